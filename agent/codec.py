@@ -1,0 +1,79 @@
+"""Bytes to messages and back, with everything checked that can be checked without a state.
+
+Decoding is a pure function of the bytes: :func:`decode_radio` may be memoised by whoever feeds
+several agents in one process.
+"""
+
+from typing import Any, TypeVar
+
+import msgpack
+import msgspec
+
+from agent.messages import Beacon, Command, Gossip, Observation
+
+MAX_RADIO_B = 1200
+MAX_MESSAGE_B = 4096
+
+_T = TypeVar("_T", bound=msgspec.Struct)
+_encode = msgspec.msgpack.Encoder().encode
+
+
+class Rejected(ValueError):
+    """A message that is refused; ``cause`` is the name it is counted under."""
+
+    def __init__(self, cause: str, detail: str) -> None:
+        super().__init__(f"{cause}: {detail}")
+        self.cause = cause
+
+
+def encode(message: msgspec.Struct) -> bytes:
+    """Encode any message of ours as msgpack."""
+    return _encode(message)
+
+
+def decode(data: bytes, kind: type[_T], max_bytes: int = MAX_MESSAGE_B) -> _T:
+    """Decode and check one message, or raise :class:`Rejected`.
+
+    The limits are those of a hostile radio: no extension types, short arrays and strings, every
+    number finite and in its range, no field missing and none too many.
+    """
+    if len(data) > max_bytes:
+        raise Rejected("oversize", f"{len(data)} B where {max_bytes} B are allowed")
+    try:
+        plain: Any = msgpack.unpackb(
+            data,
+            strict_map_key=True,
+            raw=False,
+            use_list=False,
+            max_array_len=256,
+            max_map_len=64,
+            max_str_len=64,
+            max_bin_len=4096,
+            max_ext_len=0,
+        )
+    except (ValueError, TypeError, RecursionError, msgpack.exceptions.UnpackException) as error:
+        raise Rejected("garbage", str(error)) from error
+    try:
+        return msgspec.convert(plain, kind)
+    except (msgspec.ValidationError, RecursionError) as error:
+        raise Rejected("invalid", f"{kind.__name__}: {error}") from error
+
+
+def decode_beacon(payload: bytes) -> Beacon:
+    """Decode a frame of the local channel, or raise :class:`Rejected`."""
+    return decode(payload, Beacon, MAX_RADIO_B)
+
+
+def decode_gossip(payload: bytes) -> Gossip:
+    """Decode a frame of the multihop channel, or raise :class:`Rejected`."""
+    return decode(payload, Gossip, MAX_RADIO_B)
+
+
+def decode_observation(data: bytes) -> Observation:
+    """Decode what the world tells a vehicle, or raise :class:`Rejected`."""
+    return decode(data, Observation)
+
+
+def decode_command(data: bytes) -> Command:
+    """Decode what an agent commands, or raise :class:`Rejected`."""
+    return decode(data, Command)

@@ -1,0 +1,127 @@
+"""What an agent hears, sees, says and commands.
+
+Everything is in SI units and in the world frame (x, y horizontal, z up) unless a field says
+otherwise. Angles are radians, yaw counted from +x towards +y. Numbers are checked when a message
+is decoded: finite, and within the bounds given here.
+"""
+
+from typing import Annotated, NamedTuple
+
+import msgspec
+from msgspec import Meta
+
+Vector = tuple[float, float, float]
+
+Metres = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Speed = Annotated[float, Meta(ge=-100, le=100)]
+Seconds = Annotated[float, Meta(ge=0, le=1e9)]
+Radians = Annotated[float, Meta(ge=-100, le=100)]
+Count = Annotated[int, Meta(ge=0, lt=2**53)]
+AgentId = Annotated[int, Meta(ge=0, lt=2**16)]
+Index = Annotated[int, Meta(ge=-1, lt=2**15)]
+
+Position = tuple[Metres, Metres, Metres]
+Velocity = tuple[Speed, Speed, Speed]
+
+
+class Place(NamedTuple):
+    """A place in a formation: the rank-th slot of a queue, rank 0 at the queue's first vertex.
+
+    A vertex that queues share is one place: that of the first of these queues.
+    """
+
+    queue: int
+    rank: int
+
+
+class Message(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
+    """A message: immutable, encoded as an array, refused when it has a field too many."""
+
+
+class Observation(Message, frozen=True):
+    """What one vehicle senses at the start of one of its slots; never the truth about others.
+
+    position [m], velocity [m/s], yaw [rad] are the vehicle's own.
+    vehicles: other vehicles within the proximity sensor's 2 m, as positions relative to this
+    vehicle's centre [m; axes of the world frame]. A body has no name.
+    """
+
+    slot: Count
+    time_s: Seconds
+    position: Position
+    velocity: Velocity
+    yaw: Radians
+    vehicles: tuple[Position, ...]
+
+
+class Telemetry(Message, frozen=True):
+    """What an agent tells about its own reasons, for the recording and the judge.
+
+    wanted: velocity before the safety filter [m/s]; force: |u_i| of (28) before saturation;
+    target: its target-on-queue [m]; place: where in the formation it means to be; heard: ids
+    heard directly of late; rejected: messages refused so far.
+    """
+
+    wanted: Velocity
+    force: Annotated[float, Meta(ge=0, le=1e9)]
+    target: Position | None
+    place: tuple[Index, Index] | None
+    heard: tuple[AgentId, ...]
+    rejected: Count
+
+
+class Command(Message, frozen=True):
+    """What a vehicle shall do from now until ``expires_slot``; then it stops and hovers."""
+
+    slot: Count
+    incarnation: Count
+    expires_slot: Count
+    velocity: Velocity
+    yaw: Radians
+    telemetry: Telemetry
+
+
+class Beacon(Message, frozen=True):
+    """The local channel's broadcast (E22): heard directly, never forwarded.
+
+    stamp_s: the sender's Observation time. target: where it is heading right now, q_tg of the
+    paper, which the potential of (22) needs. queue, rank: the place it claims, -1 for none.
+    speed_cap: it promises to stay below this speed for the next 3 s [m/s].
+    echoes: for each neighbour the last sequence heard of it.
+    """
+
+    id: AgentId
+    incarnation: Count
+    sequence: Count
+    stamp_s: Seconds
+    position: Position
+    velocity: Velocity
+    target: Position
+    queue: Index
+    rank: Index
+    speed_cap: Annotated[float, Meta(ge=0, le=100)]
+    echoes: Annotated[tuple[tuple[AgentId, Count], ...], Meta(max_length=128)]
+
+
+class Record(Message, frozen=True):
+    """What one agent last said of itself, passed on over the multihop channel (E24).
+
+    Only its subject writes it; ``version`` grows with each writing. stamp_s is the subject's
+    Observation time at the writing. queue, rank: the place it claims, -1 for none.
+    """
+
+    id: AgentId
+    incarnation: Count
+    version: Count
+    stamp_s: Seconds
+    position: Position
+    queue: Index
+    rank: Index
+
+
+class Gossip(Message, frozen=True):
+    """One frame of the multihop channel: some records, its sender's own among them or not."""
+
+    id: AgentId
+    stamp_s: Seconds
+    records: Annotated[tuple[Record, ...], Meta(max_length=64)]

@@ -1,0 +1,1 @@
+"""Formations, queues and their shapes (Definitions 3 and 4 of the paper)."""

@@ -1,0 +1,65 @@
+"""What an agent is told once, before it flies: tables of the scenario, as they stand there."""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from agent.qstructure.formation import FormationSpec
+
+Positive = Annotated[float, Meta(gt=0, le=1e4)]
+Hertz = Annotated[float, Meta(gt=0, le=1000)]
+
+
+class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A table of the scenario: unknown keys are refused."""
+
+
+class Vehicle(Table, frozen=True):
+    """The vehicle's limits and senses; ``max_turn_deg`` is theta, half angle of the cast-zone."""
+
+    kind: Literal["kinematic"] = "kinematic"
+    radius_m: Annotated[float, Meta(gt=0, le=100)] = 0.1
+    max_speed_mps: Annotated[float, Meta(gt=0, le=50)] = 0.5
+    max_climb_mps: Annotated[float, Meta(gt=0, le=50)] = 0.5
+    max_yaw_rate_dps: Annotated[float, Meta(gt=0, le=10_000)] = 180.0
+    max_turn_deg: Annotated[float, Meta(gt=0, le=90)] = 45.0
+    sensors: tuple[Literal["proximity"], ...] = ("proximity",)
+
+
+class Control(Table, frozen=True):
+    """The controller and the paper's distances [m]: d_ir, d_ob, d_s, d_c1, d_c2.
+
+    ``cast_far_m`` left out follows from the range (Lemma 7, E20).
+    """
+
+    controller: Annotated[str, Meta(min_length=1, max_length=200)] = "q_structure"
+    spacing_m: Positive = 1.0
+    separation_m: Positive = 0.25
+    safety_m: Positive = 0.6
+    cast_near_m: Positive = 0.05
+    cast_far_m: Positive | None = None
+
+
+class Comms(Table, frozen=True):
+    """How often each channel is used [Hz]; ``multihop_hz`` 0 is off."""
+
+    local_hz: Hertz = 20.0
+    multihop_hz: Annotated[float, Meta(ge=0, le=1000)] = 2.0
+
+
+class AgentSetup(Table, frozen=True):
+    """All that one agent is told.
+
+    command_ticks: for how many ticks a command is valid; H of ERRATA 2 follows from it.
+    """
+
+    id: Annotated[int, Meta(ge=0, lt=2**16)]
+    incarnation: Annotated[int, Meta(ge=0)]
+    tick_hz: Hertz
+    slots_per_tick: Annotated[int, Meta(ge=1, le=64)]
+    command_ticks: Annotated[int, Meta(ge=1, le=10)]
+    vehicle: Vehicle
+    control: Control
+    comms: Comms
+    formation: FormationSpec

@@ -1,0 +1,125 @@
+"""The radio medium: every frame in flight, and what became of every frame.
+
+A pure state machine. Time enters with the true positions (``place``); each transmission is judged
+once, link by link, when it is sent; ``collect`` hands a receiver what came due. The order of
+deliveries is canonical, (due, source, incarnation, channel, count), so it does not depend on the
+order in which transmissions arrived.
+"""
+
+from hashlib import sha256
+from heapq import heappop, heappush
+from math import sqrt
+from struct import Struct as Layout
+
+from netem.link import Cause, LinkModel, draw, verdict
+from netem.messages import MediumSetup, Position, Verdicts
+from netem.schedule import Schedule
+from netem.wire.frame import Frame, Transmission
+
+_FATE = Layout("<5qBd")
+_InFlight = tuple[float, int, int, int, int, Frame]
+
+
+class Medium:
+    """Frames between agents under a seed and conditions.
+
+    Conservation, at every moment: ``addressed`` (frames sent, times the other agents) equals
+    the sum of all fates plus what is in flight.
+    """
+
+    def __init__(self, setup: MediumSetup) -> None:
+        self._seed = sha256(b"qswarm medium %d" % setup.seed).digest()
+        self._schedule = Schedule(setup.conditions)
+        self._agents = setup.agents
+        self._positions: tuple[Position | None, ...] = (None,) * setup.agents
+        self._queues: list[list[_InFlight]] = [[] for _ in range(setup.agents)]
+        self._counts: dict[tuple[int, int, int], int] = {}
+        self._fates = [0] * len(Cause)
+        self._journal = sha256()
+        self.sent = 0
+        self.in_flight = 0
+
+    @property
+    def addressed(self) -> int:
+        """How many (frame, other agent) pairs there were so far."""
+        return self.sent * (self._agents - 1)
+
+    def place(self, positions: tuple[Position | None, ...]) -> None:
+        """Take the true positions, row i = agent i [m; world frame]; None is not in the world."""
+        self._positions = positions
+
+    def transmit(self, source: int, sent_s: float, transmission: Transmission) -> None:
+        """Judge one agent's frames of one slot, sent at ``sent_s`` [s], on every link."""
+        for outgoing in transmission.frames:
+            count_key = (source, transmission.incarnation, outgoing.channel)
+            count = self._counts.get(count_key, 0)
+            self._counts[count_key] = count + 1
+            self.sent += 1
+            self._spread(
+                Frame(source, transmission.incarnation, outgoing.channel, count, outgoing.payload),
+                sent_s,
+            )
+
+    def collect(self, receiver: int, now_s: float) -> tuple[Frame, ...]:
+        """Return, and forget, the frames that came due for one receiver by ``now_s`` [s]."""
+        queue = self._queues[receiver]
+        frames = []
+        while queue and queue[0][0] <= now_s:
+            frames.append(heappop(queue)[-1])
+        self.in_flight -= len(frames)
+        self._fates[Cause.DELIVERED] += len(frames)
+        return tuple(frames)
+
+    def discard(self, receiver: int) -> None:
+        """Drop what is in flight to a receiver that is no longer there."""
+        lost = len(self._queues[receiver])
+        self._queues[receiver].clear()
+        self.in_flight -= lost
+        self._fates[Cause.DROPPED_MEDIUM] += lost
+
+    def digest(self) -> bytes:
+        """Return a hash over every verdict so far, in canonical order within a transmission."""
+        return self._journal.digest()
+
+    def verdicts(self, slot: int) -> Verdicts:
+        """Return the counters as they stand."""
+        fates = {cause.name.lower(): self._fates[cause] for cause in Cause}
+        return Verdicts(slot, self.sent, self.addressed, fates, self.in_flight, {}, self.digest())
+
+    def _spread(self, frame: Frame, sent_s: float) -> None:
+        here = self._positions[frame.source]
+        for receiver in range(self._agents):
+            if receiver == frame.source:
+                continue
+            there = self._positions[receiver]
+            link = self._schedule.model(frame.channel, frame.source, receiver)
+            distance_m = _distance(here, there) if here and there else float("nan")
+            self._judge(frame, receiver, link, distance_m, sent_s)
+
+    def _judge(
+        self, frame: Frame, receiver: int, link: LinkModel, distance_m: float, sent_s: float
+    ) -> None:
+        source, incarnation, channel, count = (
+            frame.source,
+            frame.incarnation,
+            frame.channel,
+            frame.count,
+        )
+        draws = None
+        if link.draws:
+            draws = draw(self._seed, source, incarnation, receiver, channel, count)
+        fate = verdict(link, distance_m, draws)
+        self._journal.update(
+            _FATE.pack(source, incarnation, receiver, channel, count, fate.cause, fate.delay_s)
+        )
+        if fate.cause is not Cause.DELIVERED:
+            self._fates[fate.cause] += 1
+            return
+        due_s = sent_s + fate.delay_s
+        heappush(self._queues[receiver], (due_s, source, incarnation, channel, count, frame))
+        self.in_flight += 1
+
+
+def _distance(a: Position, b: Position) -> float:
+    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return sqrt(dx * dx + dy * dy + dz * dz)

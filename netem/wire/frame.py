@@ -1,0 +1,108 @@
+"""Frames, and the two messages that carry them between an agent and the medium.
+
+An agent's slot ends with one :class:`Transmission`; a slot begins with one :class:`Batch`. The
+payload of a frame is opaque here: the radio never decodes what it carries.
+"""
+
+from typing import Annotated, Any, TypeVar
+
+import msgpack
+import msgspec
+from msgspec import Meta
+
+LOCAL = 0
+"""High-frequency, short-term channel: heard directly, never forwarded (paper, Sec. 3 (ii))."""
+MULTIHOP = 1
+"""Low-frequency, long-term channel: records that agents pass on (paper, Sec. 3 (i))."""
+CHANNELS = ("local", "multihop")
+
+MAX_PAYLOAD_B = 1200
+MAX_TRANSMISSION_B = 16 * 1024
+MAX_BATCH_B = 256 * 1024
+
+Count = Annotated[int, Meta(ge=0, lt=2**53)]
+AgentId = Annotated[int, Meta(ge=0, lt=2**16)]
+Channel = Annotated[int, Meta(ge=0, lt=len(CHANNELS))]
+Payload = Annotated[bytes, Meta(max_length=MAX_PAYLOAD_B)]
+
+
+class WireError(ValueError):
+    """A message that is not what it claims to be; the text says why."""
+
+
+class Outgoing(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
+    """A payload that an agent hands to its radio, for one channel."""
+
+    channel: Channel
+    payload: Payload
+
+
+class Transmission(
+    msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True
+):
+    """All that one agent sends in one slot; empty ones are sent too, for they mark the slot."""
+
+    slot: Count
+    incarnation: Count
+    frames: Annotated[tuple[Outgoing, ...], Meta(max_length=64)]
+
+
+class Frame(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
+    """A payload as it is heard: from whom, on which channel, and the medium's own count of it."""
+
+    source: AgentId
+    incarnation: Count
+    channel: Channel
+    count: Count
+    payload: Payload
+
+
+class Batch(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
+    """All that one agent hears at the start of one slot, in the order it came due."""
+
+    slot: Count
+    frames: tuple[Frame, ...]
+
+
+_T = TypeVar("_T")
+_encode = msgspec.msgpack.Encoder().encode
+
+
+def pack(message: msgspec.Struct) -> bytes:
+    """Encode a message of ours as msgpack."""
+    return _encode(message)
+
+
+def unpack(data: bytes, kind: type[_T], max_bytes: int, max_items: int = 4096) -> _T:
+    """Decode and check a message from outside, or raise :class:`WireError`.
+
+    Sizes are checked before anything is built; extension types, map keys that are no strings and
+    numbers that are not finite or out of range do not pass.
+    """
+    if len(data) > max_bytes:
+        raise WireError(f"oversize: {len(data)} B where {max_bytes} B are allowed")
+    try:
+        plain: Any = msgpack.unpackb(
+            data,
+            strict_map_key=True,
+            raw=False,
+            use_list=False,
+            max_array_len=max_items,
+            max_map_len=64,
+            max_str_len=64,
+            max_bin_len=max_bytes,
+            max_ext_len=0,
+        )
+        return msgspec.convert(plain, kind)
+    except (ValueError, TypeError, RecursionError, msgpack.exceptions.UnpackException) as error:
+        raise WireError(f"malformed {kind.__name__}: {error}") from error
+
+
+def unpack_transmission(data: bytes) -> Transmission:
+    """Decode what an agent sent, or raise :class:`WireError`."""
+    return unpack(data, Transmission, MAX_TRANSMISSION_B)
+
+
+def unpack_batch(data: bytes) -> Batch:
+    """Decode what the medium delivered, or raise :class:`WireError`."""
+    return unpack(data, Batch, MAX_BATCH_B)

@@ -1,0 +1,1 @@
+"""Metrics, invariants and the verdict, from the truth alone."""

@@ -1,0 +1,37 @@
+"""What is judged and recorded once a tick: the same rows for both, so that both can agree.
+
+Rows are single precision, as the recording keeps them: a verdict recomputed from the recording
+meets the very numbers that the first one met. (The trace hash covers every slot in full.)
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Singles = NDArray[np.float32]
+Packets = dict[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """One tick of truth and telemetry; row i = agent i, NaN for no vehicle in the world.
+
+    position (N, 3) [m; world frame]; yaw (N,) [rad]; target (N, 3) [m; world frame], the
+    target-on-queue, NaN for none; place (N, 2): queue and rank, -1 for none; force (N,) |u_i| of
+    (28); turn_deg (N,): azimuth of the wanted velocity against the heading on moving steps, else
+    NaN; alive (N,): whether the agent's process takes part; links (L, 2): (hearer, heard).
+    packets: counters so far, as in summary.json.
+    """
+
+    index: int
+    time_s: float
+    position: Singles
+    yaw: Singles
+    target: Singles
+    place: NDArray[np.int16]
+    force: Singles
+    turn_deg: Singles
+    alive: NDArray[np.bool_]
+    links: NDArray[np.int32]
+    packets: Packets = field(default_factory=dict)

@@ -1,0 +1,162 @@
+"""The judge: sees every tick, and says in the end whether the expectations held.
+
+It knows the formation, and what was true; of an agent's telemetry it takes only the place the
+agent means to hold, and computes where that place is by itself.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from agent.messages import Place
+from agent.qstructure.formation import Formation
+from agent.qstructure.frame import Frame
+from worldsim.judge.metrics import Floats, swept_separation
+from worldsim.judge.tick import Tick
+from worldsim.scenario import Scenario
+
+CONVERGED_M = 0.12
+CONVERGED_S = 2.0
+TURN_LIMIT_SLACK_DEG = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """What the judge measured at one tick; NaN where there is nothing to measure.
+
+    separation (N,) [m]: swept since the tick before; slot_error (N,) [m]: to the agent's own slot.
+    """
+
+    separation: Floats
+    slot_error: Floats
+    converged: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """One thing a run must show, and what it did show."""
+
+    name: str
+    wanted: Any
+    got: Any
+    held: bool
+
+
+class Phase:
+    """The time of one formation, and how the team came into it."""
+
+    def __init__(self, formation: Formation, spacing: float, from_s: float) -> None:
+        self.formation = formation
+        self.from_s = from_s
+        self.converge_s: float | None = None
+        self.residual_m: float | None = None
+        self._spacing = spacing
+        self._frame = Frame()
+        self._since_s: float | None = None
+
+    def slot_error(self, tick: Tick) -> Floats:
+        """Return each agent's distance to the slot it claims [m]; infinite without a valid one.
+
+        Two that claim the same slot have none: neither counts as arrived.
+        """
+        claims = [Place(int(queue), int(rank)) for queue, rank in tick.place]
+        error = np.full(len(claims), np.nan)
+        for row, place in enumerate(claims):
+            if np.isnan(tick.position[row, 0]):
+                continue
+            rivals = [other for other, claim in enumerate(claims) if claim == place]
+            contested = sum(bool(tick.alive[other]) for other in rivals) > 1
+            if contested or not self.formation.holds(place):
+                error[row] = np.inf
+                continue
+            slot = self._frame.to_world(self.formation.slot(place, self._spacing))
+            error[row] = np.linalg.norm(tick.position[row].astype(np.float64) - slot)
+        return error
+
+    def see(self, time_s: float, error: Floats) -> bool:
+        """Take the living agents' slot errors [m] at a tick; return whether all are in place."""
+        present = error[~np.isnan(error)]
+        in_place = len(present) > 0 and bool(np.all(present <= CONVERGED_M))
+        worst = float(present.max()) if len(present) else np.inf
+        self.residual_m = worst if np.isfinite(worst) else None
+        if not in_place:
+            self._since_s = None
+            return False
+        if self._since_s is None:
+            self._since_s = time_s
+        if self.converge_s is None and time_s - self._since_s >= CONVERGED_S - 1e-9:
+            self.converge_s = self._since_s - self.from_s
+        return True
+
+
+class Judge:
+    """Sees every tick of a run under a scenario's expectations."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._formation = Formation(scenario.formation)
+        self.phases = [Phase(self._formation, scenario.control.spacing_m, 0.0)]
+        self.ticks = 0
+        self.min_separation_m: float | None = None
+        self.separation_violations = 0
+        self._turns = 0
+        self._turns_over = 0
+        self._before: Tick | None = None
+
+    def see(self, tick: Tick) -> Figures:
+        """Judge one tick; ticks come in order."""
+        before = self._before.position if self._before is not None else tick.position
+        self._before = tick
+        self.ticks += 1
+        separation = swept_separation(before, tick.position)
+        self._see_separation(separation)
+        turns = tick.turn_deg[~np.isnan(tick.turn_deg)]
+        limit = self._scenario.vehicle.max_turn_deg + TURN_LIMIT_SLACK_DEG
+        self._turns += len(turns)
+        self._turns_over += int(np.sum(np.abs(turns) > limit))
+        phase = self.phases[-1]
+        error = phase.slot_error(tick)
+        in_place = phase.see(tick.time_s, np.where(tick.alive, error, np.nan))
+        return Figures(separation, error, in_place)
+
+    @property
+    def turns_over_limit_fraction(self) -> float | None:
+        """Share of moving steps whose wanted turn exceeds the vehicle's; None without any."""
+        return self._turns_over / self._turns if self._turns else None
+
+    def expectations(self) -> list[Expectation]:
+        """Return what was expected of the run and what it showed."""
+        expect = self._scenario.expect
+        wanted_m = expect.min_separation_m
+        if wanted_m is None:
+            wanted_m = self._scenario.control.separation_m
+        least = self.min_separation_m
+        rows = [
+            Expectation(
+                "min_separation_m",
+                wanted_m,
+                least,
+                least >= wanted_m if least is not None else self._scenario.fleet.agents == 1,
+            )
+        ]
+        for phase in self.phases:
+            within = expect.converge_within_s
+            got = phase.converge_s
+            held = got is not None and (within is None or got <= within)
+            rows.append(Expectation(f"converge {phase.formation.name}", within, got, held))
+        return rows
+
+    def invariants(self) -> dict[str, dict[str, int]]:
+        """Return each invariant checked at every tick: ticks evaluated, violations."""
+        return {"I1": {"ticks": self.ticks, "violations": self.separation_violations}}
+
+    def _see_separation(self, separation: Floats) -> None:
+        present = separation[~np.isnan(separation)]
+        if not len(present):
+            return
+        least = float(present.min())
+        if self.min_separation_m is None or least < self.min_separation_m:
+            self.min_separation_m = least
+        if least < self._scenario.control.separation_m:
+            self.separation_violations += 1

@@ -1,0 +1,188 @@
+"""The slot loop, the same under every clock: who takes part, in which order, and what is seen.
+
+A clock calls ``open`` at the start of a slot, brings the observations to the agents and their
+commands back to ``obey``, and calls ``close``. Nothing here knows how messages travel.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import atan2, degrees, hypot, pi
+from typing import Any, Protocol
+
+import numpy as np
+
+from agent.messages import Command, Observation, Vector
+from worldsim.judge.tick import Packets, Tick
+from worldsim.judge.verdict import Figures, Judge
+from worldsim.run.trace import Trace
+from worldsim.scenario import SLOTS_PER_TICK, Scenario
+from worldsim.truth.sensor import ProximitySensor
+from worldsim.truth.start import starts
+from worldsim.truth.world import Clock, World
+
+MOVING_MPS = 0.02
+Event = dict[str, Any]
+
+
+class Recorder(Protocol):
+    """Keeps what a run showed. It must never fail the run: it reports its own troubles."""
+
+    def tick(self, tick: Tick, figures: Figures) -> None:
+        """Keep one tick."""
+
+    def event(self, event: Event) -> None:
+        """Keep one event: ``t_s``, ``kind``, ``agent`` and what else belongs to the kind."""
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A slot as it begins: the truth for the medium, an observation for each agent that steps."""
+
+    slot: int
+    time_s: float
+    positions: tuple[Vector | None, ...]
+    observations: list[tuple[int, Observation]]
+
+
+def world_of(scenario: Scenario, command_ticks: int) -> World:
+    """Return a scenario's world at its start. Raises StartError where there is no room."""
+    position, yaw = starts(scenario.fleet.start, scenario.fleet.agents, scenario.seed)
+    return World(
+        clock=Clock(scenario.fleet.tick_hz, SLOTS_PER_TICK),
+        limits=scenario.vehicle,
+        position=position,
+        yaw=yaw,
+        sensor=ProximitySensor(scenario.seed, scenario.sensor.proximity.noise_m),
+        command_ticks=command_ticks,
+    )
+
+
+class SlotLoop:
+    """Steps a world slot by slot, and shows every tick to the judge and the recorder.
+
+    ``packets`` is asked once a tick for the medium's counters.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        world: World,
+        recorder: Recorder | None = None,
+        packets: Callable[[], Packets] = dict,
+    ) -> None:
+        self.world = world
+        self.judge = Judge(scenario)
+        self.trace = Trace()
+        self.events: list[Event] = []
+        self.figures: Figures | None = None
+        self._alive = np.ones(scenario.fleet.agents, dtype=np.bool_)
+        self._recorder = recorder
+        self._packets = packets
+        self._places: list[tuple[int, int] | None] = [None] * scenario.fleet.agents
+        self._headings = world.fleet.yaw.tolist()
+        self._turn_deg = np.full(scenario.fleet.agents, np.nan, dtype=np.float32)
+
+    def open(self) -> Opened:
+        """Begin the present slot; at a tick, judge and record it first."""
+        world = self.world
+        self.trace.poses(world.slot, world.fleet)
+        if world.slot % world.clock.slots_per_tick == 0:
+            self._show()
+        group = [
+            agent
+            for agent in range(
+                world.slot % world.clock.slots_per_tick,
+                len(self._alive),
+                world.clock.slots_per_tick,
+            )
+            if self._alive[agent]
+        ]
+        observations = list(zip(group, world.observe(group), strict=True)) if group else []
+        for agent, observation in observations:
+            self._headings[agent] = observation.yaw
+        return Opened(world.slot, world.time_s, world.positions(), observations)
+
+    def obey(self, agent: int, command: Command, encoded: bytes) -> None:
+        """Take one agent's command; under a barrier, in order of ids."""
+        if self.world.obey(agent, command):
+            self.trace.command(agent, encoded)
+            self._turn_deg[agent] = _turn_deg(command.telemetry.wanted, self._headings[agent])
+            self._watch_place(agent, command)
+
+    def close(self, verdicts: bytes) -> None:
+        """End the slot with the medium's digest: the vehicles fly through it."""
+        self.trace.verdicts(verdicts)
+        self.world.advance()
+
+    def finish(self) -> None:
+        """Show the last tick, at the end of the run."""
+        if self.world.slot % self.world.clock.slots_per_tick == 0:
+            self._show()
+
+    def lost(self, agent: int, **details: Any) -> None:
+        """An agent's process is gone: it takes no more part; its vehicle stops and hovers."""
+        self._alive[agent] = False
+        self.event("kill", agent, **details)
+
+    def event(self, kind: str, agent: int | None, **details: Any) -> None:
+        """Note an event now."""
+        event = {"t_s": round(self.world.time_s, 6), "kind": kind, "agent": agent, **details}
+        self.events.append(event)
+        if self._recorder is not None:
+            self._recorder.event(event)
+
+    def _watch_place(self, agent: int, command: Command) -> None:
+        before, now = self._places[agent], command.telemetry.place
+        if now == before:
+            return
+        self._places[agent] = now
+        self.event("slot", agent, place=now, before=before)
+        if before is None or now is None or before[0] != now[0]:
+            self.event("queue", agent, queue=now[0] if now else None)
+        if (before is not None and before[1] == 0) != (now is not None and now[1] == 0):
+            self.event("role", agent, role="vertex" if now and now[1] == 0 else "member")
+
+    def _show(self) -> None:
+        tick = self._tick()
+        self.figures = self.judge.see(tick)
+        if self._recorder is not None:
+            self._recorder.tick(tick, self.figures)
+
+    def _tick(self) -> Tick:
+        fleet = self.world.fleet
+        count = len(fleet)
+        target = np.full((count, 3), np.nan, dtype=np.float32)
+        place = np.full((count, 2), -1, dtype=np.int16)
+        force = np.full(count, np.nan, dtype=np.float32)
+        links: list[tuple[int, int]] = []
+        for row, command in enumerate(self.world.latest):
+            if command is None or not self._alive[row]:
+                continue
+            told = command.telemetry
+            force[row] = told.force
+            if told.target is not None:
+                target[row] = told.target
+            if told.place is not None:
+                place[row] = told.place
+            links.extend((row, other) for other in told.heard)
+        return Tick(
+            index=self.world.slot // self.world.clock.slots_per_tick,
+            time_s=self.world.time_s,
+            position=fleet.position.astype(np.float32),
+            yaw=fleet.yaw.astype(np.float32),
+            target=target,
+            place=place,
+            force=force,
+            turn_deg=np.where(self._alive, self._turn_deg, np.float32(np.nan)),
+            alive=self._alive.copy(),
+            links=np.array(links, dtype=np.int32).reshape(-1, 2),
+            packets=self._packets(),
+        )
+
+
+def _turn_deg(wanted: Vector, heading: float) -> float:
+    """Return the wanted turn [deg] in (-180, 180]; NaN for a step too slow to have an azimuth."""
+    if hypot(wanted[0], wanted[1]) <= MOVING_MPS:
+        return float("nan")
+    turn = atan2(wanted[1], wanted[0]) - heading
+    return degrees(turn - 2.0 * pi * round(turn / (2.0 * pi)))

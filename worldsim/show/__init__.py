@@ -1,0 +1,1 @@
+"""What a person sees: the recording and the pictures made of it."""

@@ -1,0 +1,52 @@
+"""Vehicles as arrays: every row is one vehicle, in the world frame, SI units.
+
+Only + - * / sqrt and rounding cross rows here, so that a trace is the same in every clock.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agent.setup import Vehicle
+
+Floats = NDArray[np.float64]
+_TURN = 2.0 * np.pi
+
+
+def wrapped(angle: Floats) -> Floats:
+    """Return angles [rad] in [-pi, pi]."""
+    return angle - _TURN * np.rint(angle / _TURN)
+
+
+class Fleet:
+    """Kinematic vehicles: they take up any velocity at once, within speed, climb and yaw rate.
+
+    position (N, 3) [m], velocity (N, 3) [m/s], yaw (N,) [rad]; a row of NaN is not in the world.
+    """
+
+    def __init__(self, position: Floats, yaw: Floats, limits: Vehicle) -> None:
+        self.position = position.astype(np.float64)
+        self.velocity = np.zeros_like(self.position)
+        self.yaw = yaw.astype(np.float64)
+        self._max_speed = limits.max_speed_mps
+        self._max_climb = limits.max_climb_mps
+        self._max_yaw_rate = np.radians(limits.max_yaw_rate_dps)
+
+    def __len__(self) -> int:
+        return len(self.yaw)
+
+    def integrate(self, velocity: Floats, yaw: Floats, dt: float) -> None:
+        """Fly for ``dt`` [s] at the velocities (N, 3) [m/s] and towards the yaws (N,) [rad] wanted.
+
+        A velocity beyond a limit is scaled down as a whole, so that its direction holds.
+        """
+        self.velocity = self._limited(velocity)
+        self.position = self.position + self.velocity * dt
+        reach = self._max_yaw_rate * dt
+        self.yaw = wrapped(self.yaw + np.clip(wrapped(yaw - self.yaw), -reach, reach))
+
+    def _limited(self, velocity: Floats) -> Floats:
+        x, y, z = velocity[:, 0], velocity[:, 1], velocity[:, 2]
+        speed = np.sqrt(x * x + y * y + z * z)
+        scale = np.minimum(1.0, self._max_speed / np.maximum(speed, 1e-12))
+        scale = np.minimum(scale, self._max_climb / np.maximum(np.abs(z), 1e-12))
+        return velocity * scale[:, None]

@@ -1,0 +1,118 @@
+"""The world: commands in, vehicles fly, observations out.
+
+A pure state machine over slots; ``slot`` counts them, ``time_s`` is slot / slot_hz, never a sum.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from agent.messages import Command, Observation, Vector
+from agent.setup import Vehicle
+from worldsim.truth.sensor import ProximitySensor
+from worldsim.truth.vehicle import Fleet, Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """How simulated time is cut: ``slots_per_tick`` slots to a tick, ``tick_hz`` ticks a second."""
+
+    tick_hz: float
+    slots_per_tick: int
+
+    @property
+    def slot_hz(self) -> float:
+        """Slots per second."""
+        return self.tick_hz * self.slots_per_tick
+
+    def time_s(self, slot: int) -> float:
+        """Return the simulated time at which a slot starts [s]."""
+        return slot / self.slot_hz
+
+    def steps(self, agent: int, slot: int) -> bool:
+        """Whether an agent steps in a slot: agents take turns, so they are asynchronous."""
+        return slot % self.slots_per_tick == agent % self.slots_per_tick
+
+
+class World:
+    """Vehicles under commands.
+
+    ``senses``: whether the vehicles carry the proximity sensor. ``command_ticks``: for how many
+    ticks a command may be valid at most.
+    """
+
+    def __init__(  # noqa: PLR0913 - a world is made once, by name
+        self,
+        *,
+        clock: Clock,
+        limits: Vehicle,
+        position: Floats,
+        yaw: Floats,
+        sensor: ProximitySensor,
+        command_ticks: int,
+    ) -> None:
+        self.clock = clock
+        self.slot = 0
+        self.fleet = Fleet(position, yaw, limits)
+        self.latest: list[Command | None] = [None] * len(yaw)
+        self.discarded = 0
+        self._senses = "proximity" in limits.sensors
+        self._sensor = sensor
+        self._longest = command_ticks * clock.slots_per_tick
+        self._expires = np.zeros(len(yaw), dtype=np.int64)
+        self._velocity = np.zeros((len(yaw), 3))
+        self._yaw = self.fleet.yaw.copy()
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time at the start of the present slot [s]."""
+        return self.clock.time_s(self.slot)
+
+    def positions(self) -> tuple[Vector | None, ...]:
+        """Return true positions, row i = agent i [m; world frame], None where there is none."""
+        return tuple(
+            None if row[0] != row[0] else (row[0], row[1], row[2])
+            for row in self.fleet.position.tolist()
+        )
+
+    def observe(self, looking: list[int]) -> list[Observation]:
+        """Return the present slot's observations of these agents, in their order."""
+        if self._senses:
+            sensed = self._sensor.read(self.fleet.position, looking, self.slot)
+        else:
+            sensed = [()] * len(looking)
+        position = self.fleet.position[looking].tolist()
+        velocity = self.fleet.velocity[looking].tolist()
+        yaw = self.fleet.yaw[looking].tolist()
+        return [
+            Observation(self.slot, self.time_s, tuple(p), tuple(v), heading, bodies)
+            for p, v, heading, bodies in zip(position, velocity, yaw, sensed, strict=True)
+        ]
+
+    def obey(self, agent: int, command: Command) -> bool:
+        """Take a command, or discard and count it: too old, not newer than the last, or ahead.
+
+        A process that was stopped for a while answers old observations when it goes on; what it
+        says then must move nothing.
+        """
+        last = self.latest[agent]
+        stale = not self.slot - self.clock.slots_per_tick <= command.slot <= self.slot
+        repeated = last is not None and (
+            (command.incarnation, command.slot) <= (last.incarnation, last.slot)
+        )
+        if stale or repeated:
+            self.discarded += 1
+            return False
+        self.latest[agent] = command
+        self._expires[agent] = min(command.expires_slot, command.slot + self._longest)
+        self._velocity[agent] = command.velocity
+        self._yaw[agent] = command.yaw
+        return True
+
+    def advance(self) -> None:
+        """Fly through the present slot; a vehicle whose command has expired stops and hovers."""
+        valid = self._expires > self.slot
+        velocity = np.where(valid[:, None], self._velocity, 0.0)
+        yaw = np.where(valid, self._yaw, self.fleet.yaw)
+        self.fleet.integrate(velocity, yaw, 1.0 / self.clock.slot_hz)
+        self.slot += 1
