@@ -40,7 +40,7 @@ def decode(data: bytes, kind: type[_T], max_bytes: int = MAX_MESSAGE_B) -> _T:
     if len(data) > max_bytes:
         raise Rejected("oversize", f"{len(data)} B where {max_bytes} B are allowed")
     try:
-        plain: Any = msgpack.unpackb(
+        plain: Any = msgpack.unpackb(  # type: ignore[attr-defined, no-untyped-call]
             data,
             strict_map_key=True,
             raw=False,

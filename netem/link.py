@@ -52,7 +52,7 @@ _NUMBERS = Layout("<4Q")
 _UNIT = 1.0 / 2**53
 
 
-def draw(  # noqa: PLR0913 - the key of a draw is its whole identity
+def draw(
     seed: bytes, source: int, incarnation: int, destination: int, channel: int, count: int
 ) -> tuple[float, float, float, float]:
     """Return four numbers in [0, 1) that belong to one frame on one link and to nothing else.

@@ -4,19 +4,13 @@ The tables below are the format; every number's unit is in its key. Paths are re
 that names them. What a file leaves out gets the value written here.
 """
 
-import math
-import re
-import tomllib
-from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated
 
-import msgspec
-import tomli_w
-from msgspec import UNSET, Meta, UnsetType
+from msgspec import Meta
 
 from agent.messages import Metres
-from agent.qstructure.formation import Formation, FormationError, FormationSpec
+from agent.qstructure.formation import FormationSpec
 from agent.setup import AgentSetup, Comms, Control, Hertz, Positive, Table, Vehicle
 from netem.messages import Conditions, MediumSetup
 

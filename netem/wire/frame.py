@@ -82,7 +82,7 @@ def unpack(data: bytes, kind: type[_T], max_bytes: int, max_items: int = 4096) -
     if len(data) > max_bytes:
         raise WireError(f"oversize: {len(data)} B where {max_bytes} B are allowed")
     try:
-        plain: Any = msgpack.unpackb(
+        plain: Any = msgpack.unpackb(  # type: ignore[attr-defined, no-untyped-call]
             data,
             strict_map_key=True,
             raw=False,

@@ -1,1 +1,1 @@
-"""Ground truth as arrays over the fleet: vehicles, what they sense, and the world that steps them."""
+"""Ground truth as arrays over the fleet: vehicles, their senses, the world that steps them."""

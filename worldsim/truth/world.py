@@ -41,7 +41,7 @@ class World:
     ticks a command may be valid at most.
     """
 
-    def __init__(  # noqa: PLR0913 - a world is made once, by name
+    def __init__(
         self,
         *,
         clock: Clock,
