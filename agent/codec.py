@@ -18,7 +18,7 @@ _T = TypeVar("_T", bound=msgspec.Struct)
 _encode = msgspec.msgpack.Encoder().encode
 
 
-class Rejected(ValueError):
+class RejectedError(ValueError):
     """A message that is refused; ``cause`` is the name it is counted under."""
 
     def __init__(self, cause: str, detail: str) -> None:
@@ -32,13 +32,13 @@ def encode(message: msgspec.Struct) -> bytes:
 
 
 def decode(data: bytes, kind: type[_T], max_bytes: int = MAX_MESSAGE_B) -> _T:
-    """Decode and check one message, or raise :class:`Rejected`.
+    """Decode and check one message, or raise :class:`RejectedError`.
 
     The limits are those of a hostile radio: no extension types, short arrays and strings, every
     number finite and in its range, no field missing and none too many.
     """
     if len(data) > max_bytes:
-        raise Rejected("oversize", f"{len(data)} B where {max_bytes} B are allowed")
+        raise RejectedError("oversize", f"{len(data)} B where {max_bytes} B are allowed")
     try:
         plain: Any = msgpack.unpackb(  # type: ignore[attr-defined, no-untyped-call]
             data,
@@ -52,28 +52,28 @@ def decode(data: bytes, kind: type[_T], max_bytes: int = MAX_MESSAGE_B) -> _T:
             max_ext_len=0,
         )
     except (ValueError, TypeError, RecursionError, msgpack.exceptions.UnpackException) as error:
-        raise Rejected("garbage", str(error)) from error
+        raise RejectedError("garbage", str(error)) from error
     try:
         return msgspec.convert(plain, kind)
     except (msgspec.ValidationError, RecursionError) as error:
-        raise Rejected("invalid", f"{kind.__name__}: {error}") from error
+        raise RejectedError("invalid", f"{kind.__name__}: {error}") from error
 
 
 def decode_beacon(payload: bytes) -> Beacon:
-    """Decode a frame of the local channel, or raise :class:`Rejected`."""
+    """Decode a frame of the local channel, or raise :class:`RejectedError`."""
     return decode(payload, Beacon, MAX_RADIO_B)
 
 
 def decode_gossip(payload: bytes) -> Gossip:
-    """Decode a frame of the multihop channel, or raise :class:`Rejected`."""
+    """Decode a frame of the multihop channel, or raise :class:`RejectedError`."""
     return decode(payload, Gossip, MAX_RADIO_B)
 
 
 def decode_observation(data: bytes) -> Observation:
-    """Decode what the world tells a vehicle, or raise :class:`Rejected`."""
+    """Decode what the world tells a vehicle, or raise :class:`RejectedError`."""
     return decode(data, Observation)
 
 
 def decode_command(data: bytes) -> Command:
-    """Decode what an agent commands, or raise :class:`Rejected`."""
+    """Decode what an agent commands, or raise :class:`RejectedError`."""
     return decode(data, Command)

@@ -4,6 +4,7 @@ A shape starts at the origin; a queue puts that origin on its first vertex. An o
 for ever: past its last point it continues straight.
 """
 
+import itertools
 from bisect import bisect_right
 from math import sqrt
 from typing import Annotated, Protocol
@@ -55,7 +56,7 @@ class _Pieces:
         self._corners = corners
         self._units: list[Vector] = []
         self._starts = [0.0]
-        for a, b in zip(corners, corners[1:], strict=False):
+        for a, b in itertools.pairwise(corners):
             step = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
             length = _length(step)
             self._units.append((step[0] / length, step[1] / length, step[2] / length))
@@ -80,7 +81,7 @@ def shape_of(spec: ShapeSpec) -> Shape:
         return _Pieces([(0.0, 0.0, 0.0), spec.direction])
     first = spec.points_m[0]
     corners = [(p[0] - first[0], p[1] - first[1], p[2] - first[2]) for p in spec.points_m]
-    for index, (a, b) in enumerate(zip(corners, corners[1:], strict=False)):
+    for index, (a, b) in enumerate(itertools.pairwise(corners)):
         if _length((b[0] - a[0], b[1] - a[1], b[2] - a[2])) < 1e-9:
             raise ShapeError("points_m", f"points {index} and {index + 1} must not coincide")
     return _Pieces(corners)

@@ -120,7 +120,7 @@ class SlotLoop:
             self._show()
 
     def lost(self, agent: int, **details: Any) -> None:
-        """An agent's process is gone: it takes no more part; its vehicle stops and hovers."""
+        """Strike out an agent whose process is gone; its vehicle stops and hovers."""
         self._alive[agent] = False
         self.event("kill", agent, **details)
 
