@@ -1,0 +1,96 @@
+"""Who takes which place: one assignment that every agent solves over the agents it knows (E24).
+
+The least sum of squared distances, where a place is cheaper by ``hysteresis_m2`` for the agent
+that claims it. Agents that know the same find the same, with no negotiation and nobody in charge;
+agents that know less find nearly the same, and the claims heard mend the rest.
+"""
+
+from collections.abc import Sequence
+
+from agent.controller import Peer
+from agent.messages import Place, Vector
+
+HYSTERESIS_M2 = 0.5
+CONFLICT_M2 = 0.05
+"""Two that claim one place: the nearer by more than this keeps the claim, else the lower id."""
+GAIN_M2 = 1e-9
+
+
+def allot(
+    team: Sequence[Peer],
+    places: Sequence[Place],
+    slots: Sequence[Vector],
+    hysteresis_m2: float = HYSTERESIS_M2,
+) -> dict[int, Place]:
+    """Return a place for each member of the team, by id.
+
+    team: sorted by id; places, slots [m; world frame]: as many as the team has members, the same
+    in every agent's order. Claims come first, then the nearest pairs, then pairwise exchanges
+    until none saves anything.
+    """
+    squares = [[_square(peer.position, slot) for slot in slots] for peer in team]
+    column_of = {place: column for column, place in enumerate(places)}
+    claims = _undisputed(
+        [column_of.get(peer.place) if peer.place else None for peer in team], squares
+    )
+    for row, column in enumerate(claims):
+        if column is not None:
+            squares[row][column] -= hysteresis_m2
+    chosen = _filled(claims, squares)
+    _exchange(chosen, squares)
+    return {peer.id: places[column] for peer, column in zip(team, chosen, strict=True)}
+
+
+def _undisputed(claims: list[int | None], squares: list[list[float]]) -> list[int | None]:
+    """Return the claims with at most one row to a column: the nearer's, else the lower id's."""
+    holder: dict[int, int] = {}
+    kept: list[int | None] = [None] * len(claims)
+    for row, column in enumerate(claims):
+        if column is None:
+            continue
+        rival = holder.get(column)
+        if rival is not None:
+            if squares[row][column] >= squares[rival][column] - CONFLICT_M2:
+                continue
+            kept[rival] = None
+        holder[column] = row
+        kept[row] = column
+    return kept
+
+
+def _filled(claims: list[int | None], squares: list[list[float]]) -> list[int]:
+    """Return a column for every row: the claimed one, else greedily the nearest pair first."""
+    chosen = list(claims)
+    taken = set(claims)
+    open_rows = [row for row, column in enumerate(claims) if column is None]
+    open_columns = [column for column in range(len(claims)) if column not in taken]
+    pairs = sorted(
+        (squares[row][column], row, column) for row in open_rows for column in open_columns
+    )
+    for _, row, column in pairs:
+        if chosen[row] is None and column not in taken:
+            chosen[row] = column
+            taken.add(column)
+    return [column for column in chosen if column is not None]
+
+
+def _exchange(chosen: list[int], squares: list[list[float]]) -> None:
+    """Exchange the columns of two rows wherever that saves something, until nothing does."""
+    count = len(chosen)
+    improved = True
+    while improved:
+        improved = False
+        for a in range(count):
+            row_a = squares[a]
+            for b in range(a + 1, count):
+                at_a, at_b = chosen[a], chosen[b]
+                row_b = squares[b]
+                saved = row_a[at_a] + row_b[at_b] - row_a[at_b] - row_b[at_a]
+                if saved > GAIN_M2:
+                    chosen[a], chosen[b] = at_b, at_a
+                    improved = True
+
+
+def _square(a: Vector, b: Vector) -> float:
+    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return dx * dx + dy * dy + dz * dz

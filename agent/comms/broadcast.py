@@ -1,0 +1,84 @@
+"""What an agent says, and when: beacons on the local channel, its table on the multihop one.
+
+Fig. 3's two layers: high frequency to whoever hears it, low frequency to be passed on.
+"""
+
+from typing import NamedTuple
+
+from agent.codec import encode
+from agent.comms.gossip import Table
+from agent.messages import Beacon, Place, Record, Vector
+
+LOCAL, MULTIHOP = 0, 1
+"""Channels of the radio."""
+MEMORY = 200
+
+
+class OwnState(NamedTuple):
+    """What an agent says of itself: SI units, world frame; see Beacon."""
+
+    position: Vector
+    velocity: Vector
+    heading_for: Vector
+    place: Place | None
+    speed_cap: float
+
+    @property
+    def claim(self) -> tuple[int, int]:
+        """Queue and rank claimed, -1 for none."""
+        return self.place if self.place is not None else (-1, -1)
+
+
+class Broadcast:
+    """An agent's side of both channels; it numbers the beacons and remembers when each was sent.
+
+    beacon_period_s, round_period_s: of the two channels [s]; infinite for a channel that is off.
+    """
+
+    def __init__(
+        self, own_id: int, incarnation: int, beacon_period_s: float, round_period_s: float
+    ) -> None:
+        self._id = own_id
+        self._incarnation = incarnation
+        self._beacon_period_s = beacon_period_s
+        self._round_period_s = round_period_s
+        self._next_beacon_s = 0.0
+        self._next_round_s = 0.0
+        self._sequence = 0
+        self.sent_s: dict[int, float] = {}
+
+    def frames(
+        self, now_s: float, own: OwnState, echoes: tuple[tuple[int, int], ...], table: Table
+    ) -> tuple[tuple[int, bytes], ...]:
+        """Return what is due now, as (channel, payload)."""
+        frames: list[tuple[int, bytes]] = []
+        if now_s >= self._next_beacon_s:
+            self._next_beacon_s = now_s + self._beacon_period_s - 1e-9
+            frames.append((LOCAL, encode(self._beacon(now_s, own, echoes))))
+        if now_s >= self._next_round_s:
+            self._next_round_s = now_s + self._round_period_s - 1e-9
+            record = Record(
+                self._id, self._incarnation, self._sequence, now_s, own.position, *own.claim
+            )
+            frames.extend((MULTIHOP, frame) for frame in table.frames(record))
+        return tuple(frames)
+
+    def _beacon(self, now_s: float, own: OwnState, echoes: tuple[tuple[int, int], ...]) -> Beacon:
+        return Beacon(
+            self._id,
+            self._incarnation,
+            self._numbered(now_s),
+            now_s,
+            own.position,
+            own.velocity,
+            own.heading_for,
+            *own.claim,
+            own.speed_cap,
+            echoes,
+        )
+
+    def _numbered(self, now_s: float) -> int:
+        self._sequence += 1
+        self.sent_s[self._sequence] = now_s
+        self.sent_s.pop(self._sequence - MEMORY, None)
+        return self._sequence

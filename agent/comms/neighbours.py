@@ -1,0 +1,129 @@
+"""Neighbours: who is heard directly, how old what they said is, and who fell silent.
+
+Everything here is in the Observation's time, which all vehicles share (as GPS gives it); a host's
+clock is never read.
+"""
+
+from math import log
+
+from agent.codec import RejectedError
+from agent.controller import Heard
+from agent.messages import Beacon, Place, Vector
+
+MAX_AGE_S = 5.0
+"""A beacon older than this says nothing about now."""
+FORWARD_S = 1.0
+"""A position is carried forward along its velocity for this long at most."""
+LEAST_SILENCE_S = 1.5
+FALSE_ALARM = log(1e-6)
+SMOOTHING = 0.05
+
+
+class Neighbour:
+    """One neighbour: its last beacon, and the radio's quality as its sequence numbers show it."""
+
+    __slots__ = ("beacon", "latency_s", "mean_gap")
+
+    def __init__(self, beacon: Beacon, latency_s: float) -> None:
+        self.beacon = beacon
+        self.latency_s = latency_s
+        self.mean_gap = 1.0
+
+    def hear(self, beacon: Beacon, latency_s: float) -> None:
+        """Take a newer beacon that was under way for ``latency_s`` [s]."""
+        if beacon.incarnation == self.beacon.incarnation:
+            gap = beacon.sequence - self.beacon.sequence
+            self.mean_gap += SMOOTHING * (gap - self.mean_gap)
+        self.latency_s += SMOOTHING * (latency_s - self.latency_s)
+        self.beacon = beacon
+
+    def silence_s(self, beacon_hz: float) -> float:
+        """Return T_lost of E17 [s]: after that long without a word it is taken for gone.
+
+        So long that chance alone would bring it once in a million, at the loss measured.
+        """
+        loss = 1.0 - 1.0 / max(self.mean_gap, 1.0)
+        missed = FALSE_ALARM / log(loss) if loss > 1e-9 else 0.0
+        return max(LEAST_SILENCE_S, missed / beacon_hz) + self.latency_s
+
+
+class Neighbours:
+    """The neighbours of one agent.
+
+    beacon_hz: how often each is expected; slack_s: how far ahead of the own observation a stamp
+    may be, for a message can overtake an observation [s].
+    """
+
+    def __init__(self, own_id: int, beacon_hz: float, slack_s: float) -> None:
+        self._own_id = own_id
+        self._beacon_hz = beacon_hz
+        self._slack_s = slack_s
+        self._known: dict[int, Neighbour] = {}
+        self._last: dict[int, tuple[int, int]] = {}
+
+    def hear(self, beacon: Beacon, now_s: float, own_sent_s: dict[int, float]) -> None:
+        """Take a beacon, or raise RejectedError: a replay, or a stamp that cannot be.
+
+        own_sent_s: when each of the own recent sequences was sent [s]; a beacon that echoes one
+        was sent after it (E22), whatever its stamp says.
+        """
+        key = (beacon.incarnation, beacon.sequence)
+        if beacon.id == self._own_id:
+            raise RejectedError("spoofed", "a beacon under one's own id")
+        if key <= self._last.get(beacon.id, (-1, -1)):
+            raise RejectedError("replay", f"sequence {key} of {beacon.id} is not new")
+        age_s = now_s - beacon.stamp_s
+        if age_s < -self._slack_s:
+            raise RejectedError("future", f"a stamp {-age_s:.3f} s ahead")
+        if age_s > MAX_AGE_S:
+            raise RejectedError("old", f"a stamp {age_s:.3f} s old")
+        echoed_s = self._echoed_s(beacon, own_sent_s)
+        if echoed_s is not None and beacon.stamp_s + self._slack_s < echoed_s:
+            raise RejectedError("offset", "older than a beacon it has heard")
+        self._last[beacon.id] = key
+        known = self._known.get(beacon.id)
+        if known is None:
+            self._known[beacon.id] = Neighbour(beacon, max(0.0, age_s))
+        else:
+            known.hear(beacon, max(0.0, age_s))
+
+    def forget_silent(self, now_s: float) -> None:
+        """Drop those who have been silent for longer than chance explains."""
+        gone = [
+            who
+            for who, known in self._known.items()
+            if now_s - known.beacon.stamp_s > known.silence_s(self._beacon_hz)
+        ]
+        for who in gone:
+            del self._known[who]
+
+    def silences_s(self) -> dict[int, float]:
+        """Return for each neighbour how long it may be silent [s]."""
+        return {who: known.silence_s(self._beacon_hz) for who, known in self._known.items()}
+
+    def heard(self, now_s: float) -> tuple[Heard, ...]:
+        """Return all neighbours, brought forward to now, sorted by id."""
+        return tuple(_forward(self._known[who].beacon, now_s) for who in sorted(self._known))
+
+    def beacons(self) -> list[Beacon]:
+        """Return each neighbour's last beacon, sorted by id."""
+        return [self._known[who].beacon for who in sorted(self._known)]
+
+    def echoes(self) -> tuple[tuple[int, int], ...]:
+        """Return (id, last sequence heard) of each neighbour, sorted by id."""
+        return tuple((who, self._known[who].beacon.sequence) for who in sorted(self._known))
+
+    def _echoed_s(self, beacon: Beacon, own_sent_s: dict[int, float]) -> float | None:
+        for who, sequence in beacon.echoes:
+            if who == self._own_id:
+                return own_sent_s.get(sequence)
+        return None
+
+
+def _forward(beacon: Beacon, now_s: float) -> Heard:
+    age_s = max(0.0, now_s - beacon.stamp_s)
+    along = min(age_s, FORWARD_S)
+    p, v = beacon.position, beacon.velocity
+    position: Vector = (p[0] + along * v[0], p[1] + along * v[1], p[2] + along * v[2])
+    place = Place(beacon.queue, beacon.rank) if beacon.queue >= 0 else None
+    return Heard(beacon.id, age_s, position, v, beacon.target, place)

@@ -1,0 +1,105 @@
+"""The interface a controller implements; the Q-structure is one, a user brings another.
+
+A controller is a class that takes an :class:`~agent.setup.AgentSetup` and has ``decide``. It owns
+no socket, clock, thread or global random state: time is in what it senses. The agent around it
+keeps the neighbours, applies the safety filter to what the controller wants, and talks to radio
+and vehicle.
+"""
+
+from importlib import import_module
+from typing import NamedTuple, Protocol
+
+from agent.messages import Place, Vector
+from agent.setup import AgentSetup
+
+BUILT_IN = {"q_structure": "agent.guidance.q_structure:QStructure"}
+
+
+class ControllerError(ValueError):
+    """A controller that cannot be had; the text says why."""
+
+
+class Heard(NamedTuple):
+    """A neighbour heard directly, brought forward to now.
+
+    position [m; world frame]: as told plus velocity times age; target [m; world frame]: where it
+    is heading right now (q_tg); age_s: how old what it told is.
+    """
+
+    id: int
+    age_s: float
+    position: Vector
+    velocity: Vector
+    target: Vector
+    place: Place | None
+
+
+class Peer(NamedTuple):
+    """A member of the team as far as known, oneself included; told directly or passed on.
+
+    position [m; world frame]: where it last said it was.
+    """
+
+    id: int
+    position: Vector
+    place: Place | None
+
+
+class Senses(NamedTuple):
+    """What a controller decides on: own pose, what is heard, who is known, what is near.
+
+    vehicles: bodies within the proximity sensor, relative to the own centre [m; world axes].
+    team: sorted by id.
+    """
+
+    now_s: float
+    position: Vector
+    yaw: float
+    vehicles: tuple[Vector, ...]
+    neighbours: tuple[Heard, ...]
+    team: tuple[Peer, ...]
+
+
+class Intent(NamedTuple):
+    """What a controller wants, before the safety filter.
+
+    wanted [m/s; world frame]: the velocity it would like, whatever its heading; velocity: what it
+    asks for now, given that a vehicle may have to turn first; yaw [rad]: the heading it asks for;
+    force: |u_i| of (28) before saturation; heading_for: its immediate target q_tg [m];
+    target: its target-on-queue [m] and ``place`` its place in the formation, if it has any.
+    """
+
+    wanted: Vector
+    velocity: Vector
+    yaw: float
+    force: float
+    heading_for: Vector
+    target: Vector | None = None
+    place: Place | None = None
+
+
+class Controller(Protocol):
+    """Decides one agent's motion, once a tick."""
+
+    def __init__(self, setup: AgentSetup) -> None: ...
+
+    def decide(self, senses: Senses) -> Intent:
+        """Return what to do now."""
+
+
+def load(name: str) -> type[Controller]:
+    """Return the controller class of a built-in name or ``package.module:Class``.
+
+    Raises :class:`ControllerError` where there is none.
+    """
+    module_name, _, class_name = BUILT_IN.get(name, name).partition(":")
+    if not module_name or not class_name:
+        known = ", ".join(BUILT_IN)
+        raise ControllerError(f"{name!r} is neither built in ({known}) nor 'package.module:Class'")
+    try:
+        found = getattr(import_module(module_name), class_name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise ControllerError(f"{name!r} cannot be imported: {error}") from error
+    if not callable(getattr(found, "decide", None)):
+        raise ControllerError(f"{name!r} has no method 'decide'")
+    return found  # type: ignore[no-any-return]

@@ -1,0 +1,54 @@
+"""The bobber-agent: an immediate target that asks for no abrupt turn (Algorithm 2).
+
+The paper lets a virtual agent slide down a potential inside the cast-zone. Its limit for a
+vanishing weight of the walls has a closed form (E7), which is what stands here: straight to the
+target when it lies in the cone, else to a point on the cone's edge on the target's side.
+"""
+
+from math import atan2, cos, hypot, pi, sin, sqrt
+from typing import NamedTuple
+
+from agent.messages import Vector
+
+STRAIGHT_AHEAD_M = 0.1
+
+
+class CastZone(NamedTuple):
+    """Where a bobber may be cast: a cone in azimuth only, for vehicles climb freely (E10).
+
+    theta: half angle to each side [rad]; reach: d_c2 [m]; turning_radius: R of E7 [m].
+    """
+
+    theta: float
+    reach: float
+    turning_radius: float
+
+
+def cast_zone(theta: float, reach: float, max_speed: float, max_yaw_rate: float) -> CastZone:
+    """Return the cast-zone of a vehicle: angles [rad], lengths [m], speeds [m/s] and [rad/s]."""
+    radius = max(0.5 * reach / (2.0 * sin(0.5 * theta)), max_speed / max_yaw_rate)
+    return CastZone(theta, reach, radius)
+
+
+def azimuth_error(x: float, y: float, yaw: float) -> float:
+    """Return the angle from a heading to a horizontal direction [rad], in [-pi, pi]."""
+    error = atan2(y, x) - yaw
+    return error - 2.0 * pi * round(error / (2.0 * pi))
+
+
+def bobber(q: Vector, yaw: float, q_toq: Vector, zone: CastZone) -> Vector:
+    """Return q_ba, the immediate target on the way to the target-on-queue [m; world frame].
+
+    A target inside the turning circle is taken head on: it would be orbited otherwise, so the
+    vehicle turns on the spot there (E11).
+    """
+    x, y, z = q_toq[0] - q[0], q_toq[1] - q[1], q_toq[2] - q[2]
+    across = hypot(x, y)
+    error = azimuth_error(x, y, yaw)
+    if abs(error) <= zone.theta or across < STRAIGHT_AHEAD_M or across < 2.0 * zone.turning_radius:
+        scale = min(1.0, zone.reach / max(sqrt(x * x + y * y + z * z), 1e-12))
+        return (q[0] + x * scale, q[1] + y * scale, q[2] + z * scale)
+    step = 0.5 * zone.reach
+    heading = yaw + (zone.theta if error > 0.0 else -zone.theta)
+    climb = min(max(z, -step), step)
+    return (q[0] + step * cos(heading), q[1] + step * sin(heading), q[2] + climb)

@@ -1,0 +1,35 @@
+"""Movement: Algorithm 4, lines 5-8. Move if the direction lies in the cone, else turn first."""
+
+from math import atan2, hypot
+
+from agent.guidance.bobber import azimuth_error
+from agent.messages import Vector
+
+DEAD_BAND_MPS = 0.02
+"""Below this horizontal speed a motion has no azimuth: the vehicle hovers or climbs (E10)."""
+
+
+def steer(wanted: Vector, yaw: float, theta: float) -> tuple[Vector, float]:
+    """Return the velocity to fly now [m/s] and the heading to turn to [rad].
+
+    wanted: velocity [m/s; world frame]; yaw: present heading [rad]; theta: half angle of the cone
+    [rad]. Vehicles hover, climb and descend without turning.
+    """
+    if hypot(wanted[0], wanted[1]) <= DEAD_BAND_MPS:
+        return wanted, yaw
+    heading = atan2(wanted[1], wanted[0])
+    if abs(azimuth_error(wanted[0], wanted[1], yaw)) <= theta + 1e-9:
+        return wanted, heading
+    return (0.0, 0.0, wanted[2]), heading
+
+
+def saturated(velocity: Vector, max_speed: float, max_climb: float) -> Vector:
+    """Return a velocity [m/s] scaled down as a whole to the vehicle's limits."""
+    x, y, z = velocity
+    speed = hypot(x, y, z)
+    scale = 1.0
+    if speed > max_speed:
+        scale = max_speed / speed
+    if abs(z) * scale > max_climb:
+        scale = max_climb / abs(z)
+    return velocity if scale == 1.0 else (x * scale, y * scale, z * scale)

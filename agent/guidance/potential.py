@@ -1,0 +1,90 @@
+"""Attraction to the target and repulsion between agents: (18)-(28), in a form that converges.
+
+Per pair, with r = |q_i - q_j| and g = max(r - d_ob, 1 mm):
+
+    U    = g^2 / 2                                                     (21), E2
+    U_tg = (max(|q_tg,i - q_tg,j|, d_ob + 0.25 m) - d_ob)^2 / 2        (22), E1
+    U_ob = sigma(U) (h(U) - h(U_tg)) for U < U_tg, else 0              (23), E3
+
+with h(U) = U / U_tg^2 + 1 / U and sigma(U) = 1 / (1 + exp(a_t (U - U_tg)^3)). The one-sided form
+keeps the pole at U = 0 and the zero slope at U_tg, and has no second equilibrium beyond it. Below
+U_tg the exponent is never positive, so nothing overflows (E5).
+"""
+
+from collections.abc import Iterable
+from math import exp, sqrt
+
+from agent.messages import Vector
+
+LEAST_GAP_M = 1e-3
+TARGET_FLOOR_M = 0.25
+
+
+class Potential:
+    """The potential of one agent among others.
+
+    d_ob: least acceptable distance [m]; a_t: sharpness of (23); k_ob: weight of repulsion; cap:
+    limit of each pair's term in Omega [m] (E4).
+    """
+
+    __slots__ = ("_floor", "a_t", "cap", "d_ob", "k_ob")
+
+    def __init__(self, d_ob: float, a_t: float = 1.0, k_ob: float = 0.02, cap: float = 2.0) -> None:
+        self.d_ob = d_ob
+        self.a_t = a_t
+        self.k_ob = k_ob
+        self.cap = cap
+        self._floor = d_ob + TARGET_FLOOR_M
+
+    def at_targets(self, between_targets_m: float) -> float:
+        """Return U_tg for two immediate targets that far apart [m]: (22) with E1."""
+        gap = max(between_targets_m, self._floor) - self.d_ob
+        return 0.5 * gap * gap
+
+    def value(self, u: float, u_tg: float) -> float:
+        """Return U_ob: (23) in the one-sided form (E3)."""
+        if u >= u_tg:
+            return 0.0
+        return self._sigma(u - u_tg) * (u / (u_tg * u_tg) + 1.0 / u - 2.0 / u_tg)
+
+    def slope(self, u: float, u_tg: float) -> float:
+        """Return dU_ob/dU, never positive: 0 from U_tg on, a pole at 0 (E3)."""
+        if u >= u_tg:
+            return 0.0
+        d = u - u_tg
+        sigma = self._sigma(d)
+        excess = u / (u_tg * u_tg) + 1.0 / u - 2.0 / u_tg
+        steepness = 1.0 / (u_tg * u_tg) - 1.0 / (u * u)
+        return sigma * steepness - 3.0 * self.a_t * d * d * sigma * (1.0 - sigma) * excess
+
+    def omega(self, q: Vector, q_tg: Vector, others: Iterable[tuple[Vector, Vector]]) -> Vector:
+        """Return Omega_i of (27) with the chain rule put right (E2) [m].
+
+        q, q_tg: own position and immediate target [m]; others: the same of each neighbour.
+        """
+        x, y, z = q[0] - q_tg[0], q[1] - q_tg[1], q[2] - q_tg[2]
+        for q_j, q_tg_j in others:
+            push = self._push(q, q_tg, q_j, q_tg_j)
+            if push != 0.0:
+                x += push * (q[0] - q_j[0])
+                y += push * (q[1] - q_j[1])
+                z += push * (q[2] - q_j[2])
+        return (x, y, z)
+
+    def _push(self, q: Vector, q_tg: Vector, q_j: Vector, q_tg_j: Vector) -> float:
+        """Return the factor of q_ij in Omega_i: k_ob U'_ob g / r, its size capped."""
+        r = _distance(q, q_j)
+        g = max(r - self.d_ob, LEAST_GAP_M)
+        u_tg = self.at_targets(_distance(q_tg, q_tg_j))
+        u = 0.5 * g * g
+        if u >= u_tg or r == 0.0:
+            return 0.0
+        return max(self.k_ob * self.slope(u, u_tg) * g, -self.cap) / r
+
+    def _sigma(self, d: float) -> float:
+        return 1.0 / (1.0 + exp(self.a_t * d * d * d))
+
+
+def _distance(a: Vector, b: Vector) -> float:
+    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return sqrt(dx * dx + dy * dy + dz * dz)

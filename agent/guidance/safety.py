@@ -1,0 +1,159 @@
+"""The safety filter: last before the vehicle, and independent of why a velocity was wanted.
+
+Two forms. With a ranging sensor the approach speed towards each body sensed is limited by the gap
+that is left; both vehicles of a pair keep to half of the duty, so the gap never closes, whatever
+their phases and with a command's whole life as latency. Without one, the limit follows from what
+neighbours last told and from the speed they promised not to exceed.
+
+H is the longest time from a measurement to the expiry of the command made from it [s].
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from math import hypot, sqrt
+from typing import NamedTuple
+
+from agent.guidance.bobber import azimuth_error
+from agent.guidance.movement import DEAD_BAND_MPS
+from agent.messages import Vector
+
+SHARE = 0.18
+"""Share of the gap that one vehicle of a pair may close within H: 2 * SHARE <= 1/e."""
+PROMISE_S = 3.0
+LEAST_CAP_MPS = 0.05
+PASSES = 3
+
+
+class Bound(NamedTuple):
+    """One body's limit: the speed towards it, along the unit vector away from it [m/s]."""
+
+    away: Vector
+    limit: float
+
+
+class RangingFilter:
+    """Limits approach by the gap to each body sensed.
+
+    d_ob: least distance between centres [m]; max_speed [m/s]; horizon_s: H.
+    """
+
+    def __init__(self, d_ob: float, max_speed: float, horizon_s: float) -> None:
+        reach = max_speed * horizon_s
+        self._stop_m = d_ob + reach * reach / d_ob
+        self._rate = SHARE / horizon_s
+        self._ignore_m = self._stop_m + max_speed / self._rate
+
+    def bounds(self, vehicles: Sequence[Vector]) -> list[Bound]:
+        """Return the limits from bodies at these relative positions [m; world axes]."""
+        found = []
+        for x, y, z in vehicles:
+            r = sqrt(x * x + y * y + z * z)
+            if r >= self._ignore_m or r == 0.0:
+                continue
+            limit = self._rate * max(0.0, r - self._stop_m)
+            found.append(Bound((-x / r, -y / r, -z / r), limit))
+        return found
+
+
+class Told(NamedTuple):
+    """What a neighbour last told: relative position [m], its age [s], the speed it promised."""
+
+    relative: Vector
+    age_s: float
+    speed_cap: float
+
+
+class PromiseFilter:
+    """Limits approach by what neighbours told, for vehicles without a ranging sensor.
+
+    Each broadcast promises a speed for the next 3 s; the least promise of the last 3 s is kept.
+    """
+
+    def __init__(self, d_ob: float, max_speed: float, horizon_s: float) -> None:
+        self._d_ob = d_ob
+        self._max_speed = max_speed
+        self._horizon_s = horizon_s
+        self._promises: deque[tuple[float, float]] = deque()
+
+    def promise(self, now_s: float, told: Sequence[Told]) -> float:
+        """Return the speed to promise now [m/s], and remember it."""
+        gap = min(
+            (hypot(*each.relative) - self._d_ob - self._max_speed * each.age_s for each in told),
+            default=float("inf"),
+        )
+        cap = min(max(gap / 1.3, LEAST_CAP_MPS), self._max_speed)
+        self._promises.append((now_s, cap))
+        while self._promises[0][0] < now_s - PROMISE_S:
+            self._promises.popleft()
+        return cap
+
+    @property
+    def speed_cap(self) -> float:
+        """The least speed promised in the last 3 s [m/s]."""
+        return min((cap for _, cap in self._promises), default=LEAST_CAP_MPS)
+
+    def bounds(self, told: Sequence[Told]) -> list[Bound]:
+        """Return the limits from what was told; zero where a neighbour may be too near already."""
+        found = []
+        for relative, age_s, promised in told:
+            r = hypot(*relative)
+            if r == 0.0:
+                continue
+            cap = promised if age_s <= PROMISE_S else self._max_speed
+            room = r - self._d_ob - cap * (age_s + self._horizon_s)
+            away = (-relative[0] / r, -relative[1] / r, -relative[2] / r)
+            found.append(Bound(away, max(0.0, room) / self._horizon_s))
+        return found
+
+
+def limited(velocity: Vector, bounds: Sequence[Bound], yaw: float, theta: float) -> Vector:
+    """Return a velocity that keeps every bound [m/s].
+
+    It first slides along what is in the way; if that leaves the cone of half angle ``theta``
+    [rad] about ``yaw``, or is still too fast somewhere, the velocity is only shortened.
+    """
+    if all(_approach(velocity, bound) <= bound.limit for bound in bounds):
+        return velocity
+    sliding = velocity
+    for _ in range(PASSES):
+        for bound in bounds:
+            excess = _approach(sliding, bound) - bound.limit
+            if excess > 0.0:
+                n = bound.away
+                sliding = (
+                    sliding[0] + excess * n[0],
+                    sliding[1] + excess * n[1],
+                    sliding[2] + excess * n[2],
+                )
+    if not _in_cone(sliding, yaw, theta):
+        sliding = velocity
+    return _kept(sliding, bounds)
+
+
+def shortened(velocity: Vector, max_speed: float) -> Vector:
+    """Return a velocity no faster than ``max_speed`` [m/s], in the same direction."""
+    speed = hypot(*velocity)
+    if speed <= max_speed:
+        return velocity
+    scale = max_speed / speed
+    return (velocity[0] * scale, velocity[1] * scale, velocity[2] * scale)
+
+
+def _kept(velocity: Vector, bounds: Sequence[Bound]) -> Vector:
+    scale = 1.0
+    for bound in bounds:
+        approach = _approach(velocity, bound)
+        if approach * scale > bound.limit:
+            scale = bound.limit / approach
+    return (velocity[0] * scale, velocity[1] * scale, velocity[2] * scale)
+
+
+def _approach(velocity: Vector, bound: Bound) -> float:
+    n = bound.away
+    return -(velocity[0] * n[0] + velocity[1] * n[1] + velocity[2] * n[2])
+
+
+def _in_cone(velocity: Vector, yaw: float, theta: float) -> bool:
+    if hypot(velocity[0], velocity[1]) <= DEAD_BAND_MPS:
+        return True
+    return abs(azimuth_error(velocity[0], velocity[1], yaw)) <= theta + 1e-9
