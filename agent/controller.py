@@ -6,6 +6,7 @@ keeps the neighbours, applies the safety filter to what the controller wants, an
 and vehicle.
 """
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import NamedTuple, Protocol
 
@@ -49,7 +50,7 @@ class Senses(NamedTuple):
     """What a controller decides on: own pose, what is heard, who is known, what is near.
 
     vehicles: bodies within the proximity sensor, relative to the own centre [m; world axes].
-    team: sorted by id.
+    team(): all members known, sorted by id; gathered when it is asked for.
     """
 
     now_s: float
@@ -57,7 +58,7 @@ class Senses(NamedTuple):
     yaw: float
     vehicles: tuple[Vector, ...]
     neighbours: tuple[Heard, ...]
-    team: tuple[Peer, ...]
+    team: Callable[[], tuple[Peer, ...]]
 
 
 class Intent(NamedTuple):

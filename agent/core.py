@@ -107,7 +107,7 @@ class Agent:
             observation.yaw,
             observation.vehicles,
             self._neighbours.heard(now_s),
-            self._table.team(Peer(self.id, observation.position, self._place)),
+            lambda: self._table.team(Peer(self.id, observation.position, self._place)),
         )
 
     def _safe(self, intent: Intent, senses: Senses) -> Vector:

@@ -4,10 +4,11 @@
 numbers drawn for this very frame, so the same frame always meets the same fate.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from hashlib import blake2b
 from struct import Struct as Layout
+from typing import NamedTuple
 
 
 class Cause(IntEnum):
@@ -26,6 +27,7 @@ class LinkModel:
     range_m: hard disc, d_c [m]; infinite without a limit.
     delay_ms, jitter_ms: delay is uniform in [delay - jitter, delay + jitter], never under 0 [ms].
     loss_percent: independent loss of each frame [%].
+    draws: whether a verdict on this link needs random numbers at all.
     """
 
     range_m: float = float("inf")
@@ -33,14 +35,13 @@ class LinkModel:
     jitter_ms: float = 0.0
     loss_percent: float = 0.0
 
-    @property
-    def draws(self) -> bool:
-        """Whether a verdict on this link needs random numbers at all."""
-        return self.jitter_ms > 0.0 or self.loss_percent > 0.0
+    draws: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "draws", self.jitter_ms > 0.0 or self.loss_percent > 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
+class Verdict(NamedTuple):
     """What a link decides: the cause, and the delay [s] of a frame that gets across."""
 
     cause: Cause

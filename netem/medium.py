@@ -8,15 +8,16 @@ order in which transmissions arrived.
 
 from hashlib import sha256
 from heapq import heappop, heappush
-from math import sqrt
+from math import nan, sqrt
 from struct import Struct as Layout
 
-from netem.link import Cause, LinkModel, draw, verdict
+from netem.link import Cause, draw, verdict
 from netem.messages import MediumSetup, Position, Verdicts
 from netem.schedule import Schedule
 from netem.wire.frame import Frame, Transmission
 
-_FATE = Layout("<5qBd")
+_FATE = Layout("<5qBd").pack
+DELIVERED = Cause.DELIVERED
 _InFlight = tuple[float, int, int, int, int, Frame]
 
 
@@ -87,37 +88,32 @@ class Medium:
         return Verdicts(slot, self.sent, self.addressed, fates, self.in_flight, {}, self.digest())
 
     def _spread(self, frame: Frame, sent_s: float) -> None:
-        here = self._positions[frame.source]
-        for receiver in range(self._agents):
-            if receiver == frame.source:
-                continue
-            there = self._positions[receiver]
-            link = self._schedule.model(frame.channel, frame.source, receiver)
-            distance_m = _distance(here, there) if here and there else float("nan")
-            self._judge(frame, receiver, link, distance_m, sent_s)
-
-    def _judge(
-        self, frame: Frame, receiver: int, link: LinkModel, distance_m: float, sent_s: float
-    ) -> None:
+        """Judge one frame on its link to every other agent, in order of their ids."""
         source, incarnation, channel, count = (
             frame.source,
             frame.incarnation,
             frame.channel,
             frame.count,
         )
-        draws = None
-        if link.draws:
-            draws = draw(self._seed, source, incarnation, receiver, channel, count)
-        fate = verdict(link, distance_m, draws)
-        self._journal.update(
-            _FATE.pack(source, incarnation, receiver, channel, count, fate.cause, fate.delay_s)
-        )
-        if fate.cause is not Cause.DELIVERED:
-            self._fates[fate.cause] += 1
-            return
-        due_s = sent_s + fate.delay_s
-        heappush(self._queues[receiver], (due_s, source, incarnation, channel, count, frame))
-        self.in_flight += 1
+        here = self._positions[source]
+        journal = []
+        for receiver, there in enumerate(self._positions):
+            if receiver == source:
+                continue
+            link = self._schedule.model(channel, source, receiver)
+            distance_m = _distance(here, there) if here and there else nan
+            draws = None
+            if link.draws:
+                draws = draw(self._seed, source, incarnation, receiver, channel, count)
+            cause, delay_s = verdict(link, distance_m, draws)
+            journal.append(_FATE(source, incarnation, receiver, channel, count, cause, delay_s))
+            if cause is DELIVERED:
+                order = (sent_s + delay_s, source, incarnation, channel, count, frame)
+                heappush(self._queues[receiver], order)
+                self.in_flight += 1
+            else:
+                self._fates[cause] += 1
+        self._journal.update(b"".join(journal))
 
 
 def _distance(a: Position, b: Position) -> float:

@@ -17,16 +17,6 @@ FRAME_HEAD_B = 24
 RECORD_B = 64
 
 
-class Entry:
-    """A record, and until when its subject counts as present without a newer one."""
-
-    __slots__ = ("direct", "record")
-
-    def __init__(self, record: Record, direct: bool) -> None:
-        self.record = record
-        self.direct = direct
-
-
 class Table:
     """What one agent knows of the team, itself excepted.
 
@@ -35,31 +25,22 @@ class Table:
 
     def __init__(self, own_id: int, multihop_hz: float) -> None:
         self._own_id = own_id
-        self._entries: dict[int, Entry] = {}
+        self._newest: dict[int, Beacon | Record] = {}
         self._last: dict[int, tuple[int, int]] = {}
         period_s = 1.0 / multihop_hz if multihop_hz > 0.0 else 0.0
         self._relayed_silence_s = max(LEAST_RELAYED_SILENCE_S, RELAYED_SILENCE_ROUNDS * period_s)
 
     def adopt_beacon(self, beacon: Beacon) -> None:
         """Take what a neighbour said of itself just now."""
-        self._adopt(
-            Record(
-                beacon.id,
-                beacon.incarnation,
-                beacon.sequence,
-                beacon.stamp_s,
-                beacon.position,
-                beacon.queue,
-                beacon.rank,
-            ),
-            direct=True,
-        )
+        if self._is_news(beacon.id, beacon.incarnation, beacon.sequence):
+            self._newest[beacon.id] = beacon
 
     def adopt(self, gossip: Gossip, now_s: float, slack_s: float) -> None:
         """Take what is news in a frame of the multihop channel; stamps of the future are not."""
         for record in gossip.records:
-            if record.id != self._own_id and record.stamp_s <= now_s + slack_s:
-                self._adopt(record, direct=False)
+            plausible = record.id != self._own_id and record.stamp_s <= now_s + slack_s
+            if plausible and self._is_news(record.id, record.incarnation, record.version):
+                self._newest[record.id] = record
 
     def forget_silent(self, now_s: float, silence_s: dict[int, float]) -> None:
         """Drop the records of those who are gone.
@@ -68,36 +49,50 @@ class Table:
         directly and no more may be silent for as long as the shortest relay takes.
         """
         gone = []
-        for who, entry in self._entries.items():
-            limit = self._relayed_silence_s
-            if entry.direct:
-                limit = silence_s.get(who, 0.0)
-            if now_s - entry.record.stamp_s > limit:
+        for who, newest in self._newest.items():
+            direct = isinstance(newest, Beacon)
+            limit = silence_s.get(who, 0.0) if direct else self._relayed_silence_s
+            if now_s - newest.stamp_s > limit:
                 gone.append(who)
         for who in gone:
-            del self._entries[who]
+            del self._newest[who]
 
     def team(self, own: Peer) -> tuple[Peer, ...]:
         """Return all who are known, oneself included, sorted by id."""
         peers = [own]
-        for who, entry in self._entries.items():
-            record = entry.record
-            place = Place(record.queue, record.rank) if record.queue >= 0 else None
-            peers.append(Peer(who, record.position, place))
-        return tuple(sorted(peers))
+        for who, newest in self._newest.items():
+            place = Place(newest.queue, newest.rank) if newest.queue >= 0 else None
+            peers.append(Peer(who, newest.position, place))
+        peers.sort()
+        return tuple(peers)
 
     def frames(self, own: Record) -> list[bytes]:
         """Return the whole table, the own record first, in frames of at most 1200 B."""
-        records = [own, *(self._entries[who].record for who in sorted(self._entries))]
+        records = [own, *(_record(self._newest[who]) for who in sorted(self._newest))]
         per_frame = (MAX_FRAME_B - FRAME_HEAD_B) // RECORD_B
         return [
             encode(Gossip(self._own_id, own.stamp_s, tuple(records[at : at + per_frame])))
             for at in range(0, len(records), per_frame)
         ]
 
-    def _adopt(self, record: Record, *, direct: bool) -> None:
-        key = (record.incarnation, record.version)
-        if key <= self._last.get(record.id, (-1, -1)):
-            return
-        self._last[record.id] = key
-        self._entries[record.id] = Entry(record, direct)
+    def _is_news(self, who: int, incarnation: int, version: int) -> bool:
+        """Whether this is newer than all ever adopted of its subject; if so, remember it."""
+        last = self._last.get(who)
+        if last is not None and (incarnation, version) <= last:
+            return False
+        self._last[who] = (incarnation, version)
+        return True
+
+
+def _record(newest: Beacon | Record) -> Record:
+    if isinstance(newest, Record):
+        return newest
+    return Record(
+        newest.id,
+        newest.incarnation,
+        newest.sequence,
+        newest.stamp_s,
+        newest.position,
+        newest.queue,
+        newest.rank,
+    )

@@ -11,6 +11,8 @@ from typing import NamedTuple
 from agent.messages import Vector
 
 STRAIGHT_AHEAD_M = 0.1
+WITHIN = 0.95
+"""A bobber on the cone's edge stands a little inside: a neighbour's push then asks for no turn."""
 
 
 class CastZone(NamedTuple):
@@ -49,6 +51,6 @@ def bobber(q: Vector, yaw: float, q_toq: Vector, zone: CastZone) -> Vector:
         scale = min(1.0, zone.reach / max(sqrt(x * x + y * y + z * z), 1e-12))
         return (q[0] + x * scale, q[1] + y * scale, q[2] + z * scale)
     step = 0.5 * zone.reach
-    heading = yaw + (zone.theta if error > 0.0 else -zone.theta)
+    heading = yaw + WITHIN * (zone.theta if error > 0.0 else -zone.theta)
     climb = min(max(z, -step), step)
     return (q[0] + step * cos(heading), q[1] + step * sin(heading), q[2] + climb)

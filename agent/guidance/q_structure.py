@@ -60,5 +60,5 @@ class QStructure:
     def _own_place(self, senses: Senses) -> Place:
         if self._place is None or senses.now_s >= self._choose_at_s:
             self._choose_at_s = senses.now_s + self._choice_period_s - 1e-9
-            self._place = self._targets.choose(senses.team, self._frame)
+            self._place = self._targets.choose(senses.team(), self._frame)
         return self._place

@@ -24,6 +24,7 @@ class TargetOnQueue:
         self._own_id = own_id
         self._formation = formation
         self._spacing = spacing
+        self._slots: dict[Place, Vector] = {}
 
     def choose(self, team: Sequence[Peer], frame: Frame) -> Place:
         """Return the own place, given all members known, oneself included, sorted by id."""
@@ -33,4 +34,7 @@ class TargetOnQueue:
 
     def slot(self, place: Place, frame: Frame) -> Vector:
         """Return the target-on-queue of a place [m; world frame]: s_i = s_k + d_ir (E13)."""
-        return frame.to_world(self._formation.slot(place, self._spacing))
+        on_queue = self._slots.get(place)
+        if on_queue is None:
+            on_queue = self._slots[place] = self._formation.slot(place, self._spacing)
+        return frame.to_world(on_queue)

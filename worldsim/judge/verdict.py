@@ -4,12 +4,13 @@ It knows the formation, and what was true; of an agent's telemetry it takes only
 agent means to hold, and computes where that place is by itself.
 """
 
+from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from agent.messages import Place
+from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation
 from agent.qstructure.frame import Frame
 from worldsim.judge.metrics import Floats, swept_separation
@@ -54,25 +55,34 @@ class Phase:
         self._spacing = spacing
         self._frame = Frame()
         self._since_s: float | None = None
+        self._slots: dict[tuple[int, int], Vector] = {}
 
     def slot_error(self, tick: Tick) -> Floats:
         """Return each agent's distance to the slot it claims [m]; infinite without a valid one.
 
         Two that claim the same slot have none: neither counts as arrived.
         """
-        claims = [Place(int(queue), int(rank)) for queue, rank in tick.place]
-        error = np.full(len(claims), np.nan)
-        for row, place in enumerate(claims):
-            if np.isnan(tick.position[row, 0]):
-                continue
-            rivals = [other for other, claim in enumerate(claims) if claim == place]
-            contested = sum(bool(tick.alive[other]) for other in rivals) > 1
-            if contested or not self.formation.holds(place):
-                error[row] = np.inf
-                continue
-            slot = self._frame.to_world(self.formation.slot(place, self._spacing))
-            error[row] = np.linalg.norm(tick.position[row].astype(np.float64) - slot)
+        error = np.full(len(tick.place), np.inf)
+        claims = [(queue, rank) for queue, rank in tick.place.tolist()]
+        holders = Counter(claim for claim, alive in zip(claims, tick.alive, strict=True) if alive)
+        rows = [
+            row
+            for row, claim in enumerate(claims)
+            if holders[claim] <= 1 and self.formation.holds(Place(*claim))
+        ]
+        if rows:
+            off = tick.position[rows].astype(np.float64)
+            off -= np.array([self._slot(claims[row]) for row in rows])
+            error[rows] = np.sqrt(np.sum(off * off, axis=1))
+        error[np.isnan(tick.position[:, 0])] = np.nan
         return error
+
+    def _slot(self, claim: tuple[int, int]) -> Vector:
+        slot = self._slots.get(claim)
+        if slot is None:
+            slot = self._frame.to_world(self.formation.slot(Place(*claim), self._spacing))
+            self._slots[claim] = slot
+        return slot
 
     def see(self, time_s: float, error: Floats) -> bool:
         """Take the living agents' slot errors [m] at a tick; return whether all are in place."""

@@ -1,0 +1,54 @@
+"""One agent by hand: ``python -m agent --id 0 --run mine --connect tcp/127.0.0.1:7447``."""
+
+import argparse
+import sys
+
+from agent.controller import ControllerError
+from agent.process import GoneError, fly
+from netem.wire.post import RefusedError
+from netem.wire.session import SessionError
+
+DESCRIPTION = """\
+One agent of a fleet: it senses and hears, decides, commands its vehicle and speaks to the others.
+
+It asks the world of its run for its setup (formation, limits, controller) and flies until the run
+is over. It can be started before the world is."""
+
+EPILOG = """\
+exit status: 0 the run is over, or SIGTERM came; 1 the world is gone; 2 no router, no such agent
+or no such controller"""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Fly as the command line says; return the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="python -m agent",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--id", required=True, type=int, metavar="I", help="which agent, counted from 0"
+    )
+    parser.add_argument("--run", required=True, metavar="NAME", help="the run that it belongs to")
+    parser.add_argument(
+        "--connect", required=True, metavar="ENDPOINT", help="the router: tcp/127.0.0.1:7447"
+    )
+    options = parser.parse_args(arguments)
+    return run(options.id, options.run, options.connect)
+
+
+def run(agent: int, run_name: str, connect: str) -> int:
+    """Fly one agent, and say in one line what stood in its way; return the exit status."""
+    try:
+        return fly(agent, run_name, connect)
+    except GoneError as error:
+        print(f"agent-{agent}: {error}", file=sys.stderr)
+        return 1
+    except (SessionError, RefusedError, ControllerError, ValueError) as error:
+        print(f"agent-{agent}: {error}", file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())
