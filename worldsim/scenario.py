@@ -1,117 +1,113 @@
 """Scenario files: TOML in, a typed and checked scenario out, or an error naming file and key.
 
-The tables below are the format; every number's unit is in its key. Paths are relative to the file
-that names them. What a file leaves out gets the value written here.
+The format is in ``tables``, what must hold between keys in ``rules``. Paths are relative to the
+file that names them.
 """
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Any
 
-from msgspec import Meta
+import msgspec
+import tomli_w
 
-from agent.messages import Metres
-from agent.qstructure.formation import FormationSpec
-from agent.setup import AgentSetup, Comms, Control, Hertz, Positive, Table, Vehicle
-from netem.messages import Conditions, MediumSetup
+from agent.qstructure.formation import Formation, FormationError, FormationSpec
+from worldsim.decoding import decode
+from worldsim.rules import check
+from worldsim.tables import SLOTS_PER_TICK, BoxStart, ListStart, Scenario
+from worldsim.toml import Data, ScenarioError, override, read, tables
 
-SLOTS_PER_TICK = 4
-MAX_AGENTS = 1000
-MAX_FILE_B = 1024 * 1024
-
-
-class ScenarioError(ValueError):
-    """Bad input, told in one line: the file, the key, what is wrong and what is allowed."""
-
-    def __init__(self, file: str | Path, key: str, detail: str) -> None:
-        super().__init__(f"{file}: {key}: {detail}" if key else f"{file}: {detail}")
-
-
-Triple = tuple[Metres, Metres, Metres]
-Extent = Annotated[float, Meta(ge=0, le=1e5)]
+__all__ = [
+    "SLOTS_PER_TICK",
+    "BoxStart",
+    "ListStart",
+    "Scenario",
+    "ScenarioError",
+    "dump",
+    "load",
+    "parse",
+]
 
 
-class BoxStart(Table, frozen=True, tag="box", tag_field="kind"):
-    """Random starts in a box, at least ``spacing_m`` apart, with random headings."""
-
-    centre_m: Triple = (0.0, 0.0, 0.0)
-    size_m: tuple[Extent, Extent, Extent] = (5.0, 5.0, 3.0)
-    spacing_m: Extent = 0.6
+_PLAIN_ARRAY = re.compile(r"\[\n((?: +[^\s\[\]{}][^\n]*,\n)+) *\]")
 
 
-class ListStart(Table, frozen=True, tag="list", tag_field="kind"):
-    """Starts given one by one; headings left out are 0."""
-
-    positions_m: tuple[Triple, ...]
-    yaws_deg: tuple[Annotated[float, Meta(ge=-360, le=360)], ...] | None = None
+def load(path: Path, overrides: Mapping[str, str] | None = None) -> Scenario:
+    """Return the scenario of a file, with dotted keys overridden, or raise ScenarioError."""
+    return parse(read(path), path, overrides)
 
 
-class Fleet(Table, frozen=True):
-    """How many agents, how fast they think, and where they start."""
+def parse(
+    text: str, name: str | Path = "scenario.toml", overrides: Mapping[str, str] | None = None
+) -> Scenario:
+    """Return the scenario of a TOML text, or raise ScenarioError.
 
-    agents: Annotated[int, Meta(ge=1, le=MAX_AGENTS)]
-    tick_hz: Hertz = 20.0
-    start: BoxStart | ListStart = BoxStart()
-
-
-class ProximitySensor(Table, frozen=True):
-    """Relative positions of vehicles within 2 m; noise is normal, per axis [m]."""
-
-    noise_m: Annotated[float, Meta(ge=0, le=1)] = 0.0
-
-
-class Sensors(Table, frozen=True):
-    """What each kind of sensor is like."""
-
-    proximity: ProximitySensor = ProximitySensor()
-
-
-class Expectations(Table, frozen=True):
-    """What a run must show; ``converge_within_s`` counts from each formation's start."""
-
-    converge_within_s: Positive | None = None
-    min_separation_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
+    name: what errors call the text; paths within it are relative to the folder of that name.
+    """
+    overrides = overrides or {}
+    try:
+        data = tables(text, name)
+        override(data, overrides, name)
+        whose = _place_formation(data, Path(name))
+        scenario = decode(data, Scenario, name)
+        _check_formation(scenario.formation, *whose)
+        check(scenario, name)
+    except ScenarioError as error:
+        raise _told_as_override(error, overrides) from error
+    return scenario
 
 
-class Scenario(Table, frozen=True, omit_defaults=False):
-    """A whole scenario, resolved: every default filled in, the formation in place."""
+def dump(scenario: Scenario) -> str:
+    """Return a scenario as TOML with every default filled in; ``parse`` gives it back, equal."""
+    text = tomli_w.dumps(_without_none(msgspec.to_builtins(scenario)))
+    return _PLAIN_ARRAY.sub(_on_one_line, text)
 
-    fleet: Fleet
-    formation: FormationSpec
-    schema: Annotated[int, Meta(ge=1, le=1)] = 1
-    name: Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=80)] = "unnamed"
-    seed: Annotated[int, Meta(ge=0, lt=2**53)] = 1
-    duration_s: Annotated[float, Meta(gt=0, le=86_400)] = 20.0
-    vehicle: Vehicle = Vehicle()
-    sensor: Sensors = Sensors()
-    control: Control = Control()
-    comms: Comms = Comms()
-    netem: Conditions = Conditions()
-    expect: Expectations = Expectations()
 
-    @property
-    def slot_hz(self) -> float:
-        """Slots per second of simulated time."""
-        return self.fleet.tick_hz * SLOTS_PER_TICK
+def _place_formation(data: Data, file: Path) -> tuple[Path, str]:
+    """Put what a formation's file holds in place of its name; return whose keys they are.
 
-    @property
-    def slots(self) -> int:
-        """How many slots the run lasts."""
-        return round(self.duration_s * self.slot_hz)
+    That is the file, and what its keys begin with.
+    """
+    table = data.get("formation")
+    if not isinstance(table, dict) or "file" not in table:
+        return file, "formation."
+    other = next((key for key in table if key != "file"), None)
+    if other is not None:
+        raise ScenarioError(file, f"formation.{other}", "not beside file; one or the other")
+    if not isinstance(table["file"], str):
+        raise ScenarioError(file, "formation.file", "the path of a formation file, as text")
+    path = file.parent / table["file"]
+    if not path.exists():
+        raise ScenarioError(file, "formation.file", f"no such file: {path}")
+    data["formation"] = tables(read(path), path)
+    decode(data["formation"], FormationSpec, path)
+    return path, ""
 
-    def medium_setup(self) -> MediumSetup:
-        """Return what the medium is told."""
-        return MediumSetup(self.seed, self.fleet.agents, SLOTS_PER_TICK, self.slot_hz, self.netem)
 
-    def agent_setup(self, agent: int, incarnation: int, command_ticks: int) -> AgentSetup:
-        """Return what one agent is told; ``command_ticks`` is the clock's (one, or two)."""
-        return AgentSetup(
-            id=agent,
-            incarnation=incarnation,
-            tick_hz=self.fleet.tick_hz,
-            slots_per_tick=SLOTS_PER_TICK,
-            command_ticks=command_ticks,
-            vehicle=self.vehicle,
-            control=self.control,
-            comms=self.comms,
-            formation=self.formation,
+def _check_formation(spec: FormationSpec, file: Path, prefix: str) -> None:
+    try:
+        Formation(spec)
+    except FormationError as error:
+        raise ScenarioError(file, prefix + error.key, error.detail) from error
+
+
+def _told_as_override(error: ScenarioError, overrides: Mapping[str, str]) -> ScenarioError:
+    """Say so if the key at fault was set on the command line: the file is not to blame."""
+    if any(error.key == key or error.key.startswith((f"{key}.", f"{key}[")) for key in overrides):
+        return ScenarioError(
+            error.file, error.key, f"{error.detail} (it was set on the command line)"
         )
+    return error
+
+
+def _on_one_line(array: re.Match[str]) -> str:
+    """Write an array of numbers or names as people do."""
+    return "[" + " ".join(line.strip() for line in array[1].splitlines()).rstrip(",") + "]"
+
+
+def _without_none(value: Any) -> Any:
+    """TOML has no word for nothing: what is None is left out."""
+    if isinstance(value, dict):
+        return {key: _without_none(inner) for key, inner in value.items() if inner is not None}
+    return [_without_none(inner) for inner in value] if isinstance(value, list | tuple) else value

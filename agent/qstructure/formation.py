@@ -89,7 +89,7 @@ class Formation:
             Queue(
                 table.name,
                 spec.vertices[table.vertices[0]],
-                _shape(table),
+                _shape(index, table),
                 shares[index],
                 1 if len(holders[table.vertices[0]]) > 1 else 0,
             )
@@ -164,8 +164,8 @@ def _capacities(spec: FormationSpec) -> tuple[float, ...]:
     return tuple(share for share in given if share is not None)
 
 
-def _shape(queue: QueueSpec) -> Shape:
+def _shape(index: int, queue: QueueSpec) -> Shape:
     try:
         return shape_of(queue.shape)
     except ShapeError as error:
-        raise FormationError(f"queue {queue.name!r}, shape.{error.key}", str(error)) from error
+        raise FormationError(f"queue[{index}].shape.{error.key}", str(error)) from error

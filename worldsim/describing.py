@@ -1,0 +1,111 @@
+"""What a type allows, and what stood there instead, in words for people who write scenarios."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from msgspec import inspect
+
+MAX_SHOWN = 60
+
+
+def allowed(kind: Any) -> str:
+    """Return in words what a type allows."""
+    return _words(inspect.type_info(kind))
+
+
+def tags(kind: Any) -> str:
+    """Return the kinds of table that a tagged union can be told by."""
+    info = inspect.type_info(kind)
+    options = info.types if isinstance(info, inspect.UnionType) else (info,)
+    return " or ".join(_tags(options))
+
+
+def got(value: Any) -> str:
+    """Return in words what stood in the file, and why that may be wrong."""
+    if isinstance(value, bool):
+        return f"got {str(value).lower()}"
+    if isinstance(value, str):
+        return f"got the text {_short(repr(value))}"
+    if isinstance(value, dict):
+        return "got a table"
+    if isinstance(value, list):
+        return f"got a list of {len(value)}"
+    return f"got {_short(str(value))}"
+
+
+def _words(info: inspect.Type) -> str:
+    match info:
+        case inspect.Metadata(extra_json_schema={"description": str(words)}):
+            return words
+        case inspect.UnionType():
+            return _union(info)
+        case inspect.LiteralType():
+            return " or ".join(repr(value) for value in info.values)
+        case inspect.IntType() | inspect.FloatType():
+            return _number(info)
+        case inspect.StrType():
+            return _text(info)
+        case _:
+            return _nested(info)
+
+
+def _nested(info: inspect.Type) -> str:
+    match info:
+        case inspect.TupleType():
+            return f"a list of {len(info.item_types)}, each {_words(info.item_types[0])}"
+        case inspect.VarTupleType():
+            return (
+                f"a list{_count(info.min_length, info.max_length)}, each {_words(info.item_type)}"
+            )
+        case inspect.DictType():
+            count = _count(info.min_length, info.max_length)
+            return f"a table{count}, each {_words(info.value_type)}"
+        case inspect.StructType():
+            return f"a table of {', '.join(field.encode_name for field in info.fields)}"
+    raise LookupError(f"no words for {info}")
+
+
+def _union(info: inspect.UnionType) -> str:
+    kinds = _tags(info.types)
+    if kinds:
+        return f"a table with kind = {' or '.join(kinds)}"
+    options = [option for option in info.types if not isinstance(option, inspect.NoneType)]
+    return " or ".join(_words(option) for option in options)
+
+
+def _number(info: inspect.IntType | inspect.FloatType) -> str:
+    words = "a whole number" if isinstance(info, inspect.IntType) else "a number"
+    if info.ge is not None and info.ge == info.le:
+        return f"{info.ge:g}"
+    bounds = (("from", info.ge), ("above", info.gt), ("up to", info.le), ("below", info.lt))
+    told = [f"{word} {_figure(bound)}" for word, bound in bounds if bound is not None]
+    return f"{words} {' and '.join(told)}".rstrip().replace(" and up to", " up to")
+
+
+def _figure(bound: float) -> str:
+    return str(int(bound)) if bound == int(bound) else f"{bound:g}"
+
+
+def _text(info: inspect.StrType) -> str:
+    count = _count(info.min_length, info.max_length)
+    return f"text{count} characters" if count else "text"
+
+
+def _count(least: int | None, most: int | None) -> str:
+    if least is None and most is None:
+        return ""
+    if least == most:
+        return f" of {least}"
+    return f" of {least or 0} to {most}" if most is not None else f" of {least} or more"
+
+
+def _tags(options: Iterable[inspect.Type]) -> list[str]:
+    return [
+        repr(option.tag)
+        for option in options
+        if isinstance(option, inspect.StructType) and option.tag is not None
+    ]
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 3] + "..."

@@ -1,0 +1,115 @@
+"""The tables of a scenario file: their keys, units, bounds and defaults.
+
+These structures are the format; every number's unit is in its key. What a file leaves out gets the
+value written here. What must hold between keys is said in ``rules``.
+"""
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from agent.messages import Metres
+from agent.qstructure.formation import FormationSpec
+from agent.setup import AgentSetup, Comms, Control, Hertz, Positive, Table, Vehicle
+from netem.messages import Conditions, MediumSetup
+
+SLOTS_PER_TICK = 4
+MAX_AGENTS = 1000
+
+Triple = tuple[Metres, Metres, Metres]
+Extent = Annotated[float, Meta(ge=0, le=1e5)]
+RunName = Annotated[
+    str,
+    Meta(
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*\Z",
+        max_length=80,
+        description="a name of letters, digits, '.', '_' and '-', at most 80, no '.' first",
+    ),
+]
+
+
+class BoxStart(Table, frozen=True, tag="box", tag_field="kind"):
+    """Random starts in a box, at least ``spacing_m`` apart, with random headings."""
+
+    centre_m: Triple = (0.0, 0.0, 0.0)
+    size_m: tuple[Extent, Extent, Extent] = (5.0, 5.0, 3.0)
+    spacing_m: Extent = 0.6
+
+
+class ListStart(Table, frozen=True, tag="list", tag_field="kind"):
+    """Starts given one by one; headings left out are 0."""
+
+    positions_m: tuple[Triple, ...]
+    yaws_deg: tuple[Annotated[float, Meta(ge=-360, le=360)], ...] | None = None
+
+
+class Fleet(Table, frozen=True):
+    """How many agents, how fast they think, and where they start."""
+
+    agents: Annotated[int, Meta(ge=1, le=MAX_AGENTS)]
+    tick_hz: Hertz = 20.0
+    start: BoxStart | ListStart = BoxStart()
+
+
+class ProximitySensor(Table, frozen=True):
+    """Relative positions of vehicles within 2 m; noise is normal, per axis [m]."""
+
+    noise_m: Annotated[float, Meta(ge=0, le=1)] = 0.0
+
+
+class Sensors(Table, frozen=True):
+    """What each kind of sensor is like."""
+
+    proximity: ProximitySensor = ProximitySensor()
+
+
+class Expectations(Table, frozen=True):
+    """What a run must show; ``converge_within_s`` counts from each formation's start."""
+
+    converge_within_s: Positive | None = None
+    min_separation_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
+
+
+class Scenario(Table, frozen=True, omit_defaults=False):
+    """A whole scenario, resolved: every default filled in, the formation in place."""
+
+    fleet: Fleet
+    formation: FormationSpec
+    schema: Annotated[int, Meta(ge=1, le=1)] = 1
+    name: RunName = "unnamed"
+    seed: Annotated[int, Meta(ge=0, lt=2**53)] = 1
+    duration_s: Annotated[float, Meta(gt=0, le=86_400)] = 20.0
+    vehicle: Vehicle = Vehicle()
+    sensor: Sensors = Sensors()
+    control: Control = Control()
+    comms: Comms = Comms()
+    netem: Conditions = Conditions()
+    expect: Expectations = Expectations()
+
+    @property
+    def slot_hz(self) -> float:
+        """Slots per second of simulated time."""
+        return self.fleet.tick_hz * SLOTS_PER_TICK
+
+    @property
+    def slots(self) -> int:
+        """How many slots the run lasts."""
+        return round(self.duration_s * self.slot_hz)
+
+    def medium_setup(self) -> MediumSetup:
+        """Return what the medium is told."""
+        return MediumSetup(self.seed, self.fleet.agents, SLOTS_PER_TICK, self.slot_hz, self.netem)
+
+    def agent_setup(self, agent: int, incarnation: int, command_ticks: int) -> AgentSetup:
+        """Return what one agent is told; ``command_ticks`` is the clock's (one, or two)."""
+        return AgentSetup(
+            id=agent,
+            incarnation=incarnation,
+            tick_hz=self.fleet.tick_hz,
+            slots_per_tick=SLOTS_PER_TICK,
+            command_ticks=command_ticks,
+            vehicle=self.vehicle,
+            control=self.control,
+            comms=self.comms,
+            formation=self.formation,
+        )
