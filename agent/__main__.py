@@ -5,6 +5,7 @@ import sys
 
 from agent.controller import ControllerError
 from agent.process import GoneError, fly
+from netem.wire.keys import Keys
 from netem.wire.post import RefusedError
 from netem.wire.session import SessionError
 
@@ -41,13 +42,20 @@ def main(arguments: list[str] | None = None) -> int:
 def run(agent: int, run_name: str, connect: str) -> int:
     """Fly one agent, and say in one line what stood in its way; return the exit status."""
     try:
-        return fly(agent, run_name, connect)
+        keys = Keys(run_name)
+    except ValueError as error:
+        return _said(agent, error, 2)
+    try:
+        return fly(agent, keys, connect)
     except GoneError as error:
-        print(f"agent-{agent}: {error}", file=sys.stderr)
-        return 1
-    except (SessionError, RefusedError, ControllerError, ValueError) as error:
-        print(f"agent-{agent}: {error}", file=sys.stderr)
-        return 2
+        return _said(agent, error, 1)
+    except (SessionError, RefusedError, ControllerError) as error:
+        return _said(agent, error, 2)
+
+
+def _said(agent: int, error: Exception, status: int) -> int:
+    print(f"agent-{agent}: {error}", file=sys.stderr)
+    return status
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ class Cockpit:
                 self._core.receive(frame.source, frame.channel, frame.payload, observation.time_s)
 
 
-def fly(agent: int, run: str, connect: str) -> int:
+def fly(agent: int, keys: Keys, connect: str) -> int:
     """Fly one agent of a run until the run is over; return 0.
 
     Raises SessionError without a router, RefusedError when the world has no such agent,
@@ -73,10 +73,10 @@ def fly(agent: int, run: str, connect: str) -> int:
     """
     with open_client(connect) as session:
         stop = Stop()
-        post = Post(session, Keys(run))
-        setup = _setup(post, agent, run, stop)
+        post = Post(session, keys)
+        setup = _setup(post, agent, keys.run, stop)
         if setup is not None:
-            _fly(post, setup, run, stop)
+            _fly(post, setup, keys.run, stop)
     return 0
 
 

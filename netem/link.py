@@ -20,6 +20,13 @@ class Cause(IntEnum):
     DROPPED_MEDIUM = 3
 
 
+class Verdict(NamedTuple):
+    """What a link decides: the cause, and the delay [s] of a frame that gets across."""
+
+    cause: Cause
+    delay_s: float = 0.0
+
+
 @dataclass(frozen=True, slots=True)
 class LinkModel:
     """A link in tc-netem's and ns-3's terms.
@@ -27,7 +34,8 @@ class LinkModel:
     range_m: hard disc, d_c [m]; infinite without a limit.
     delay_ms, jitter_ms: delay is uniform in [delay - jitter, delay + jitter], never under 0 [ms].
     loss_percent: independent loss of each frame [%].
-    draws: whether a verdict on this link needs random numbers at all.
+    draws: whether a verdict on this link needs random numbers at all; ``clean``: the verdict in
+    range if it needs none.
     """
 
     range_m: float = float("inf")
@@ -36,16 +44,11 @@ class LinkModel:
     loss_percent: float = 0.0
 
     draws: bool = field(init=False)
+    clean: Verdict = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "draws", self.jitter_ms > 0.0 or self.loss_percent > 0.0)
-
-
-class Verdict(NamedTuple):
-    """What a link decides: the cause, and the delay [s] of a frame that gets across."""
-
-    cause: Cause
-    delay_s: float = 0.0
+        object.__setattr__(self, "clean", Verdict(Cause.DELIVERED, self.delay_ms / 1000.0))
 
 
 _KEY = Layout("<6q")
@@ -77,7 +80,7 @@ def verdict(
     if not distance_m <= link.range_m:
         return LOST_TO_RANGE
     if draws is None:
-        return Verdict(Cause.DELIVERED, link.delay_ms / 1000.0)
+        return link.clean
     if draws[0] * 100.0 < link.loss_percent:
         return LOST
     delay_ms = link.delay_ms + link.jitter_ms * (2.0 * draws[1] - 1.0)

@@ -23,6 +23,8 @@ class Schedule:
 
     def model(self, channel: int, source: int, destination: int) -> LinkModel:
         """Return the model of one directed link on one channel."""
+        if not self._links:
+            return self._channels[channel]
         return self._links.get((channel, source, destination), self._channels[channel])
 
 

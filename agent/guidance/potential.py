@@ -13,11 +13,24 @@ U_tg the exponent is never positive, so nothing overflows (E5).
 
 from collections.abc import Iterable
 from math import exp, sqrt
+from typing import Protocol
 
 from agent.messages import Vector
 
 LEAST_GAP_M = 1e-3
 TARGET_FLOOR_M = 0.25
+
+
+class Other(Protocol):
+    """A neighbour as the potential sees it: where it is and where it is heading [m]."""
+
+    @property
+    def position(self) -> Vector:
+        """Position q_j [m; world frame]."""
+
+    @property
+    def target(self) -> Vector:
+        """Immediate target q_tg,j [m; world frame]."""
 
 
 class Potential:
@@ -28,7 +41,7 @@ class Potential:
     wedge: from 0.02 to 0.005 convergence and separation stay, and turns over 45 degrees halve.
     """
 
-    __slots__ = ("_floor", "a_t", "cap", "d_ob", "k_ob")
+    __slots__ = ("_floor", "_floor2", "a_t", "cap", "d_ob", "k_ob")
 
     def __init__(
         self, d_ob: float, a_t: float = 1.0, k_ob: float = 0.005, cap: float = 2.0
@@ -38,6 +51,7 @@ class Potential:
         self.k_ob = k_ob
         self.cap = cap
         self._floor = d_ob + TARGET_FLOOR_M
+        self._floor2 = self._floor * self._floor
 
     def at_targets(self, between_targets_m: float) -> float:
         """Return U_tg for two immediate targets that far apart [m]: (22) with E1."""
@@ -60,15 +74,16 @@ class Potential:
         steepness = 1.0 / (u_tg * u_tg) - 1.0 / (u * u)
         return sigma * steepness - 3.0 * self.a_t * d * d * sigma * (1.0 - sigma) * excess
 
-    def omega(self, q: Vector, q_tg: Vector, others: Iterable[tuple[Vector, Vector]]) -> Vector:
+    def omega(self, q: Vector, q_tg: Vector, others: Iterable[Other]) -> Vector:
         """Return Omega_i of (27) with the chain rule put right (E2) [m].
 
         q, q_tg: own position and immediate target [m]; others: the same of each neighbour.
         """
         x, y, z = q[0] - q_tg[0], q[1] - q_tg[1], q[2] - q_tg[2]
-        for q_j, q_tg_j in others:
-            push = self._push(q, q_tg, q_j, q_tg_j)
+        for other in others:
+            push = self._push(q, q_tg, other.position, other.target)
             if push != 0.0:
+                q_j = other.position
                 x += push * (q[0] - q_j[0])
                 y += push * (q[1] - q_j[1])
                 z += push * (q[2] - q_j[2])
@@ -76,18 +91,16 @@ class Potential:
 
     def _push(self, q: Vector, q_tg: Vector, q_j: Vector, q_tg_j: Vector) -> float:
         """Return the factor of q_ij in Omega_i: k_ob U'_ob g / r, its size capped."""
-        r = _distance(q, q_j)
+        dx, dy, dz = q[0] - q_j[0], q[1] - q_j[1], q[2] - q_j[2]
+        tx, ty, tz = q_tg[0] - q_tg_j[0], q_tg[1] - q_tg_j[1], q_tg[2] - q_tg_j[2]
+        r2 = dx * dx + dy * dy + dz * dz
+        t2 = tx * tx + ty * ty + tz * tz
+        if r2 >= max(t2, self._floor2) or r2 == 0.0:
+            return 0.0  # U >= U_tg, told without a root: most neighbours, most of the time
+        r = sqrt(r2)
         g = max(r - self.d_ob, LEAST_GAP_M)
-        u_tg = self.at_targets(_distance(q_tg, q_tg_j))
-        u = 0.5 * g * g
-        if u >= u_tg or r == 0.0:
-            return 0.0
-        return max(self.k_ob * self.slope(u, u_tg) * g, -self.cap) / r
+        slope = self.slope(0.5 * g * g, self.at_targets(sqrt(t2)))
+        return max(self.k_ob * slope * g, -self.cap) / r
 
     def _sigma(self, d: float) -> float:
         return 1.0 / (1.0 + exp(self.a_t * d * d * d))
-
-
-def _distance(a: Vector, b: Vector) -> float:
-    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    return sqrt(dx * dx + dy * dy + dz * dz)

@@ -49,9 +49,7 @@ class QStructure:
         q = senses.position
         q_toq = self._targets.slot(place, self._frame)
         q_tg = bobber(q, senses.yaw, q_toq, self._zone)
-        x, y, z = self._potential.omega(
-            q, q_tg, [(other.position, other.target) for other in senses.neighbours]
-        )
+        x, y, z = self._potential.omega(q, q_tg, senses.neighbours)
         force = GAIN * sqrt(x * x + y * y + z * z)
         wanted = saturated((-GAIN * x, -GAIN * y, -GAIN * z), self._max_speed, self._max_climb)
         velocity, yaw = steer(wanted, senses.yaw, self._theta)

@@ -15,17 +15,21 @@ def swept_separation(before: Singles, after: Singles) -> Floats:
     that is alone, give NaN.
     """
     start = _between_rows(before)
-    change = _between_rows(after) - start
-    along = np.sum(change * change, axis=2)
-    closing = -np.sum(start * change, axis=2)
-    when = np.clip(closing / np.where(along > 0.0, along, 1.0), 0.0, 1.0)
-    nearest = start + when[:, :, None] * change
-    distance = np.sqrt(np.sum(nearest * nearest, axis=2))
+    change = [after - before for before, after in zip(start, _between_rows(after), strict=True)]
+    along = _dot(change, change)
+    when = -_dot(start, change) / np.where(along > 0.0, along, 1.0)
+    when = np.minimum(np.maximum(when, 0.0), 1.0)
+    nearest = [a + when * b for a, b in zip(start, change, strict=True)]
+    distance = np.sqrt(_dot(nearest, nearest))
     np.fill_diagonal(distance, np.inf)
     least = np.where(np.isnan(distance), np.inf, distance).min(axis=1)
     return np.where(np.isfinite(least), least, np.nan)
 
 
-def _between_rows(position: Singles) -> Floats:
-    wide = position.astype(np.float64)
-    return wide[:, None, :] - wide[None, :, :]
+def _between_rows(position: Singles) -> list[Floats]:
+    """Return x, y, z of row j as seen from row i, each (N, N) [m]."""
+    return [axis[None, :] - axis[:, None] for axis in position.T.astype(np.float64)]
+
+
+def _dot(a: list[Floats], b: list[Floats]) -> Floats:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -6,10 +6,11 @@ commands back to ``obey``, and calls ``close``. Nothing here knows how messages 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan2, degrees, hypot, pi
-from typing import Any, Protocol
+from math import atan2, degrees, hypot, nan, pi
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agent.messages import Command, Observation, Vector
 from worldsim.judge.tick import Packets, Tick
@@ -22,6 +23,20 @@ from worldsim.truth.world import Clock, World
 
 MOVING_MPS = 0.02
 Event = dict[str, Any]
+
+
+class Told(NamedTuple):
+    """What an agent last told of its reasons, as a row of a tick; see Telemetry and Tick."""
+
+    target: Vector
+    place: tuple[int, int]
+    force: float
+    turn_deg: float
+    heard: tuple[int, ...]
+
+
+UNTOLD = Told((nan, nan, nan), (-1, -1), nan, nan, ())
+NO_LINKS: NDArray[np.int32] = np.zeros((0, 2), dtype=np.int32)
 
 
 class Recorder(Protocol):
@@ -80,7 +95,7 @@ class SlotLoop:
         self._packets = packets
         self._places: list[tuple[int, int] | None] = [None] * scenario.fleet.agents
         self._headings = world.fleet.yaw.tolist()
-        self._turn_deg = np.full(scenario.fleet.agents, np.nan, dtype=np.float32)
+        self._told = [UNTOLD] * scenario.fleet.agents
 
     def open(self) -> Opened:
         """Begin the present slot; at a tick, judge and record it first."""
@@ -106,8 +121,15 @@ class SlotLoop:
         """Take one agent's command; under a barrier, in order of ids."""
         if self.world.obey(agent, command):
             self.trace.command(agent, encoded)
-            self._turn_deg[agent] = _turn_deg(command.telemetry.wanted, self._headings[agent])
-            self._watch_place(agent, command)
+            told = command.telemetry
+            self._told[agent] = Told(
+                told.target or UNTOLD.target,
+                told.place or UNTOLD.place,
+                told.force,
+                _turn_deg(told.wanted, self._headings[agent]),
+                told.heard,
+            )
+            self._watch_place(agent, told.place)
 
     def close(self, verdicts: bytes) -> None:
         """End the slot with the medium's digest: the vehicles fly through it."""
@@ -131,8 +153,8 @@ class SlotLoop:
         if self._recorder is not None:
             self._recorder.event(event)
 
-    def _watch_place(self, agent: int, command: Command) -> None:
-        before, now = self._places[agent], command.telemetry.place
+    def _watch_place(self, agent: int, now: tuple[int, int] | None) -> None:
+        before = self._places[agent]
         if now == before:
             return
         self._places[agent] = now
@@ -150,34 +172,28 @@ class SlotLoop:
 
     def _tick(self) -> Tick:
         fleet = self.world.fleet
-        count = len(fleet)
-        target = np.full((count, 3), np.nan, dtype=np.float32)
-        place = np.full((count, 2), -1, dtype=np.int16)
-        force = np.full(count, np.nan, dtype=np.float32)
-        links: list[tuple[int, int]] = []
-        for row, command in enumerate(self.world.latest):
-            if command is None or not self._alive[row]:
-                continue
-            told = command.telemetry
-            force[row] = told.force
-            if told.target is not None:
-                target[row] = told.target
-            if told.place is not None:
-                place[row] = told.place
-            links.extend((row, other) for other in told.heard)
+        told = [
+            row if alive else UNTOLD
+            for row, alive in zip(self._told, self._alive.tolist(), strict=True)
+        ]
         return Tick(
             index=self.world.slot // self.world.clock.slots_per_tick,
             time_s=self.world.time_s,
             position=fleet.position.astype(np.float32),
             yaw=fleet.yaw.astype(np.float32),
-            target=target,
-            place=place,
-            force=force,
-            turn_deg=np.where(self._alive, self._turn_deg, np.float32(np.nan)),
+            target=np.array([row.target for row in told], dtype=np.float32),
+            place=np.array([row.place for row in told], dtype=np.int16),
+            force=np.array([row.force for row in told], dtype=np.float32),
+            turn_deg=np.array([row.turn_deg for row in told], dtype=np.float32),
             alive=self._alive.copy(),
-            links=np.array(links, dtype=np.int32).reshape(-1, 2),
-            packets=self._packets(),
+            links=self._links(told) if self._recorder is not None else NO_LINKS,
+            packets=self._packets() if self._recorder is not None else {},
         )
+
+    @staticmethod
+    def _links(told: list[Told]) -> NDArray[np.int32]:
+        pairs = [(row, other) for row, each in enumerate(told) for other in each.heard]
+        return np.array(pairs, dtype=np.int32).reshape(-1, 2)
 
 
 def _turn_deg(wanted: Vector, heading: float) -> float:

@@ -42,7 +42,8 @@ class Fleet:
         self.velocity = self._limited(velocity)
         self.position = self.position + self.velocity * dt
         reach = self._max_yaw_rate * dt
-        self.yaw = wrapped(self.yaw + np.clip(wrapped(yaw - self.yaw), -reach, reach))
+        turn = np.minimum(np.maximum(wrapped(yaw - self.yaw), -reach), reach)
+        self.yaw = wrapped(self.yaw + turn)
 
     def _limited(self, velocity: Floats) -> Floats:
         x, y, z = velocity[:, 0], velocity[:, 1], velocity[:, 2]
