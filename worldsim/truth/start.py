@@ -6,6 +6,7 @@ from worldsim.scenario import BoxStart, ListStart
 from worldsim.truth.vehicle import Floats
 
 TRIES = 10_000
+"""For one vehicle; a box that refuses so many draws has no room."""
 
 
 class StartError(ValueError):
@@ -19,16 +20,16 @@ def starts(start: BoxStart | ListStart, agents: int, seed: int) -> tuple[Floats,
         return np.array(start.positions_m), np.radians(np.array(yaws))
     generator = np.random.Generator(np.random.Philox(key=[seed, 0x57A27]))
     centre, size = np.array(start.centre_m), np.array(start.size_m)
-    placed: list[Floats] = []
-    for _ in range(TRIES * agents):
-        if len(placed) == agents:
-            break
-        candidate = centre + size * (generator.random(3) - 0.5)
-        if all(np.linalg.norm(candidate - other) >= start.spacing_m for other in placed):
-            placed.append(candidate)
-    if len(placed) < agents:
-        raise StartError(
-            f"no room for {agents} agents {start.spacing_m:g} m apart in a box of "
-            f"{' x '.join(f'{edge:g}' for edge in start.size_m)} m"
-        )
-    return np.array(placed), generator.uniform(-np.pi, np.pi, agents)
+    placed = np.empty((agents, 3))
+    for row in range(agents):
+        for _ in range(TRIES):
+            placed[row] = centre + size * (generator.random(3) - 0.5)
+            away = placed[:row] - placed[row]
+            if np.all(np.sqrt(np.sum(away * away, axis=1)) >= start.spacing_m):
+                break
+        else:
+            raise StartError(
+                f"no room for {agents} agents {start.spacing_m:g} m apart in a box of "
+                f"{' x '.join(f'{edge:g}' for edge in start.size_m)} m"
+            )
+    return placed, generator.uniform(-np.pi, np.pi, agents)

@@ -1,0 +1,45 @@
+"""What a scenario must pass before anything is started, besides its own checks.
+
+A start with room for everybody, a controller that can be had, vehicles that the safety filter can
+hold under the clock in question.
+"""
+
+from pathlib import Path
+
+from agent.controller import ControllerError
+from agent.controller import load as load_controller
+from worldsim.rules import Finding, too_fast
+from worldsim.scenario import Scenario, ScenarioError
+from worldsim.truth.start import StartError, starts
+
+VIRTUAL_COMMAND_TICKS = 1
+PROCESS_COMMAND_TICKS = 2
+"""For how many ticks a command lives under each clock: H of ERRATA 2."""
+
+
+def admit(scenario: Scenario, file: str | Path, command_ticks: int) -> None:
+    """Raise ScenarioError if a scenario cannot be flown where a command lives that long."""
+    broken = too_fast(scenario, command_ticks) or _controller(scenario) or _room(scenario)
+    if broken is not None:
+        raise ScenarioError(file, *broken)
+
+
+def _controller(scenario: Scenario) -> Finding | None:
+    name = scenario.control.controller
+    try:
+        load_controller(name)
+    except ControllerError as error:
+        return Finding("control.controller", str(error))
+    except Exception as error:  # the user's module may raise anything while it is imported
+        return Finding(
+            "control.controller", f"{name!r} cannot be imported: {type(error).__name__}: {error}"
+        )
+    return None
+
+
+def _room(scenario: Scenario) -> Finding | None:
+    try:
+        starts(scenario.fleet.start, scenario.fleet.agents, scenario.seed)
+    except StartError as error:
+        return Finding("fleet.start", str(error))
+    return None

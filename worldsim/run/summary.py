@@ -1,0 +1,150 @@
+"""summary.json: what a run showed, from the judge, the radio's counters and the clock."""
+
+from math import isfinite
+from typing import Any
+
+from netem.messages import Verdicts
+from worldsim.judge.verdict import Expectation, Judge
+from worldsim.run.slots import SlotLoop
+from worldsim.scenario import Scenario
+
+SCHEMA = 1
+FATES = (
+    "delivered",
+    "dropped_range",
+    "dropped_loss",
+    "dropped_partition",
+    "dropped_queue",
+    "dropped_medium",
+    "duplicated",
+    "corrupted",
+)
+EXIT_STATUS = {"pass": 0, "fail": 1, "inconclusive": 3}
+
+
+def summarise(  # noqa: PLR0913 - a figure each, by name
+    scenario: Scenario,
+    loop: SlotLoop,
+    *,
+    mode: str,
+    verdicts: Verdicts | None,
+    rejected: int | None,
+    late_tick_fraction: float | None,
+    real_time_factor: float | None,
+    duration_s: float,
+    interrupted: bool,
+    host_too_slow: bool,
+) -> dict[str, Any]:
+    """Return summary.json's content: plain values, None for what could not be measured.
+
+    mode: "processes", "lockstep" or "virtual". duration_s: how much was flown, in simulated time.
+    """
+    judge = loop.judge
+    expectations = judge.expectations()
+    invariants = {**judge.invariants(), "I8": _conservation(verdicts)}
+    doubt = _doubt(interrupted, host_too_slow, duration_s, late_tick_fraction)
+    outcome, reason = _outcome(expectations, invariants, doubt)
+    summary = {
+        "schema": SCHEMA,
+        "scenario": scenario.name,
+        "seed": scenario.seed,
+        "mode": mode,
+        "agents": scenario.fleet.agents,
+        "duration_s": duration_s,
+        "outcome": outcome,
+        "reason": reason,
+        "expectations": [_row(expectation) for expectation in expectations],
+        "min_separation_m": judge.min_separation_m,
+        "min_obstacle_distance_m": None,
+        "phases": _phases(judge),
+        "turns_over_limit_fraction": judge.turns_over_limit_fraction,
+        "packets": _packets(verdicts, rejected),
+        "invariants": invariants,
+        "late_tick_fraction": late_tick_fraction,
+        "real_time_factor": real_time_factor,
+        "trace_sha256": None if mode == "processes" else loop.trace.sha256,
+    }
+    return {key: _strict(value) for key, value in summary.items()}
+
+
+def _outcome(
+    expectations: list[Expectation], invariants: dict[str, dict[str, int]], doubt: str | None
+) -> tuple[str, str | None]:
+    """Return the outcome and its reason.
+
+    A broken invariant is a failure whatever else happened: no slow host excuses a collision.
+    """
+    broken = [name for name, counts in invariants.items() if counts["violations"]]
+    if broken:
+        return "fail", f"violated: {', '.join(broken)}"
+    if doubt is not None:
+        return "inconclusive", doubt
+    unseen = [name for name, counts in invariants.items() if not counts["ticks"]]
+    if unseen:
+        return "fail", f"never evaluated: {', '.join(unseen)}"
+    missed = [expectation.name for expectation in expectations if not expectation.held]
+    if missed:
+        return "fail", f"not held: {', '.join(missed)}"
+    return "pass", None
+
+
+def _doubt(
+    interrupted: bool, host_too_slow: bool, duration_s: float, late: float | None
+) -> str | None:
+    if interrupted:
+        return f"interrupted after {duration_s:.1f} s"
+    if host_too_slow:
+        share = f": {100 * late:.1f} % of ticks were late" if late is not None else ""
+        return f"the host was too slow{share}"
+    return None
+
+
+def _conservation(verdicts: Verdicts | None) -> dict[str, int]:
+    """I8: what was addressed has met a fate or is in flight; looked at once, over the whole run."""
+    if verdicts is None:
+        return {"ticks": 0, "violations": 0}
+    kept = sum(verdicts.fates.values()) + verdicts.in_flight == verdicts.addressed
+    return {"ticks": 1, "violations": 0 if kept else 1}
+
+
+def _packets(verdicts: Verdicts | None, rejected: int | None) -> dict[str, int | None]:
+    """Count packets; sent and each fate count once for each agent a frame was addressed to."""
+    if verdicts is None:
+        return {"sent": None, **dict.fromkeys(FATES), "in_flight": None, "rejected": rejected}
+    return {
+        "sent": verdicts.addressed,
+        **{fate: verdicts.fates.get(fate, 0) for fate in FATES},
+        "in_flight": verdicts.in_flight,
+        "rejected": rejected,
+    }
+
+
+def _phases(judge: Judge) -> list[dict[str, Any]]:
+    return [
+        {
+            "formation": phase.formation.name,
+            "from_s": phase.from_s,
+            "converged": phase.converge_s is not None,
+            "converge_s": phase.converge_s,
+            "residual_m": phase.residual_m,
+        }
+        for phase in judge.phases
+    ]
+
+
+def _row(expectation: Expectation) -> dict[str, Any]:
+    return {
+        "name": expectation.name,
+        "wanted": expectation.wanted,
+        "got": expectation.got,
+        "held": expectation.held,
+    }
+
+
+def _strict(value: Any) -> Any:
+    """JSON knows no NaN and no infinity: what is not finite was not measured."""
+    if isinstance(value, float):
+        return float(value) if isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _strict(inner) for key, inner in value.items()}
+    return [_strict(inner) for inner in value] if isinstance(value, list | tuple) else value
