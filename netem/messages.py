@@ -39,13 +39,14 @@ class Conditions(LinkKeys, frozen=True):
 
 
 class MediumSetup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """All that a medium needs to begin."""
+    """All that a medium needs to begin; ``speed``: simulated seconds in one of the wall clock."""
 
     seed: Count
     agents: Annotated[int, Meta(ge=1, lt=2**16)]
     slots_per_tick: Annotated[int, Meta(ge=1, le=64)]
     slot_hz: Annotated[float, Meta(gt=0, le=1e5)]
     conditions: Conditions
+    speed: Annotated[float, Meta(gt=0, le=1e4)] = 1.0
 
 
 class Truth(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):

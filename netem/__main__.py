@@ -1,0 +1,52 @@
+"""The medium by hand: ``python -m netem --listen tcp/127.0.0.1:7447``."""
+
+import argparse
+import sys
+
+from netem.process import SilenceError, serve
+from netem.wire.session import SessionError
+
+DESCRIPTION = """\
+The radio between the agents, and the Zenoh router that all processes of a run connect to.
+
+It serves the first run whose world asks for it, refuses any other, and ends with that run.
+What the radio is like (range, delay, loss) comes from the world's scenario."""
+
+EPILOG = """\
+a fleet by hand, each in its own shell:
+  python -m netem --listen tcp/127.0.0.1:7447
+  python -m worldsim deploy/scenarios/wedge-9.toml --connect tcp/127.0.0.1:7447 --out runs/mine \\
+      --run mine
+  for i in 0 1 2 3 4 5 6 7 8; do
+      python -m agent --id $i --run mine --connect tcp/127.0.0.1:7447 &
+  done
+
+exit status: 0 the run ended or SIGTERM came; 1 the world went silent; 2 it could not listen"""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Serve as the command line says; return the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="python -m netem",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--listen",
+        required=True,
+        metavar="ENDPOINT",
+        help="where to listen, on loopback: tcp/127.0.0.1:7447, unixsock-stream//run/qswarm.sock",
+    )
+    try:
+        return serve(parser.parse_args(arguments).listen)
+    except SessionError as error:
+        print(f"netem: {error}", file=sys.stderr)
+        return 2
+    except SilenceError as error:
+        print(f"netem: {error}", file=sys.stderr)
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

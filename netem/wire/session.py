@@ -1,0 +1,116 @@
+"""Zenoh sessions as this project uses them: one router a host, every other process its client.
+
+Nothing is discovered, nothing is listened on that was not named, and what comes in is bounded.
+"""
+
+import ipaddress
+import json
+import re
+from typing import Any
+
+import zenoh
+
+OPEN_TIMEOUT_S = 8.0
+MAX_MESSAGE_B = 4 * 1024 * 1024
+
+_ENDPOINT = re.compile(r"(?P<protocol>[a-z][a-z-]*)/(?P<address>.+)")
+_IN_USE = re.compile(r"in use|lock", re.IGNORECASE)
+
+
+class SessionError(RuntimeError):
+    """A session that could not be opened; the text says it in one line."""
+
+
+def open_router(listen: str) -> zenoh.Session:
+    """Open this host's router at ``listen``, for example ``tcp/127.0.0.1:7447``.
+
+    Raises :class:`SessionError` when the endpoint is malformed, not loopback or in use.
+    """
+    _refuse_all_but_loopback(listen)
+    try:
+        return zenoh.open(router_config(listen))
+    except zenoh.ZError as error:
+        raise SessionError(f"{listen}: {_cause(error)}") from error
+
+
+def open_client(connect: str, timeout_s: float = OPEN_TIMEOUT_S) -> zenoh.Session:
+    """Open a client of the router at ``connect``; later the client reconnects by itself.
+
+    Raises :class:`SessionError` when no router answers within ``timeout_s`` [s].
+    """
+    _address(connect)
+    try:
+        return zenoh.open(client_config(connect, timeout_s))
+    except zenoh.ZError as error:
+        raise SessionError(f"no router answers at {connect} within {timeout_s:g} s") from error
+
+
+def router_config(listen: str) -> zenoh.Config:
+    """Return the configuration of a router that listens at one endpoint."""
+    return _config({"mode": "router", "listen": {"endpoints": [listen]}})
+
+
+def client_config(connect: str, timeout_s: float) -> zenoh.Config:
+    """Return the configuration of a client that listens nowhere."""
+    retry = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2}
+    return _config(
+        {
+            "mode": "client",
+            "listen": {"endpoints": []},
+            "connect": {
+                "endpoints": [connect],
+                "timeout_ms": round(timeout_s * 1000),
+                "exit_on_failure": True,
+                "retry": retry,
+            },
+        }
+    )
+
+
+def _config(own: dict[str, Any]) -> zenoh.Config:
+    common = {
+        "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        "adminspace": {"enabled": False},
+        "transport": {
+            "link": {"rx": {"max_message_size": MAX_MESSAGE_B}},
+            "shared_memory": {"enabled": False},
+        },
+    }
+    return zenoh.Config.from_json5(json.dumps(common | own))
+
+
+def _address(endpoint: str) -> tuple[str, str]:
+    match = _ENDPOINT.fullmatch(endpoint)
+    if match is None:
+        raise SessionError(f"{endpoint!r}: no endpoint; one looks like tcp/127.0.0.1:7447")
+    return match["protocol"], match["address"]
+
+
+def _refuse_all_but_loopback(endpoint: str) -> None:
+    protocol, address = _address(endpoint)
+    if protocol == "unixsock-stream":
+        return
+    host, colon, port = address.rpartition(":")
+    if not colon or not port.isdecimal() or not int(port) < 2**16:
+        raise SessionError(f"{endpoint}: the port is missing or wrong; 0 to 65535 are allowed")
+    if not _is_loopback(host.strip("[]")):
+        raise SessionError(
+            f"{endpoint}: not a loopback address; 127.0.0.1, [::1] and localhost are allowed"
+        )
+
+
+def _is_loopback(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _cause(error: zenoh.ZError) -> str:
+    text = str(error)
+    if _IN_USE.search(text):
+        return "the port is in use"
+    # Zenoh appends where in its own source an error arose; that helps nobody here.
+    return re.sub(r" at /\S+\.rs:\d+\.?", "", text).splitlines()[0]
