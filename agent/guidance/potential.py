@@ -41,7 +41,7 @@ class Potential:
     wedge: from 0.02 to 0.005 convergence and separation stay, and turns over 45 degrees halve.
     """
 
-    __slots__ = ("_floor", "_floor2", "a_t", "cap", "d_ob", "k_ob")
+    __slots__ = ("_floor", "a_t", "cap", "d_ob", "k_ob")
 
     def __init__(
         self, d_ob: float, a_t: float = 1.0, k_ob: float = 0.005, cap: float = 2.0
@@ -51,7 +51,6 @@ class Potential:
         self.k_ob = k_ob
         self.cap = cap
         self._floor = d_ob + TARGET_FLOOR_M
-        self._floor2 = self._floor * self._floor
 
     def at_targets(self, between_targets_m: float) -> float:
         """Return U_tg for two immediate targets that far apart [m]: (22) with E1."""
@@ -93,14 +92,13 @@ class Potential:
         """Return the factor of q_ij in Omega_i: k_ob U'_ob g / r, its size capped."""
         dx, dy, dz = q[0] - q_j[0], q[1] - q_j[1], q[2] - q_j[2]
         tx, ty, tz = q_tg[0] - q_tg_j[0], q_tg[1] - q_tg_j[1], q_tg[2] - q_tg_j[2]
-        r2 = dx * dx + dy * dy + dz * dz
-        t2 = tx * tx + ty * ty + tz * tz
-        if r2 >= max(t2, self._floor2) or r2 == 0.0:
-            return 0.0  # U >= U_tg, told without a root: most neighbours, most of the time
-        r = sqrt(r2)
+        r = sqrt(dx * dx + dy * dy + dz * dz)
         g = max(r - self.d_ob, LEAST_GAP_M)
-        slope = self.slope(0.5 * g * g, self.at_targets(sqrt(t2)))
-        return max(self.k_ob * slope * g, -self.cap) / r
+        u = 0.5 * g * g
+        u_tg = self.at_targets(sqrt(tx * tx + ty * ty + tz * tz))
+        if u >= u_tg or r == 0.0:
+            return 0.0
+        return max(self.k_ob * self.slope(u, u_tg) * g, -self.cap) / r
 
     def _sigma(self, d: float) -> float:
         return 1.0 / (1.0 + exp(self.a_t * d * d * d))

@@ -1,0 +1,104 @@
+"""The paper's equations as they are printed, to be put in the place of the forms that fly.
+
+Each is what a reader would write from the page; the law named beside it in
+test_literal_forms.py says what then breaks.
+"""
+
+from math import acos, cos, dist, exp, sin, sqrt
+
+from agent.messages import Place
+
+STEP_M = 1e-3
+
+
+def at_targets(self, between_targets_m):
+    """(22): U_tg,ij = |q_tg,i - q_tg,j|^2 / 2."""
+    return 0.5 * between_targets_m * between_targets_m
+
+
+def at_targets_without_floor(self, between_targets_m):
+    """(22) with (21)'s offset but no floor."""
+    gap = max(between_targets_m - self.d_ob, 1e-4)
+    return 0.5 * gap * gap
+
+
+def omega(self, q, q_tg, others):
+    """(27): Omega_i = (q_i - q_tg,i) + sum U'_ob,ij q_ij."""
+    total = [a - b for a, b in zip(q, q_tg, strict=True)]
+    for other in others:
+        gap = dist(q, other.position) - self.d_ob
+        u_tg = self.at_targets(dist(q_tg, other.target))
+        slope = self.k_ob * self.slope(0.5 * gap * gap, u_tg)
+        for axis in range(3):
+            total[axis] += slope * (q[axis] - other.position[axis])
+    return tuple(total)
+
+
+def value_two_sided(self, u, u_tg):
+    """(23), on both sides of U_tg."""
+    sigma = 1.0 / (1.0 + exp(min(self.a_t * (u - u_tg) ** 3, 700.0)))
+    return sigma * (u / u_tg**2 + 1.0 / u)
+
+
+def slope_two_sided(self, u, u_tg):
+    """The derivative of (23), on both sides of U_tg."""
+    d = u - u_tg
+    sigma = 1.0 / (1.0 + exp(min(self.a_t * d**3, 700.0)))
+    h, h_slope = u / u_tg**2 + 1.0 / u, 1.0 / u_tg**2 - 1.0 / u**2
+    return sigma * h_slope - 3.0 * self.a_t * d * d * sigma * (1.0 - sigma) * h
+
+
+def push_two_sided(self, q, q_tg, q_j, q_tg_j):
+    """The factor of q_ij for (23) on both sides."""
+    r = dist(q, q_j)
+    gap = max(r - self.d_ob, 1e-3)
+    slope = slope_two_sided(self, 0.5 * gap * gap, self.at_targets(dist(q_tg, q_tg_j)))
+    return self.k_ob * slope * gap / r
+
+
+def bobber(q, yaw, q_toq, zone):
+    """(1)-(3), (10) at unit weight: the least U_tcast + U_obcast in the cast-zone, on a grid."""
+    near, far = 0.05, zone.reach
+    best, least = q, float("inf")
+    for ring in range(1, 40):
+        r = near + (far - near) * ring / 40
+        for ray in range(1, 60):
+            side = -zone.theta + 2.0 * zone.theta * ray / 60
+            at = (q[0] + r * cos(yaw + side), q[1] + r * sin(yaw + side), q[2])
+            onward = [t - a for t, a in zip(q_toq, at, strict=True)]
+            out = [a - b for a, b in zip(at, q, strict=True)]
+            cosine = sum(a * b for a, b in zip(out, onward, strict=True)) / (
+                r * sqrt(sum(b * b for b in onward))
+            )
+            walls = 0.5 / (r - near) ** 2 + 0.5 / (r - far) ** 2
+            walls += 1.0 / (r * sin(zone.theta - side)) + 1.0 / (r * sin(zone.theta + side))
+            potential = acos(max(-1.0, min(1.0, cosine))) + walls
+            if potential < least:
+                best, least = at, potential
+    return best
+
+
+def slot_by_chord(self, place, spacing):
+    """Algorithm 1, line 18: the next point of the queue at the straight distance d_ir."""
+    queue = self.queues[place.queue]
+    s = 0.0
+    for _ in range(place.rank):
+        before = queue.point(s)
+        s += STEP_M
+        while dist(queue.point(s), before) < spacing:
+            s += STEP_M
+    return queue.point(s)
+
+
+def places_queue_by_queue(self, agents):
+    """Algorithm 1, line 15 in each queue by itself: its first agent takes the vertex."""
+    counts = [agents // len(self.queues)] * len(self.queues)
+    for extra in range(agents % len(self.queues)):
+        counts[extra] += 1
+    return tuple(Place(j, k) for j, count in enumerate(counts) for k in range(count))
+
+
+def allot_by_distance(team, places, slots):
+    """Algorithm 1, lines 12-18: ordered by distance from the vertex, each time anew."""
+    ordered = sorted(team, key=lambda peer: dist(peer.position, slots[0]))
+    return {peer.id: place for peer, place in zip(ordered, places, strict=True)}
