@@ -11,11 +11,18 @@ from worldsim.scenario import Scenario, dump
 RUNS = Path("runs")
 
 
-class RunDirectoryError(OSError):
+class RunDirectoryError(Exception):
     """A run's folder that cannot be made or written; one line that names it and says why."""
 
     def __init__(self, path: Path, detail: str) -> None:
-        super().__init__(f"{path}: {detail}")
+        super().__init__(path, detail)
+
+    def __str__(self) -> str:
+        return "{}: {}".format(*self.args)
+
+
+class RunWriteError(RunDirectoryError):
+    """A run whose result could not be kept, on a full disk say."""
 
 
 class RunDirectory:
@@ -58,7 +65,7 @@ class RunDirectory:
             self._events_lost = True
 
     def write_summary(self, summary: dict[str, Any]) -> None:
-        """Write summary.json whole or not at all. Raises RunDirectoryError, a full disk say."""
+        """Write summary.json whole or not at all. Raises RunWriteError, on a full disk say."""
         write_json(self.summary, summary)
 
 
@@ -76,13 +83,13 @@ def make_folder(path: Path | None, name: str) -> Path:
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write strict JSON so that a reader sees all of it or none, or raise RunDirectoryError."""
+    """Write strict JSON so that a reader sees all of it or none, or raise RunWriteError."""
     draft = path.with_suffix(".part")
     try:
         draft.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
         draft.replace(path)
     except OSError as error:
-        raise RunDirectoryError(path, _reason(error)) from error
+        raise RunWriteError(path, _reason(error)) from error
 
 
 def _named_after_now(name: str) -> Path:

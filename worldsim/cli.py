@@ -1,0 +1,250 @@
+"""The command line: qswarm run | sim | check | verify | ps.
+
+Commands check everything before they start anything. Bad input is one line on stderr and exit
+status 2; what a command needs is imported inside it, so that --help and check stay quick.
+"""
+
+import os
+import re
+import sys
+from collections.abc import Mapping
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from typer.main import get_command
+
+if TYPE_CHECKING:
+    from worldsim.scenario import Scenario
+
+HELD, NOT_HELD, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+MAX_RUNS = 1_000_000
+
+ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO", help="A scenario file (TOML).")]
+ScenarioFiles = Annotated[
+    list[Path], typer.Argument(metavar="SCENARIO", help="One or more scenario files (TOML).")
+]
+RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="The folder of a run.")]
+Agents = Annotated[int | None, typer.Option(metavar="N", help="Fly this many agents instead.")]
+Seed = Annotated[int | None, typer.Option(metavar="S", help="Another seed: starts and radio.")]
+Duration = Annotated[
+    float | None, typer.Option(metavar="T", help="Simulated seconds to fly instead.")
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Set any key; may be given again."),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Where to; must not exist. [runs/SCENARIO-TIME]"),
+]
+NoRecording = Annotated[bool, typer.Option("--no-recording", help="Write no run.rrd.")]
+
+
+def _examples(*lines: str) -> str:
+    return "\n".join(("\b", "Examples:", *(f"  {line}" for line in lines)))
+
+
+app = typer.Typer(
+    name="qswarm",
+    help="Chaos testing for swarm controllers: a fleet of real processes or the same fleet in"
+    " virtual time, an emulated radio between the agents, and a verdict.",
+    epilog=_examples(
+        "qswarm run deploy/scenarios/wedge-9.toml",
+        "qswarm sim deploy/scenarios/wedge-9.toml --seeds 0:20",
+        "qswarm COMMAND --help",
+    )
+    + "\n\nExit status: 0 the expectations held; 1 they did not; 2 bad input, nothing started;"
+    " 3 inconclusive, the host was too slow or the run was interrupted.",
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+@app.command(
+    epilog=_examples(
+        "qswarm run deploy/scenarios/wedge-9.toml",
+        "qswarm run deploy/scenarios/wedge-9.toml --seed 7 --set netem.loss_percent=50",
+        "qswarm run deploy/scenarios/wedge-9.toml --agents 20 --duration 40 --speed 2",
+    )
+)
+def run(
+    scenario: ScenarioFile,
+    agents: Agents = None,
+    seed: Seed = None,
+    speed: Annotated[
+        float, typer.Option(metavar="X", help="Simulated seconds in one of the clock.", min=0.01)
+    ] = 1.0,
+    duration: Duration = None,
+    settings: Settings = None,
+    out: Out = None,
+    no_recording: NoRecording = False,
+) -> int:
+    """Fly a fleet of real processes: netem, world and one for each agent, over Zenoh."""
+    from worldsim.run.admission import PROCESS_COMMAND_TICKS
+    from worldsim.run.rundir import RunDirectory
+
+    if not isfinite(speed):
+        raise typer.BadParameter(f"{speed}; a number from 0.01", param_hint="--speed")
+    overrides = _overrides(settings, agents, seed, duration)
+    admitted = _admitted(scenario, overrides, PROCESS_COMMAND_TICKS)
+    directory = RunDirectory.create(out, admitted)
+    from worldsim.run.fleet import run as fly_processes
+
+    return fly_processes(admitted, directory, speed=speed, recording=not no_recording)
+
+
+@app.command(
+    epilog=_examples(
+        "qswarm sim deploy/scenarios/wedge-9.toml",
+        "qswarm sim deploy/scenarios/wedge-9.toml --seeds 0:20 --jobs 2 --out runs/twenty",
+        "qswarm sim deploy/scenarios/wedge-9.toml --set netem.delay_ms=200 --no-recording",
+    )
+)
+def sim(
+    scenarios: ScenarioFiles,
+    agents: Agents = None,
+    seed: Seed = None,
+    seeds: Annotated[
+        str | None,
+        typer.Option(metavar="A:B", help="Fly each seed from A up to, not with, B."),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Processes at work at once. [all cores]")
+    ] = None,
+    duration: Duration = None,
+    settings: Settings = None,
+    out: Out = None,
+    no_recording: NoRecording = False,
+) -> int:
+    """Fly the same fleet in virtual time, in one process, as fast as the host allows."""
+    from worldsim.run.admission import VIRTUAL_COMMAND_TICKS
+    from worldsim.run.flying import fly_many, fly_one
+
+    if seed is not None and seeds is not None:
+        raise typer.BadParameter("not beside --seed; one or the other", param_hint="--seeds")
+    flown = [
+        _admitted(file, _overrides(settings, agents, each, duration), VIRTUAL_COMMAND_TICKS)
+        for file in scenarios
+        for each in (_seeds(seeds) if seeds is not None else (seed,))
+    ]
+    if seeds is None and len(scenarios) == 1:
+        return fly_one(flown[0], out, not no_recording)
+    return fly_many(flown, out, not no_recording, jobs or len(os.sched_getaffinity(0)))
+
+
+@app.command(
+    epilog=_examples(
+        "qswarm check deploy/scenarios/wedge-9.toml",
+        "qswarm check my.toml --agents 50 --set fleet.tick_hz=40 > resolved.toml",
+    )
+)
+def check(
+    scenario: ScenarioFile,
+    agents: Agents = None,
+    seed: Seed = None,
+    duration: Duration = None,
+    settings: Settings = None,
+) -> int:
+    """Check a scenario and print it resolved; warnings go to stderr. Nothing is started."""
+    from worldsim.rules import cautions, too_fast
+    from worldsim.run.admission import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
+    from worldsim.scenario import dump
+
+    overrides = _overrides(settings, agents, seed, duration)
+    admitted = _admitted(scenario, overrides, VIRTUAL_COMMAND_TICKS)
+    for caution in cautions(admitted):
+        _say(f"{scenario}: {caution.key}: warning: {caution.detail}")
+    outrun = too_fast(admitted, PROCESS_COMMAND_TICKS)
+    if outrun is not None:
+        _say(f"{scenario}: {outrun.key}: warning: only 'sim' can fly this: {outrun.detail}")
+    sys.stdout.write(dump(admitted))
+    return HELD
+
+
+@app.command(epilog=_examples("qswarm verify runs/wedge-9-20260102T030405Z"))
+def verify(run: RunFolder) -> int:
+    """Judge a run again from its recording alone, and compare with its summary."""
+    from worldsim.show.verify import verify as verify_run
+
+    verification = verify_run(run)
+    print(verification)
+    return verification.exit_status
+
+
+@app.command(epilog=_examples("qswarm ps runs/wedge-9-20260102T030405Z"))
+def ps(run: RunFolder) -> int:
+    """List the processes of a fleet: name, pid, and whether it is alive."""
+    from worldsim.run.fleet import processes
+
+    for name, pid, alive in processes(run):
+        print(f"{name:12} {pid:>8}  {'alive' if alive else 'gone'}")
+    return HELD
+
+
+def main() -> None:
+    """Run the command line and exit with the contract's status."""
+    # A controller of the user's own is looked for last where the command is given.
+    sys.path.append(str(Path.cwd()))
+    sys.exit(command(sys.argv[1:]))
+
+
+def command(arguments: list[str]) -> int:
+    """Run one command line; return its exit status. Bad input is told in one line."""
+    from worldsim.run.rundir import RunDirectoryError, RunWriteError
+    from worldsim.scenario import ScenarioError
+
+    try:
+        status = get_command(app)(arguments, prog_name="qswarm", standalone_mode=False)
+    except (ScenarioError, RunDirectoryError) as error:
+        _say(str(error))
+        return NOT_HELD if isinstance(error, RunWriteError) else BAD_INPUT
+    except typer.TyperException as error:
+        _say(f"qswarm: {' '.join(error.format_message().split())} (see qswarm --help)")
+        return BAD_INPUT
+    except (typer.Abort, KeyboardInterrupt):
+        _say("qswarm: interrupted")
+        return INTERRUPTED
+    return int(status or HELD)
+
+
+def _admitted(file: Path, overrides: Mapping[str, str], command_ticks: int) -> "Scenario":
+    from worldsim.run.admission import admit
+    from worldsim.scenario import load
+
+    scenario = load(file, overrides)
+    admit(scenario, file, command_ticks)
+    return scenario
+
+
+def _overrides(
+    settings: list[str] | None, agents: int | None, seed: int | None, duration: float | None
+) -> dict[str, str]:
+    """Return the keys to override; an option of its own wins over --set."""
+    overrides = {}
+    for setting in settings or []:
+        key, equals, value = setting.partition("=")
+        if not equals or not key.strip():
+            raise typer.BadParameter(
+                f"{setting!r}; write it as netem.loss_percent=50", param_hint="--set"
+            )
+        overrides[key.strip()] = value.strip()
+    options = {"fleet.agents": agents, "seed": seed, "duration_s": duration}
+    return overrides | {key: str(value) for key, value in options.items() if value is not None}
+
+
+def _seeds(text: str) -> range:
+    parts = re.fullmatch(r"(\d{1,15}):(\d{1,15})", text)
+    seeds = range(int(parts[1]), int(parts[2])) if parts else range(0)
+    if not seeds or len(seeds) > MAX_RUNS:
+        raise typer.BadParameter(
+            f"{text!r}; write first:end, as 0:20 for 0 to 19, at most {MAX_RUNS} seeds",
+            param_hint="--seeds",
+        )
+    return seeds
+
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr)

@@ -1,0 +1,161 @@
+"""Runs in virtual time, one or many: each into its folder, many with a summary over all."""
+
+import multiprocessing
+import os
+import signal
+import statistics
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from worldsim.run.notebook import notebook
+from worldsim.run.rundir import RunDirectory
+from worldsim.run.slots import SlotLoop
+from worldsim.run.summary import summarise
+from worldsim.run.virtual import fly
+from worldsim.scenario import Scenario
+
+Summary = dict[str, Any]
+
+
+class Job(NamedTuple):
+    """One run to fly: the scenario, where to, and whether to record it."""
+
+    scenario: Scenario
+    folder: Path | None
+    recording: bool
+
+
+def simulate(job: Job, on_progress: Callable[[SlotLoop], None] | None = None) -> Summary:
+    """Fly one run into a new folder; return its summary and, under ``folder``, where it is.
+
+    Raises RunDirectoryError when the folder exists or cannot be written.
+    """
+    scenario = job.scenario
+    directory = RunDirectory.create(job.folder, scenario)
+    notes = notebook(directory, scenario, directory.path.name, job.recording)
+    try:
+        flight = fly(scenario, notes, on_progress=on_progress)
+    finally:
+        notes.close()
+    flown_s = flight.loop.world.time_s
+    summary = summarise(
+        scenario,
+        flight.loop,
+        mode="virtual",
+        verdicts=flight.verdicts,
+        rejected=flight.rejected,
+        late_tick_fraction=0.0,
+        real_time_factor=flown_s / flight.wall_s,
+        duration_s=flown_s,
+        interrupted=False,
+        host_too_slow=False,
+    )
+    directory.write_summary(summary)
+    return {**summary, "folder": str(directory.path)}
+
+
+def sweep(jobs: list[Job], workers: int) -> Iterator[Summary]:
+    """Fly many runs in up to ``workers`` processes; yield each summary as it is done."""
+    if workers == 1 or len(jobs) == 1:
+        yield from map(simulate, jobs)
+        return
+    with _pool(min(workers, len(jobs))) as pool:
+        for done in as_completed([pool.submit(simulate, job) for job in jobs]):
+            yield done.result()
+
+
+def over_all(summaries: Iterable[Summary]) -> Summary:
+    """Return the summary over many runs, by scenario, with a row for each run."""
+    rows = sorted(summaries, key=lambda summary: (summary["scenario"], summary["seed"]))
+    names = sorted({row["scenario"] for row in rows})
+    outcomes = [row["outcome"] for row in rows]
+    return {
+        "schema": 1,
+        "mode": "virtual",
+        "runs": len(rows),
+        "outcome": next((bad for bad in ("fail", "inconclusive") if bad in outcomes), "pass"),
+        "scenarios": [_of_scenario(name, rows) for name in names],
+        "rows": [_row(row) for row in rows],
+    }
+
+
+def _of_scenario(name: str, rows: list[Summary]) -> Summary:
+    mine = [_row(row) for row in rows if row["scenario"] == name]
+    figures = ("min_separation_m", "converge_s", "residual_m", "turns_over_limit_fraction")
+    return {
+        "scenario": name,
+        "runs": len(mine),
+        **{
+            outcome: sum(row["outcome"] == outcome for row in mine)
+            for outcome in ("pass", "fail", "inconclusive")
+        },
+        **{figure: _spread([row[figure] for row in mine]) for figure in figures},
+    }
+
+
+def _row(summary: Summary) -> Summary:
+    """Return a run's line: of several formations the slowest and the worst residual count."""
+    phases = summary["phases"]
+    return {
+        "run": Path(summary["folder"]).name,
+        "scenario": summary["scenario"],
+        "seed": summary["seed"],
+        "outcome": summary["outcome"],
+        "reason": summary["reason"],
+        "min_separation_m": summary["min_separation_m"],
+        "converge_s": _worst([phase["converge_s"] for phase in phases]),
+        "residual_m": _worst([phase["residual_m"] for phase in phases]),
+        "turns_over_limit_fraction": summary["turns_over_limit_fraction"],
+        "real_time_factor": summary["real_time_factor"],
+        "trace_sha256": summary["trace_sha256"],
+    }
+
+
+def _worst(values: list[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return max(known) if len(known) == len(values) and known else None
+
+
+def _spread(values: list[float | None]) -> Summary | None:
+    """Return least, median and greatest of what was measured, and in how many runs it was."""
+    known = [value for value in values if value is not None]
+    if not known:
+        return None
+    return {
+        "min": min(known),
+        "median": statistics.median(known),
+        "max": max(known),
+        "measured": len(known),
+    }
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Worker processes that end with this one, however it ends."""
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for worker in multiprocessing.active_children():
+            worker.terminate()
+        raise
+    pool.shutdown()
+
+
+def _begin_worker() -> None:
+    """Leave Ctrl-C to the parent, and go when the parent is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_leave_with_parent, daemon=True).start()
+
+
+def _leave_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
