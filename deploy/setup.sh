@@ -46,7 +46,7 @@ install_into_venv() {
 # A finished .venv is kept; an unfinished or broken one, or one that was moved, is made anew.
 make_venv() {
     local python=${PYTHON:-python3} version
-    if [ ! -e "$venv/unfinished" ] && [[ $("$venv/bin/pip" --version 2>&1) == *" $venv/"* ]]; then
+    if [ ! -e "$venv/unfinished" ] && [[ $("$venv/bin/pip" --version 2>/dev/null) == *" $venv/"* ]]; then
         return
     fi
     version=$("$python" -c 'import platform; print(platform.python_version())') \
