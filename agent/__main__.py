@@ -3,11 +3,7 @@
 import argparse
 import sys
 
-from agent.controller import ControllerError
-from agent.process import GoneError, fly
-from netem.wire.keys import Keys
-from netem.wire.post import RefusedError
-from netem.wire.session import SessionError
+from agent.process import run
 
 DESCRIPTION = """\
 One agent of a fleet: it senses and hears, decides, commands its vehicle and speaks to the others.
@@ -37,25 +33,6 @@ def main(arguments: list[str] | None = None) -> int:
     )
     options = parser.parse_args(arguments)
     return run(options.id, options.run, options.connect)
-
-
-def run(agent: int, run_name: str, connect: str) -> int:
-    """Fly one agent, and say in one line what stood in its way; return the exit status."""
-    try:
-        keys = Keys(run_name)
-    except ValueError as error:
-        return _said(agent, error, 2)
-    try:
-        return fly(agent, keys, connect)
-    except GoneError as error:
-        return _said(agent, error, 1)
-    except (SessionError, RefusedError, ControllerError) as error:
-        return _said(agent, error, 2)
-
-
-def _said(agent: int, error: Exception, status: int) -> int:
-    print(f"agent-{agent}: {error}", file=sys.stderr)
-    return status
 
 
 if __name__ == "__main__":

@@ -3,19 +3,21 @@
 The process reads no clock: what time it is comes with each observation.
 """
 
+import sys
 import time
 from collections.abc import Callable
 
 import msgspec
 
 from agent.codec import RejectedError, decode_observation, encode
+from agent.controller import ControllerError
 from agent.core import Agent
 from agent.messages import Observation
 from agent.setup import AgentSetup
 from netem.wire.frame import Outgoing, Transmission, WireError, pack, unpack_batch
 from netem.wire.keys import Keys
-from netem.wire.post import Post
-from netem.wire.session import open_client
+from netem.wire.post import Post, RefusedError
+from netem.wire.session import SessionError, open_client
 from netem.wire.stop import Stop
 
 WAIT_S = 0.2
@@ -63,6 +65,25 @@ class Cockpit:
                 continue
             for frame in batch.frames:
                 self._core.receive(frame.source, frame.channel, frame.payload, observation.time_s)
+
+
+def run(agent: int, run_name: str, connect: str) -> int:
+    """Fly one agent, and say in one line what stood in its way; return the exit status."""
+    try:
+        keys = Keys(run_name)
+    except ValueError as error:
+        return _said(agent, error, 2)
+    try:
+        return fly(agent, keys, connect)
+    except GoneError as error:
+        return _said(agent, error, 1)
+    except (SessionError, RefusedError, ControllerError) as error:
+        return _said(agent, error, 2)
+
+
+def _said(agent: int, error: Exception, status: int) -> int:
+    print(f"agent-{agent}: {error}", file=sys.stderr)
+    return status
 
 
 def fly(agent: int, keys: Keys, connect: str) -> int:

@@ -3,8 +3,7 @@
 import argparse
 import sys
 
-from netem.process import SilenceError, serve
-from netem.wire.session import SessionError
+from netem.process import run
 
 DESCRIPTION = """\
 The radio between the agents, and the Zenoh router that all processes of a run connect to.
@@ -38,14 +37,7 @@ def main(arguments: list[str] | None = None) -> int:
         metavar="ENDPOINT",
         help="where to listen, on loopback: tcp/127.0.0.1:7447, unixsock-stream//run/qswarm.sock",
     )
-    try:
-        return serve(parser.parse_args(arguments).listen)
-    except SessionError as error:
-        print(f"netem: {error}", file=sys.stderr)
-        return 2
-    except SilenceError as error:
-        print(f"netem: {error}", file=sys.stderr)
-        return 1
+    return run(parser.parse_args(arguments).listen)
 
 
 if __name__ == "__main__":

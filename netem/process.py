@@ -4,6 +4,7 @@ The world conducts. Each slot's truth makes the medium take in what was sent so 
 the batches of the next slot, so a frame never arrives in the slot in which it was sent.
 """
 
+import sys
 import time
 from collections import Counter, deque
 from statistics import median
@@ -17,7 +18,7 @@ from netem.messages import MAX_CONDITIONS_B, MAX_TRUTH_B, MediumSetup, Truth, Ve
 from netem.wire.frame import Batch, Transmission, WireError, pack, unpack, unpack_transmission
 from netem.wire.keys import Keys
 from netem.wire.post import Post, Waiting, drained, receive
-from netem.wire.session import open_router
+from netem.wire.session import SessionError, open_router
 from netem.wire.stop import Stop
 
 WAIT_S = 0.2
@@ -202,6 +203,15 @@ class Radio:
             frames = self._medium.collect(receiver, due_s)
             self._receivers[receiver](pack(Batch(slot, frames)))
         self._lateness.note(due_s, newest_s, read_at)
+
+
+def run(listen: str) -> int:
+    """Serve at an endpoint, and say in one line what stood in its way; return the exit status."""
+    try:
+        return serve(listen)
+    except (SessionError, SilenceError) as error:
+        print(f"netem: {error}", file=sys.stderr)
+        return 2 if isinstance(error, SessionError) else 1
 
 
 def serve(listen: str) -> int:

@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# A fleet without the launcher: netem, the world and the agents, each started by a plain command.
+#   deploy/by-hand.sh [SCENARIO]
+# The parts may as well be typed into different shells.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+scenario=${1:-deploy/scenarios/wedge-9.toml}
+python=.venv/bin/python
+endpoint=tcp/127.0.0.1:${QSWARM_PORT:-7447}
+run=by-hand
+out=runs/by-hand-$(date -u +%Y%m%dT%H%M%SZ)
+
+agents=$("$python" -c '
+import sys, tomllib
+print(tomllib.load(open(sys.argv[1], "rb"))["fleet"]["agents"])' "$scenario")
+
+pids=()
+trap 'kill "${pids[@]}" 2>/dev/null || true; wait' EXIT
+
+"$python" -m netem --listen "$endpoint" &
+pids+=($!)
+"$python" -m worldsim "$scenario" --connect "$endpoint" --run "$run" --out "$out" &
+world=$!
+pids+=("$world")
+for ((id = 0; id < agents; id++)); do
+    "$python" -m agent --id "$id" --run "$run" --connect "$endpoint" &
+    pids+=($!)
+done
+
+status=0
+wait "$world" || status=$?
+if [[ -f $out/summary.json ]]; then
+    "$python" -c '
+import json, sys
+print("outcome:", json.load(open(sys.argv[1]))["outcome"])' "$out/summary.json"
+    echo "kept in $out"
+fi
+exit "$status"

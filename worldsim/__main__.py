@@ -1,0 +1,83 @@
+"""The world by hand: ``python -m worldsim SCENARIO --connect tcp/127.0.0.1:7447 --out DIR``."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from netem.wire.keys import Keys
+from worldsim.run.admission import PROCESS_COMMAND_TICKS, admit
+from worldsim.run.outside import ByHand
+from worldsim.run.process import Terms, run
+from worldsim.run.rundir import RunDirectory
+from worldsim.scenario import ScenarioError, load
+
+MAX_SPEED = 1000.0
+
+DESCRIPTION = """\
+The world of a fleet whose processes are started by hand: it owns the truth, conducts time, judges
+and records.
+
+It waits until netem and all agents of the scenario are there, flies the scenario, and writes
+recording, events and summary into DIR. `qswarm run` does all of this with one command."""
+
+EPILOG = """\
+exit status: 0 the expectations held; 1 they did not; 2 bad input, or somebody did not come;
+3 inconclusive: the host was too slow, or the flight was interrupted"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m worldsim",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add("scenario", type=Path, metavar="SCENARIO", help="a scenario file (TOML)")
+    add("--connect", required=True, metavar="ENDPOINT", help="the router: tcp/127.0.0.1:7447")
+    add("--out", required=True, type=Path, metavar="DIR", help="the run's folder; must not exist")
+    add(
+        "--run",
+        type=_run_name,
+        metavar="NAME",
+        help="its name (the scenario's)",
+    )
+    add("--speed", type=_speed, default=1.0, metavar="X", help="simulated s in one s (1)")
+    add("--no-recording", action="store_true", help="write no run.rrd")
+    return parser
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Conduct a run as the command line says; return the exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        scenario = load(options.scenario)
+        admit(scenario, options.scenario, PROCESS_COMMAND_TICKS)
+    except ScenarioError as error:
+        print(f"world: {error}", file=sys.stderr)
+        return 2
+    return run(
+        options.connect,
+        scenario,
+        lambda: RunDirectory.create(options.out, scenario),
+        Terms(options.run or scenario.name, options.speed, not options.no_recording),
+        lambda muster: ByHand(muster.gone),
+    )
+
+
+def _run_name(text: str) -> str:
+    try:
+        return Keys(text).run
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _speed(text: str) -> float:
+    speed = float(text)
+    if not 0.0 < speed <= MAX_SPEED:
+        raise argparse.ArgumentTypeError(f"{text}: above 0, at most {MAX_SPEED:g} is allowed")
+    return speed
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,100 @@
+"""Forked children: they die with their parent, and what they print goes to their log.
+
+Everything is forked from a process that has opened no Zenoh session and no recording; after
+either, a child would hang.
+"""
+
+import ctypes
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+_PR_SET_PDEATHSIG = 1
+
+
+class Exit(NamedTuple):
+    """How a child ended: by a signal, or with a status."""
+
+    signal: int | None
+    status: int | None
+
+    @staticmethod
+    def of(wait_status: int) -> "Exit":
+        """Return what waitpid's status says."""
+        if os.WIFSIGNALED(wait_status):
+            return Exit(os.WTERMSIG(wait_status), None)
+        return Exit(None, os.waitstatus_to_exitcode(wait_status))
+
+    def __str__(self) -> str:
+        if self.signal is not None:
+            return f"was killed by signal {self.signal}"
+        return f"ended with status {self.status}"
+
+
+def fork(log: Path | None, death_signal: signal.Signals, main: Callable[[], int]) -> int:
+    """Run ``main`` in a child that gets ``death_signal`` when this process dies; return its pid.
+
+    ``log``: where its output goes; None leaves it where this process's goes.
+    """
+    parent = os.getpid()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    pid = os.fork()
+    if pid == 0:
+        _live(parent, log, death_signal, main)
+    return pid
+
+
+def reaped(pid: int) -> Exit | None:
+    """Return how a child ended, or None while it lives."""
+    done, wait_status = os.waitpid(pid, os.WNOHANG)
+    return Exit.of(wait_status) if done else None
+
+
+def _live(
+    parent: int, log: Path | None, death_signal: signal.Signals, main: Callable[[], int]
+) -> None:
+    status = 1
+    try:
+        _follow(parent, death_signal)
+        _redirect(log)
+        # Ctrl-C reaches the whole group; the launcher conducts the end.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        status = main()
+    except SystemExit as leaving:
+        status = leaving.code if isinstance(leaving.code, int) else 1
+    except BaseException:  # noqa: BLE001, RUF100 - a child must never return into its parent's code
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+
+
+def _follow(parent: int, death_signal: signal.Signals) -> None:
+    """Ask for a signal at the parent's death; leave at once where it has died meanwhile."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.prctl(_PR_SET_PDEATHSIG, int(death_signal), 0, 0, 0) != 0:
+        raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG)")
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def _redirect(log: Path | None) -> None:
+    """Read nothing, and write to the log, whatever the parent made of its own streams."""
+    _replace(0, os.open(os.devnull, os.O_RDONLY))
+    if log is not None:
+        _replace(1, os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644))
+        os.dup2(1, 2)
+    sys.stdout = os.fdopen(1, "w", buffering=1, closefd=False)
+    sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
+
+
+def _replace(descriptor: int, other: int) -> None:
+    os.dup2(other, descriptor)
+    os.close(other)

@@ -1,0 +1,237 @@
+"""The launcher: it starts a fleet of processes, says what becomes of them, and ends them all.
+
+It opens no session and no recording itself. It forks the zygote first, then netem and the world;
+the zygote forks the agents. Deaths are what waitpid says, its own or the zygote's.
+"""
+
+import json
+import os
+import signal
+import socket
+from typing import Any
+
+from rich.console import Console
+
+from netem import process as netem_process
+from worldsim.run import process as world_process
+from worldsim.run.child import Exit
+from worldsim.run.kin import Kin
+from worldsim.run.lines import Line, Lines
+from worldsim.run.outside import Conducted, Progress
+from worldsim.run.process import Terms
+from worldsim.run.roster import ProcessRow, Roster, processes
+from worldsim.run.rundir import RunDirectory
+from worldsim.run.summary import EXIT_STATUS
+from worldsim.run.terminal import Terminal
+from worldsim.run.zygote import Brood, Zygote
+from worldsim.scenario import Scenario
+from worldsim.show.telling import verdict
+
+__all__ = ["ProcessRow", "processes", "run"]
+
+NOT_STARTED, UNKNOWN, INTERRUPTED = 2, 3, 130
+LOOK_EVERY_S = 1.0
+LANDING_WITHIN_S = 15.0
+END_WITHIN_S = 3.0
+TAIL_LINES = 5
+MAX_TAIL_B = 4096
+
+
+class StartError(RuntimeError):
+    """A process of the fleet that did not come up; the text says which, and its last words."""
+
+
+def run(
+    scenario: Scenario, directory: RunDirectory, *, speed: float = 1.0, recording: bool = True
+) -> int:
+    """Fly a scenario with real processes, and tell the verdict; return the exit status.
+
+    Whatever happens, Ctrl-C and SIGTERM included, no process is left behind.
+    """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # One thread for receiving is enough for a client, and saves a tenth of its CPU time.
+    os.environ.setdefault("ZENOH_RUNTIME", "(rx: (worker_threads: 1))")
+    launch = Launch(scenario, directory, Terms(scenario.name, speed, recording))
+    try:
+        launch.fly()
+        status = launch.conclude()
+    except StartError as error:
+        launch.terminal.say(str(error))
+        status = NOT_STARTED
+    except KeyboardInterrupt:
+        launch.interrupt()
+        launch.conclude()
+        status = INTERRUPTED
+    finally:
+        launch.end()
+    return status
+
+
+class Launch:
+    """One fleet, from its first process to its last."""
+
+    def __init__(self, scenario: Scenario, directory: RunDirectory, terms: Terms) -> None:
+        self.terminal = Terminal(Console())
+        self._scenario = scenario
+        self._directory = directory
+        self._terms = terms
+        self._endpoint = f"tcp/127.0.0.1:{_free_port()}"
+        self._roster = Roster(directory.path, terms.run, self._endpoint)
+        self._kin = Kin(directory.logs, self._child_ended)
+        self._zygote, self._zygote_end = Lines.pair()
+        self._world, self._world_end = Lines.pair()
+        self._agents: dict[int, int] = {}
+        self._missing: list[str] | None = None
+        self._landing = False
+        self._broken = False
+        self._time_s = 0.0
+
+    def fly(self) -> None:
+        """Start everybody, and follow the flight until the world has ended.
+
+        Raises :class:`StartError` when somebody does not come up.
+        """
+        count, name = self._scenario.fleet.agents, self._scenario.name
+        self.terminal.say(
+            f"{name}: starting netem, the world and {count} agents; logs in {self._directory.logs}"
+        )
+        self._start()
+        while "world" in self._kin.pids and not self._broken:
+            self._kin.turn(LOOK_EVERY_S)
+        self._end_world()
+
+    def interrupt(self) -> None:
+        """Let the world finish the recording and write a summary of what there was."""
+        self.terminal.say("interrupted: ending the run")
+        self._end_world()
+
+    def conclude(self) -> int:
+        """Tell the verdict from the run's summary; return the exit status."""
+        self.terminal.close()
+        try:
+            summary: dict[str, Any] = json.loads(self._directory.summary.read_text("utf-8"))
+        except FileNotFoundError:
+            self.terminal.say(f"no summary was written; {self._last_words('world')}")
+            return UNKNOWN
+        recorded = self._directory.recording.exists()
+        self.terminal.say(verdict(summary, self._directory.path, recorded))
+        if recorded:
+            self.terminal.say(f"to look at it: qswarm view {self._directory.path}")
+        return EXIT_STATUS[summary["outcome"]]
+
+    def end(self) -> None:
+        """End every process that is left."""
+        self._landing = True
+        self.terminal.close()
+        self._zygote.send(end=True)
+        self._kin.end(["world", "netem"], END_WITHIN_S, signal.SIGTERM)
+        self._kin.end(["zygote"], END_WITHIN_S, None)
+        everybody = list(self._kin.pids)
+        self._kin.end(everybody, END_WITHIN_S, signal.SIGKILL)
+
+    def _end_world(self) -> None:
+        self._landing = True
+        self._kin.end(["world"], LANDING_WITHIN_S, signal.SIGTERM)
+
+    def _start(self) -> None:
+        agents = range(self._scenario.fleet.agents)
+        zygote = self._kin.start("zygote", signal.SIGKILL, self._be_zygote)
+        self._zygote_end.close()
+        netem = self._kin.start("netem", signal.SIGKILL, self._be_netem)
+        # The world is asked to end, so that it finishes the recording even without a launcher.
+        world = self._kin.start("world", signal.SIGTERM, self._be_world)
+        self._world_end.close()
+        for name, pid in (("zygote", zygote), ("netem", netem), ("world", world)):
+            self._roster.add(name, pid)
+        self._kin.listen(self._zygote, self._hear_zygote)
+        self._kin.listen(self._world, self._hear_world)
+        for agent in agents:
+            self._zygote.send(spawn=agent)
+
+    def _be_zygote(self) -> int:
+        for end in (self._zygote, self._world, self._world_end):
+            end.close()
+        brood = Brood(self._terms.run, self._endpoint, self._directory.logs)
+        return Zygote(self._zygote_end, brood).serve()
+
+    def _be_netem(self) -> int:
+        for end in (self._zygote, self._world, self._world_end):
+            end.close()
+        return netem_process.run(self._endpoint)
+
+    def _be_world(self) -> int:
+        for end in (self._zygote, self._world):
+            end.close()
+        return world_process.run(
+            self._endpoint,
+            self._scenario,
+            lambda: self._directory,
+            self._terms,
+            lambda _: Conducted(self._world_end),
+        )
+
+    def _hear_zygote(self) -> None:
+        lines = self._zygote.receive()
+        for line in lines:
+            if "spawned" in line:
+                self._agents[line["spawned"]] = line["pid"]
+                self._roster.add(f"agent-{line['spawned']}", line["pid"])
+            else:
+                self._agent_ended(line)
+        if any("spawned" in line for line in lines):
+            self._roster.write()
+
+    def _hear_world(self) -> None:
+        for line in self._world.receive():
+            if "progress" in line:
+                progress = Progress(**line["progress"])
+                self._time_s = progress.time_s
+                self.terminal.show(progress)
+            elif "missing" in line:
+                self._missing = line["missing"]
+            else:
+                self._landing = True
+
+    def _agent_ended(self, line: Line) -> None:
+        # What the world said before an agent could end is there already.
+        self._hear_world()
+        if self._landing:
+            return
+        agent, end = line["exit"], Exit(line["signal"], line["status"])
+        if not self._flying:
+            raise self._not_started(f"agent-{agent}", end)
+        self._world.send(lost=[agent, *end])
+        self.terminal.say(
+            f"agent-{agent} (pid {line['pid']}) {end} about {self._time_s:.1f} s into the run;"
+            " its vehicle hovers"
+        )
+
+    def _child_ended(self, name: str, end: Exit) -> None:
+        self._hear_world()
+        if self._landing:
+            return
+        if not self._flying:
+            raise self._not_started(name, end)
+        self.terminal.say(f"{name} {end} about {self._time_s:.1f} s into the run, which ends here")
+        self._broken = True
+
+    @property
+    def _flying(self) -> bool:
+        return self._missing == []
+
+    def _not_started(self, name: str, end: Exit) -> StartError:
+        return StartError(f"{name} did not start: it {end}; {self._last_words(name)}")
+
+    def _last_words(self, name: str) -> str:
+        log = self._directory.logs / f"{name}.log"
+        lines = log.read_bytes()[-MAX_TAIL_B:].decode("utf-8", "replace").splitlines()
+        if not lines:
+            return f"{log} is empty"
+        return "\n  ".join([f"{log} ends with:", *lines[-TAIL_LINES:]])
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port

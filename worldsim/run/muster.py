@@ -1,0 +1,102 @@
+"""Before a flight: the medium takes its conditions, each agent its setup, and all report."""
+
+import time
+from collections import Counter
+from collections.abc import Callable
+
+import msgspec
+import zenoh
+
+from netem.messages import MediumSetup
+from netem.wire.post import Post, RefusedError, Roll, Waiting, drained
+from worldsim.run.admission import PROCESS_COMMAND_TICKS
+from worldsim.run.outside import Outside
+from worldsim.scenario import Scenario
+
+MUSTER_WITHIN_S = 30.0
+LOOK_EVERY_S = 0.02
+QUESTIONS_AT_ONCE = 64
+
+
+class MusterError(RuntimeError):
+    """Not everybody came; the text says who is missing."""
+
+
+class Muster:
+    """Answers agents that ask for their setup, at the start and late; knows who is there."""
+
+    def __init__(self, post: Post, scenario: Scenario) -> None:
+        self._post = post
+        self._scenario = scenario
+        self._starts: Counter[int] = Counter()
+        self._roll: Roll = post.roll()
+        self._questions: Waiting[zenoh.Query] = post.questions("setup")
+
+    def instruct_medium(self, speed: float) -> bool:
+        """Tell the medium its conditions; False while there is no medium yet.
+
+        Raises RefusedError when it serves another run.
+        """
+        setup: MediumSetup = msgspec.structs.replace(self._scenario.medium_setup(), speed=speed)
+        answer = self._post.ask("medium", None, msgspec.json.encode(setup), timeout_s=2.0)
+        return answer is not None
+
+    def instruct_agents(self) -> None:
+        """Answer the agents that ask."""
+        for query in drained(self._questions, QUESTIONS_AT_ONCE):
+            with query:
+                self._answer(query)
+
+    def missing(self) -> list[str]:
+        """Return the names of those who have not come."""
+        self._roll.gone()
+        agents = range(self._scenario.fleet.agents)
+        wanted = ["netem", *(f"agent-{agent}" for agent in agents)]
+        return [name for name in wanted if name not in self._roll.present]
+
+    def gone(self) -> list[str]:
+        """Return who went since the last call, as liveliness has it: a hint."""
+        return self._roll.gone()
+
+    def _answer(self, query: zenoh.Query) -> None:
+        agent = str(query.key_expr).rsplit("/", 1)[1]
+        if not agent.isdecimal() or int(agent) >= self._scenario.fleet.agents:
+            query.reply_err(f"no agent {agent} in a run of {self._scenario.fleet.agents}")
+            return
+        incarnation = self._starts[int(agent)]
+        self._starts[int(agent)] += 1
+        setup = self._scenario.agent_setup(int(agent), incarnation, PROCESS_COMMAND_TICKS)
+        query.reply(query.key_expr, msgspec.json.encode(setup))
+
+
+def assemble(muster: Muster, speed: float, unwanted: Callable[[], bool], outside: Outside) -> bool:
+    """Wait until everybody is there; False when ``unwanted`` says that it is for nothing.
+
+    Raises :class:`MusterError` after MUSTER_WITHIN_S, and when the medium refuses.
+    """
+    deadline = time.monotonic() + MUSTER_WITHIN_S
+    missing: list[str] | None = None
+    instructed = False
+    while not unwanted():
+        try:
+            instructed = instructed or muster.instruct_medium(speed)
+        except RefusedError as error:
+            raise MusterError(f"netem refuses: {error}") from error
+        muster.instruct_agents()
+        before, missing = missing, muster.missing()
+        if missing != before:
+            outside.missing(shortened(missing))
+        if not missing:
+            return True
+        if time.monotonic() > deadline:
+            raise MusterError(
+                f"not there within {MUSTER_WITHIN_S:g} s: {', '.join(shortened(missing))}"
+            )
+        time.sleep(LOOK_EVERY_S)
+    return False
+
+
+def shortened(names: list[str], most: int = 5) -> list[str]:
+    """Return a few names, and how many more there are."""
+    more = len(names) - most
+    return names if more <= 0 else [*names[:most], f"{more} more"]

@@ -1,0 +1,149 @@
+"""What the world hears and says beside its topics: who is lost, when to stop, how far it is.
+
+Under a launcher, deaths are what waitpid says, and the launcher shows progress. By hand, deaths
+are what liveliness hints at, and progress is printed.
+"""
+
+import select
+import time
+from collections.abc import Callable
+from math import inf
+from typing import NamedTuple, Protocol
+
+from worldsim.run.lines import Lines
+
+PRINT_EVERY_S = 2.0
+
+
+class Loss(NamedTuple):
+    """An agent whose process is gone: by a signal, with a status, or nobody knows how."""
+
+    agent: int
+    signal: int | None = None
+    status: int | None = None
+
+
+class Progress(NamedTuple):
+    """How far a flight is. separation_m: the least so far; late: share of late ticks."""
+
+    time_s: float
+    duration_s: float
+    agents: int
+    in_place: int
+    separation_m: float | None
+    late: float | None
+
+    def __str__(self) -> str:
+        separation = "-" if self.separation_m is None else f"{self.separation_m:.2f} m"
+        late = "-" if self.late is None else f"{self.late:.1%}"
+        return (
+            f"{self.time_s:6.1f} of {self.duration_s:g} s   in place {self.in_place}/{self.agents}"
+            f"   least separation {separation}   late ticks {late}"
+        )
+
+
+class Outside(Protocol):
+    """What a flight needs of whoever started it."""
+
+    @property
+    def stopped(self) -> str | None:
+        """Why the flight must end now, or None."""
+
+    def wait(self, left_s: float) -> None:
+        """Wait ``left_s`` [s], or less when there is news."""
+
+    def losses(self) -> list[Loss]:
+        """Return who was lost since the last call."""
+
+    def missing(self, names: list[str]) -> None:
+        """Say who is not there yet."""
+
+    def progress(self, progress: Progress) -> None:
+        """Say how far the flight is."""
+
+    def landing(self) -> None:
+        """Say that the run is over, before the others hear of it and end."""
+
+
+class Conducted:
+    """Under a launcher, at the other end of ``lines``."""
+
+    def __init__(self, lines: Lines) -> None:
+        self._lines = lines
+
+    @property
+    def stopped(self) -> str | None:
+        """The launcher's end is the flight's."""
+        return "the launcher is gone" if self._lines.closed else None
+
+    def wait(self, left_s: float) -> None:
+        """Wait, but not longer than until the launcher says something."""
+        _wait([] if self._lines.closed else [self._lines], left_s)
+
+    def losses(self) -> list[Loss]:
+        """Return the exits that the launcher told."""
+        return [Loss(*line["lost"]) for line in self._lines.receive()]
+
+    def missing(self, names: list[str]) -> None:
+        """Tell the launcher who is not there yet; an empty list when everybody is."""
+        self._lines.send(missing=names)
+
+    def progress(self, progress: Progress) -> None:
+        """Tell the launcher how far the flight is."""
+        self._lines.offer(progress=progress._asdict())
+
+    def landing(self) -> None:
+        """Tell the launcher that from now on everybody ends as planned."""
+        self._lines.send(landing=True)
+
+
+class ByHand:
+    """Without a launcher; ``gone`` tells which names stopped showing signs of life."""
+
+    def __init__(self, gone: Callable[[], list[str]]) -> None:
+        self.stopped: str | None = None
+        self._gone = gone
+        self._print_at_s = -inf
+
+    def wait(self, left_s: float) -> None:
+        """Wait; there is never news."""
+        _wait([], left_s)
+
+    def losses(self) -> list[Loss]:
+        """Return the agents that went; when the medium went, everybody seems to have: stop."""
+        gone = self._gone()
+        if "netem" in gone:
+            self.stopped = "netem is gone"
+            return []
+        agents = [int(name.removeprefix("agent-")) for name in gone if name.startswith("agent-")]
+        for agent in agents:
+            print(f"agent-{agent} is gone", flush=True)
+        return [Loss(agent) for agent in agents]
+
+    def missing(self, names: list[str]) -> None:
+        """Print who is not there yet, every two seconds."""
+        if not names:
+            print("everybody is there", flush=True)
+        elif self._due():
+            print(f"waiting for {', '.join(names)}", flush=True)
+
+    def progress(self, progress: Progress) -> None:
+        """Print how far the flight is, every two seconds."""
+        if self._due():
+            print(progress, flush=True)
+
+    def landing(self) -> None:
+        """Print what is ahead: the end."""
+        print("world: the run is over", flush=True)
+
+    def _due(self) -> bool:
+        now_s = time.monotonic()
+        due = now_s >= self._print_at_s
+        if due:
+            self._print_at_s = now_s + PRINT_EVERY_S
+        return due
+
+
+def _wait(news: list[Lines], left_s: float) -> None:
+    if left_s > 0.0:
+        select.select(news, [], [], left_s)

@@ -1,0 +1,68 @@
+"""fleet.json: which processes a running fleet consists of, and where its router listens."""
+
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+from worldsim.run.rundir import RunDirectoryError, write_json
+
+FILE = "fleet.json"
+
+
+class ProcessRow(NamedTuple):
+    """One process of a fleet; not ``alive`` when it ended, whoever has its pid now."""
+
+    name: str
+    pid: int
+    alive: bool
+
+
+class Roster:
+    """Keeps a run's fleet.json while processes are started."""
+
+    def __init__(self, folder: Path, run: str, endpoint: str) -> None:
+        self._path = folder / FILE
+        self._content = {"run": run, "endpoint": endpoint}
+        self._processes: dict[str, tuple[int, int | None]] = {}
+
+    def add(self, name: str, pid: int) -> None:
+        """Note a process that was just started; it takes the place of an earlier one."""
+        self._processes[name] = (pid, _started(pid))
+
+    def write(self) -> None:
+        """Write the file. Raises RunDirectoryError when the disk fails."""
+        rows = [
+            {"name": name, "pid": pid, "started": started}
+            for name, (pid, started) in self._processes.items()
+        ]
+        write_json(self._path, {**self._content, "processes": rows})
+
+
+def processes(run: Path) -> list[ProcessRow]:
+    """Return the processes of the run in a folder, or raise RunDirectoryError."""
+    path = run / FILE
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))["processes"]
+        return [ProcessRow(row["name"], row["pid"], _alive(row)) for row in rows]
+    except OSError as error:
+        raise RunDirectoryError(run, f"no {FILE} in it: no run of processes") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise RunDirectoryError(path, "cannot be read as a fleet's list of processes") from error
+
+
+def _alive(row: dict[str, int]) -> bool:
+    started = _started(row["pid"])
+    return started is not None and started == row["started"]
+
+
+def _started(pid: int) -> int | None:
+    """Return when a process started [clock ticks since boot], None when it is not running.
+
+    Pids come back; a pid with its start time does not.
+    """
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return None
+    state, *fields = stat.rpartition(")")[2].split()
+    return None if state in "ZX" else int(fields[18])

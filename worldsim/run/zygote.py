@@ -1,0 +1,97 @@
+"""The zygote: a warm process of one thread, without sessions, that agents are forked from.
+
+It does what the launcher asks for over a socket pair, at the start or late: fork agent i. It reaps
+its agents and reports each exit as waitpid has it, which is what the launcher believes.
+"""
+
+import gc
+import os
+import selectors
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from agent import process as agent_process
+from worldsim.run.child import fork, reaped
+from worldsim.run.lines import Line, Lines
+
+END_WITHIN_S = 2.0
+
+
+class Brood(NamedTuple):
+    """What all agents of a run have in common."""
+
+    run: str
+    endpoint: str
+    logs: Path
+
+
+class Zygote:
+    """Forks agents on request, and reports their exits; ends them all when asked or alone."""
+
+    def __init__(self, lines: Lines, brood: Brood) -> None:
+        self._lines = lines
+        self._brood = brood
+        self._pids: dict[int, int] = {}
+        self._watch = selectors.DefaultSelector()
+        self._ending = False
+
+    def serve(self) -> int:
+        """Serve until told to end, or the launcher is gone; return 0 when no agent is left."""
+        gc.freeze()  # what is warm stays shared with the children
+        self._watch.register(self._lines, selectors.EVENT_READ, self._hear)
+        while not self._ending:
+            self._turn(None)
+        self._watch.unregister(self._lines)
+        self._signal_all(signal.SIGTERM)
+        deadline = time.monotonic() + END_WITHIN_S
+        while self._pids and (left_s := deadline - time.monotonic()) > 0.0:
+            self._turn(left_s)
+        self._signal_all(signal.SIGKILL)
+        while self._pids:
+            self._turn(None)
+        return 0
+
+    def _turn(self, timeout_s: float | None) -> None:
+        for key, _ in self._watch.select(timeout_s):
+            act: Callable[[], None] = key.data
+            act()
+
+    def _hear(self) -> None:
+        for line in self._lines.receive():
+            self._obey(line)
+        self._ending = self._ending or self._lines.closed
+
+    def _obey(self, line: Line) -> None:
+        if "end" in line:
+            self._ending = True
+        else:
+            self._spawn(line["spawn"])
+
+    def _spawn(self, agent: int) -> None:
+        log = self._brood.logs / f"agent-{agent}.log"
+        pid = fork(log, signal.SIGKILL, lambda: self._live(agent))
+        exit_descriptor = os.pidfd_open(pid)
+        self._pids[pid] = agent
+        self._watch.register(
+            exit_descriptor, selectors.EVENT_READ, lambda: self._bury(exit_descriptor, pid)
+        )
+        self._lines.send(spawned=agent, pid=pid)
+
+    def _live(self, agent: int) -> int:
+        self._lines.close()
+        return agent_process.run(agent, self._brood.run, self._brood.endpoint)
+
+    def _bury(self, exit_descriptor: int, pid: int) -> None:
+        end = reaped(pid)
+        if end is None:
+            return
+        self._watch.unregister(exit_descriptor)
+        os.close(exit_descriptor)
+        self._lines.send(exit=self._pids.pop(pid), pid=pid, signal=end.signal, status=end.status)
+
+    def _signal_all(self, number: signal.Signals) -> None:
+        for pid in self._pids:
+            os.kill(pid, number)
