@@ -1,0 +1,41 @@
+"""Colours: one for each queue, so that a viewer sees the edges of a formation."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Colours = NDArray[np.uint32]
+
+QUEUES = np.array(
+    [
+        0x4DA3FFFF,
+        0xFF8A4CFF,
+        0x3DDC97FF,
+        0xE86BFFFF,
+        0x41E0E6FF,
+        0xFF6B81FF,
+        0xB6E34BFF,
+        0x9D8CFFFF,
+    ],
+    dtype=np.uint32,
+)
+SHARED = np.uint32(0xFFD54FFF)
+UNPLACED = np.uint32(0xC8CDD6FF)
+DEAD = np.uint32(0x5A5F69FF)
+LINK = np.uint32(0x8FA3BF38)
+LIMIT = np.uint32(0xFF5252FF)
+
+
+def of_places(place: NDArray[np.int16], shared: NDArray[np.int16]) -> Colours:
+    """Return the colours (N,) of agents that mean to hold places (N, 2): queue and rank.
+
+    shared: (K, 2), the places that queues have in common, which have a colour of their own.
+    """
+    queue = place[:, 0]
+    colours = np.where(queue >= 0, QUEUES[queue % len(QUEUES)], UNPLACED)
+    at_shared = np.any(np.all(place[:, None, :] == shared[None, :, :], axis=2), axis=1)
+    return np.where(at_shared, SHARED, colours).astype(np.uint32)
+
+
+def faint(colours: Colours, alpha: int) -> Colours:
+    """Return colours with another opacity, 0 to 255."""
+    return (colours & np.uint32(0xFFFFFF00)) | np.uint32(alpha)

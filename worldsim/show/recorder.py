@@ -1,0 +1,173 @@
+"""The recording of a run: rows of truth in, a rerun file out. Only this file writes with rerun.
+
+Ticks are gathered and sent once a second of simulated time, each entity in one piece: that costs
+a tenth of sending them one by one, and loses at most that second when the process is killed.
+"""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from agent.qstructure.formation import Formation
+from worldsim.judge.tick import Tick
+from worldsim.judge.verdict import Figures
+from worldsim.scenario import Scenario
+from worldsim.show import layout
+from worldsim.show.blueprint import blueprint_of, stage_of
+from worldsim.show.scenery import Scenery, limits
+from worldsim.show.sheets import Sheet, Sheets
+from worldsim.show.spool import Spool
+
+Event = dict[str, Any]
+FLUSH_S = 5.0
+WARNINGS = frozenset({"kill", "leave", "partition", "jam"})
+
+
+def complain(text: str) -> None:
+    """Say what is wrong with a recording, where a person sees it."""
+    print(f"recording: {text}", file=sys.stderr, flush=True)
+
+
+class RunRecorder:
+    """Records one run into a new file ``path``; ``run_id`` is its name in the viewer.
+
+    It never fails the run: its first trouble goes to ``say``, and from then on it keeps nothing.
+    The process must not fork after this. mode: "processes", "lockstep" or "virtual".
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        scenario: Scenario,
+        run_id: str,
+        *,
+        mode: str = "processes",
+        say: Callable[[str], None] = complain,
+    ) -> None:
+        self._say = say
+        self._working = True
+        self._scenario = scenario
+        self._formation = Formation(scenario.formation)
+        shared = np.array(self._formation.common, dtype=np.int16).reshape(-1, 2)
+        self._sheets = Sheets(shared, scenario.fleet.tick_hz, limits(scenario))
+        self._every = max(1, round(scenario.fleet.tick_hz))
+        self._ticks: list[Tick] = []
+        self._figures: list[Figures] = []
+        self._events: list[Event] = []
+        self._guarded(self._open, path, run_id, mode)
+
+    def tick(self, tick: Tick, figures: Figures) -> None:
+        """Keep one tick."""
+        self._ticks.append(tick)
+        self._figures.append(figures)
+        if len(self._ticks) >= self._every:
+            self._guarded(self._flush)
+
+    def event(self, event: Event) -> None:
+        """Keep one event: ``t_s``, ``kind``, ``agent`` and what else belongs to the kind."""
+        self._events.append(event)
+
+    def close(self) -> None:
+        """Keep what is left, and end the file."""
+        self._guarded(self._flush)
+        self._guarded(self._end)
+        self._working = False
+
+    def _guarded(self, action: Callable[..., None], *details: Any) -> None:
+        """Do something for the recording; whatever it meets must not reach the run."""
+        if self._working:
+            try:
+                action(*details)
+            except Exception as error:
+                self._working = False
+                self._say(f"it ends here, the run goes on: {error}")
+        self._ticks, self._figures, self._events = [], [], []
+
+    def _open(self, path: Path, run_id: str, mode: str) -> None:
+        rr.set_strict_mode(True)
+        self._spool = Spool(path, self._say)
+        scenery = Scenery(self._scenario, self._formation)
+        self._stream = rr.RecordingStream(
+            "qswarm",
+            recording_id=run_id,
+            batcher_config=rr.ChunkBatcherConfig(flush_tick=1.0),
+        )
+        self._stream.set_sinks(
+            rr.FileSink(self._spool.path),
+            default_blueprint=blueprint_of(stage_of(self._scenario, scenery.slots)),
+        )
+        self._spool.opened()
+        rr.set_log_time_enabled(False, recording=self._stream)
+        rr.set_log_tick_enabled(False, recording=self._stream)
+        self._stream.send_recording_name(run_id)
+        self._stream.send_property(
+            "run",
+            rr.AnyValues(
+                scenario=self._scenario.name,
+                seed=self._scenario.seed,
+                mode=mode,
+                agents=self._scenario.fleet.agents,
+            ),
+        )
+        self._lay_out(scenery)
+
+    def _lay_out(self, scenery: Scenery) -> None:
+        for entity, parts in scenery.lasting():
+            self._stream.log(entity, *parts, static=True)
+        self._stream.set_time(layout.SIM_TIME, duration=0.0)
+        self._stream.set_time(layout.TICK, sequence=0)
+        for entity, part in scenery.formation():
+            self._stream.log(entity, part)
+        self._stream.flush(timeout_sec=FLUSH_S)
+
+    def _flush(self) -> None:
+        if self._ticks:
+            for sheet in self._sheets.of(self._ticks, self._figures):
+                self._send(sheet)
+        if self._events:
+            self._send_events()
+        self._stream.flush(timeout_sec=FLUSH_S)
+
+    def _send(self, sheet: Sheet) -> None:
+        ticks = [self._ticks[row] for row in sheet.rows]
+        times = [tick.time_s for tick in ticks]
+        indexes = _indexes(times, [tick.index for tick in ticks]) if ticks else []
+        rr.send_columns(sheet.entity, indexes, sheet.columns, recording=self._stream)
+
+    def _send_events(self) -> None:
+        times = [float(event["t_s"]) for event in self._events]
+        ticks = [int(t * self._scenario.fleet.tick_hz + 1e-6) for t in times]
+        told = [json.dumps(event, default=str) for event in self._events]
+        columns = [
+            *rr.TextLog.columns(
+                text=[sentence(event) for event in self._events],
+                level=["WARN" if event["kind"] in WARNINGS else "INFO" for event in self._events],
+            ),
+            *rr.AnyValues.columns(event=told),
+        ]
+        rr.send_columns(layout.EVENTS, _indexes(times, ticks), columns, recording=self._stream)
+
+    def _end(self) -> None:
+        self._stream.disconnect()
+        self._spool.wait()
+
+
+def sentence(event: Event) -> str:
+    """Return an event as a person reads it: its kind, the agent, and the rest as it stands."""
+    agent = "" if event.get("agent") is None else f" a{event['agent']}"
+    rest = {key: value for key, value in event.items() if key not in {"t_s", "kind", "agent"}}
+    details = ", ".join(f"{key} {value}" for key, value in rest.items())
+    return f"{event['kind']}{agent}" + (f": {details}" if details else "")
+
+
+def _indexes(times_s: list[float], ticks: list[int]) -> list[rr.TimeColumn]:
+    since_start = np.rint(np.array(times_s) * 1e9).astype("timedelta64[ns]")
+    return [
+        rr.TimeColumn(layout.SIM_TIME, duration=since_start),
+        rr.TimeColumn(layout.TICK, sequence=ticks),
+    ]

@@ -1,0 +1,109 @@
+"""What stands still in a recording: styles, names, the formation, the scenario's text."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from agent.messages import Place
+from agent.qstructure.formation import Formation
+from agent.qstructure.frame import Frame
+from worldsim.judge.verdict import CONVERGED_M
+from worldsim.scenario import Scenario, dump
+from worldsim.show import layout, palette
+
+TRAIL_RADIUS_M = 0.018
+TARGET_RADIUS_M = 0.035
+
+
+class Scenery:
+    """Everything of a recording that is known before the first tick.
+
+    slots: (M, 3), where the formation's places are [m; world frame].
+    """
+
+    def __init__(self, scenario: Scenario, formation: Formation) -> None:
+        self._scenario = scenario
+        self._formation = formation
+        self._frame = Frame()
+        self._places = formation.places(scenario.fleet.agents)
+        self.slots: NDArray[np.float64] = np.array([self._slot(place) for place in self._places])
+
+    def lasting(self) -> Iterator[tuple[str, list[Any]]]:
+        """Return what holds for the whole run, entity by entity."""
+        agents = self._scenario.fleet.agents
+        names = [f"a{agent}" for agent in range(agents)]
+        yield layout.AGENTS, [rr.Points3D.from_fields(radii=[TRAIL_RADIUS_M])]
+        yield layout.TARGETS, [rr.Points3D.from_fields(radii=[TARGET_RADIUS_M])]
+        yield (
+            layout.LINKS,
+            [rr.LineStrips3D.from_fields(colors=np.array([palette.LINK]), radii=[0.004])],
+        )
+        yield layout.VEHICLES, [self._bodies(names)]
+        for metric in layout.PER_AGENT:
+            yield metric, [rr.SeriesLines(names=names, widths=[1.2] * agents)]
+        for metric, lines in limits(self._scenario).items():
+            yield layout.limit_of(metric), [_reference(len(lines))]
+        text = f"```toml\n{dump(self._scenario)}```\n"
+        yield layout.SCENARIO, [rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)]
+
+    def formation(self) -> Iterator[tuple[str, Any]]:
+        """Return the formation as it stands from the start of its phase on."""
+        colours = self._place_colours()
+        yield layout.SLOTS, rr.Points3D(self.slots, colors=colours, radii=[0.022])
+        yield (
+            layout.ARRIVED,
+            rr.Ellipsoids3D(
+                centers=self.slots,
+                half_sizes=[[CONVERGED_M] * 3] * len(self.slots),
+                colors=palette.faint(colours, 40),
+                line_radii=[0.003],
+                fill_mode=rr.components.FillMode.MajorWireframe,
+            ),
+        )
+        strips, tints = self._edges()
+        yield layout.QUEUES, rr.LineStrips3D(strips, colors=tints, radii=[0.008])
+
+    def _bodies(self, names: list[str]) -> rr.Boxes3D:
+        r = self._scenario.vehicle.radius_m
+        return rr.Boxes3D.from_fields(
+            half_sizes=[[r, 0.62 * r, 0.3 * r]] * len(names),
+            labels=names,
+            show_labels=len(names) <= 50,
+            fill_mode=rr.components.FillMode.Solid,
+        )
+
+    def _place_colours(self) -> palette.Colours:
+        shared = np.array(self._formation.common, dtype=np.int16).reshape(-1, 2)
+        return palette.of_places(np.array(self._places, dtype=np.int16), shared)
+
+    def _edges(self) -> tuple[list[list[Any]], palette.Colours]:
+        """Return each queue from its vertex to its last slot, and its colour."""
+        strips = []
+        queues = np.arange(len(self._formation.queues))
+        for index in queues.tolist():
+            last = max((place.rank for place in self._places if place.queue == index), default=0)
+            strips.append([self._slot(Place(index, rank)) for rank in range(last + 1)])
+        return strips, palette.faint(palette.QUEUES[queues % len(palette.QUEUES)], 90)
+
+    def _slot(self, place: Place) -> tuple[float, float, float]:
+        return self._frame.to_world(self._formation.slot(place, self._scenario.control.spacing_m))
+
+
+def _reference(lines: int) -> rr.SeriesLines:
+    return rr.SeriesLines(
+        colors=np.full(lines, palette.LIMIT), widths=[1.0] * lines, names=["limit"] * lines
+    )
+
+
+def limits(scenario: Scenario) -> dict[str, list[float]]:
+    """Return the reference lines of each metric that has a limit."""
+    least = scenario.expect.min_separation_m
+    turn = scenario.vehicle.max_turn_deg
+    return {
+        layout.SEPARATION: [least if least is not None else scenario.control.separation_m],
+        layout.SLOT_ERROR: [CONVERGED_M],
+        layout.TURN_DEG: [-turn, turn],
+    }

@@ -1,0 +1,203 @@
+"""A second of ticks as sheets of columns: what of a run goes under which entity, at which ticks.
+
+What changes at every tick has a row for every tick; what seldom changes (colours, who hears whom,
+counters) has a row where it changed, and a viewer shows the latest.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from worldsim.judge.tick import Singles, Tick
+from worldsim.judge.verdict import Figures
+from worldsim.show import layout, palette
+
+LINES_MAX = 400
+LINES_PER_S = 2000
+"""More lines than these at once, or in a second, would cost more than all the rest together."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """Columns of one entity; ``rows`` are the ticks of the block that they belong to."""
+
+    entity: str
+    rows: Sequence[int]
+    columns: Any
+
+
+class Latest:
+    """Remembers a value, and finds where a series departs from the one before."""
+
+    def __init__(self) -> None:
+        self._value: NDArray[Any] | None = None
+
+    def changes(self, series: Sequence[NDArray[Any]]) -> list[int]:
+        """Return the rows of a series that differ from the row before; the first ever counts."""
+        rows = []
+        for row, value in enumerate(series):
+            if self._value is None or not np.array_equal(self._value, value):
+                rows.append(row)
+                self._value = value
+        return rows
+
+
+class Sheets:
+    """Makes the sheets of one block of ticks after the other.
+
+    shared: (K, 2), the places that queues have in common. tick_hz: ticks in a second. limits: for
+    each metric its reference lines.
+    """
+
+    def __init__(
+        self, shared: NDArray[np.int16], tick_hz: float, limits: Mapping[str, list[float]]
+    ) -> None:
+        self._shared = shared
+        self._limits = limits
+        self._tick_hz = tick_hz
+        self._colours = Latest()
+        self._heard = Latest()
+        self._counters: dict[str, Latest] = {}
+        self._lines_due = 0
+
+    def of(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Sheet]:
+        """Return the sheets of a block; blocks come in order."""
+        yield from _poses(ticks)
+        yield from _metrics(ticks, figures)
+        yield _state(ticks)
+        yield from self._coloured(ticks)
+        yield from self._hearing(ticks)
+        yield from self._lines(ticks)
+        yield from self._packets(ticks)
+        yield from self._references(len(ticks) - 1)
+
+    def _coloured(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
+        series = [
+            np.where(tick.alive, palette.of_places(tick.place, self._shared), palette.DEAD)
+            for tick in ticks
+        ]
+        rows = self._colours.changes(series)
+        if not rows:
+            return
+        colours = np.concatenate([series[row] for row in rows])
+        counts = [len(series[0])] * len(rows)
+        for entity, archetype in (
+            (layout.AGENTS, rr.Points3D),
+            (layout.VEHICLES, rr.Boxes3D),
+            (layout.TARGETS, rr.Points3D),
+        ):
+            yield Sheet(entity, rows, archetype.columns(colors=colours).partition(counts))
+        lasting = rr.SeriesLines.columns(colors=series[rows[-1]]).partition(counts[:1])
+        for entity in layout.PER_AGENT:
+            yield Sheet(entity, (), lasting)
+
+    def _hearing(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
+        series = [_bits(tick.links, len(tick.alive)) for tick in ticks]
+        rows = self._heard.changes(series)
+        if rows and len(series[0]):
+            bits = np.concatenate([series[row] for row in rows])
+            columns = rr.AnyValues.columns(hears=bits)
+            yield Sheet(layout.HEARD, rows, columns.partition([len(series[0])] * len(rows)))
+
+    def _lines(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
+        rows, strips = [], []
+        for row, tick in enumerate(ticks):
+            if tick.index >= self._lines_due:
+                rows.append(row)
+                strips.append(lines(tick))
+                pause = len(strips[-1]) * self._tick_hz / LINES_PER_S
+                self._lines_due = tick.index + max(1, round(pause))
+        if rows:
+            columns = rr.LineStrips3D.columns(strips=np.concatenate(strips))
+            yield Sheet(layout.LINKS, rows, columns.partition([len(some) for some in strips]))
+
+    def _packets(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
+        for cause in dict.fromkeys(cause for tick in ticks for cause in tick.packets):
+            counts = [np.array(tick.packets.get(cause, 0)) for tick in ticks]
+            rows = self._counters.setdefault(cause, Latest()).changes(counts)
+            if rows:
+                values = [float(counts[row]) for row in rows]
+                yield Sheet(f"{layout.PACKETS}/{cause}", rows, rr.Scalars.columns(scalars=values))
+
+    def _references(self, last: int) -> Iterator[Sheet]:
+        """Return the reference lines, drawn on as far as the block goes."""
+        rows = sorted({0, last})
+        for metric, values in self._limits.items():
+            columns = rr.Scalars.columns(scalars=values * len(rows))
+            yield Sheet(layout.limit_of(metric), rows, columns.partition([len(values)] * len(rows)))
+
+
+def lines(tick: Tick) -> NDArray[np.float32]:
+    """Return a line for each pair of which one hears the other (K, 2, 3) [m; world frame].
+
+    Each pair once; of too many, the shortest.
+    """
+    hearer, heard = _known(tick.links, len(tick.alive)).T
+    pairs = np.unique(np.sort(np.stack([hearer, heard], axis=1), axis=1), axis=0)
+    ends: Singles = tick.position[pairs]
+    ends = ends[~np.isnan(ends).any(axis=(1, 2))]
+    if len(ends) > LINES_MAX:
+        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        ends = ends[np.sort(np.argsort(length, kind="stable")[:LINES_MAX])]
+    return ends
+
+
+def _poses(ticks: Sequence[Tick]) -> Iterator[Sheet]:
+    rows, counts = range(len(ticks)), [len(ticks[0].alive)] * len(ticks)
+    position = np.concatenate([tick.position for tick in ticks])
+    half = np.concatenate([tick.yaw for tick in ticks]) / 2.0
+    zero = np.zeros_like(half)
+    attitude = np.stack([zero, zero, np.sin(half), np.cos(half)], axis=1)
+    target = np.concatenate([tick.target for tick in ticks])
+    boxes = rr.Boxes3D.columns(centers=position, quaternions=attitude)
+    yield Sheet(layout.AGENTS, rows, rr.Points3D.columns(positions=position).partition(counts))
+    yield Sheet(layout.VEHICLES, rows, boxes.partition(counts))
+    yield Sheet(layout.TARGETS, rows, rr.Points3D.columns(positions=target).partition(counts))
+
+
+def _metrics(ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Sheet]:
+    counts = [len(ticks[0].alive)] * len(ticks)
+    for entity, series in (
+        (layout.FORCE, [tick.force for tick in ticks]),
+        (layout.TURN_DEG, [tick.turn_deg for tick in ticks]),
+        (layout.SEPARATION, [seen.separation for seen in figures]),
+        (layout.SLOT_ERROR, [_finite(seen.slot_error) for seen in figures]),
+    ):
+        columns = rr.Scalars.columns(scalars=np.concatenate(series)).partition(counts)
+        yield Sheet(entity, range(len(ticks)), columns)
+
+
+def _state(ticks: Sequence[Tick]) -> Sheet:
+    """Return what the judge or a reader needs and no view shows."""
+    agents = len(ticks[0].alive)
+    place = rr.AnyValues.columns(place=np.concatenate([tick.place.ravel() for tick in ticks]))
+    others = rr.AnyValues.columns(
+        alive=np.concatenate([tick.alive for tick in ticks]).astype(np.uint8),
+        yaw=np.concatenate([tick.yaw for tick in ticks]),
+    )
+    columns = [
+        *place.partition([2 * agents] * len(ticks)),
+        *others.partition([agents] * len(ticks)),
+    ]
+    return Sheet(layout.STATE, range(len(ticks)), columns)
+
+
+def _finite(error: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(np.isfinite(error), error, np.nan)
+
+
+def _known(links: NDArray[np.int32], agents: int) -> NDArray[np.int32]:
+    """Return the links between agents that exist: what an agent tells may be anything."""
+    return links[np.all((links >= 0) & (links < agents), axis=1)]
+
+
+def _bits(links: NDArray[np.int32], agents: int) -> NDArray[np.uint8]:
+    """Return who hears whom as a matrix of bits, row by row: 5 kB for 200 agents, not 20."""
+    hears = np.zeros((agents, agents), dtype=np.bool_)
+    hearer, heard = _known(links, agents).T
+    hears[hearer, heard] = True
+    return np.packbits(hears)

@@ -1,0 +1,163 @@
+"""The verdict once more, from the recording alone, held against what the run itself said.
+
+A fresh judge sees the recorded ticks. The rows are the very ones that the first judge saw, so its
+figures are equal, not close: any difference means that summary and recording do not belong
+together.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from worldsim.judge.verdict import Expectation, Judge
+from worldsim.show.readback import RecordingError, read_run
+
+RECORDING = "run.rrd"
+SUMMARY = "summary.json"
+HELD, NOT_HELD, NOTHING_TO_JUDGE = 0, 1, 2
+
+Figure = float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A figure that the summary tells otherwise than the recording does."""
+
+    key: str
+    summary: Any
+    recording: Any
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseFigures:
+    """How the team came into one formation, under the keys of summary.json."""
+
+    formation: str
+    from_s: float
+    converged: bool
+    converge_s: Figure
+    residual_m: Figure
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """What a recording shows.
+
+    ticks, until_s: how much of the run it holds. summary: whether there was one to compare with;
+    differences: where it disagrees. problem: why nothing could be judged, else None.
+    """
+
+    run: Path
+    problem: str | None = None
+    scenario: str | None = None
+    ticks: int = 0
+    until_s: float = 0.0
+    duration_s: float = 0.0
+    expectations: tuple[Expectation, ...] = ()
+    min_separation_m: Figure = None
+    turns_over_limit_fraction: Figure = None
+    phases: tuple[PhaseFigures, ...] = ()
+    summary: bool = False
+    differences: tuple[Difference, ...] = ()
+
+    @property
+    def whole(self) -> bool:
+        """Whether the recording reaches the end that its scenario asks for."""
+        return self.problem is None and self.until_s >= self.duration_s - 1e-9
+
+    @property
+    def held(self) -> bool:
+        """Whether every expectation held and no figure differs from the summary's."""
+        judged = self.problem is None and self.ticks > 0
+        return judged and all(row.held for row in self.expectations) and not self.differences
+
+    @property
+    def exit_status(self) -> int:
+        """0: held; 1: not; 2: no such run, or no recording in it that can be read."""
+        if self.problem is not None:
+            return NOTHING_TO_JUDGE
+        return HELD if self.held else NOT_HELD
+
+
+def verify(run: Path) -> Verification:
+    """Judge a run's recording again; ``run`` is its folder, or the recording itself."""
+    recording = run / RECORDING if run.is_dir() else run
+    try:
+        judged = _judged(run, recording)
+        return _compared(judged, recording.with_name(SUMMARY))
+    except RecordingError as error:
+        return Verification(run, problem=str(error))
+
+
+def _judged(run: Path, recording: Path) -> Verification:
+    readback = read_run(recording)
+    judge = Judge(readback.scenario)
+    for tick in readback.ticks:
+        judge.see(tick)
+    return Verification(
+        run=run,
+        scenario=readback.scenario.name,
+        ticks=judge.ticks,
+        until_s=readback.ticks[-1].time_s if readback.ticks else 0.0,
+        duration_s=readback.scenario.duration_s,
+        expectations=tuple(judge.expectations()),
+        min_separation_m=judge.min_separation_m,
+        turns_over_limit_fraction=judge.turns_over_limit_fraction,
+        phases=tuple(
+            PhaseFigures(
+                phase.formation.name,
+                phase.from_s,
+                phase.converge_s is not None,
+                phase.converge_s,
+                phase.residual_m,
+            )
+            for phase in judge.phases
+        ),
+    )
+
+
+def _compared(judged: Verification, summary: Path) -> Verification:
+    if not summary.is_file():
+        return judged
+    try:
+        told = json.loads(summary.read_text())
+    except ValueError as error:
+        raise RecordingError(f"{summary}: cannot be read: {error}") from error
+    return replace(judged, summary=True, differences=tuple(_differences(told, judged)))
+
+
+def _differences(told: Any, judged: Verification) -> Iterator[Difference]:
+    """Return what the summary tells otherwise; a figure that it lacks is told otherwise too."""
+    for key, shown in _figures(judged).items():
+        said = _at(told, key)
+        if said != shown:
+            yield Difference(key, said, shown)
+    if told.get("outcome") == "pass" and not all(row.held for row in judged.expectations):
+        yield Difference("outcome", "pass", "fail")
+
+
+def _figures(judged: Verification) -> dict[str, Any]:
+    """Return what must be equal, by its path in summary.json."""
+    figures: dict[str, Any] = {
+        "min_separation_m": judged.min_separation_m,
+        "turns_over_limit_fraction": judged.turns_over_limit_fraction,
+    }
+    for index, phase in enumerate(judged.phases):
+        for key in ("formation", "from_s", "converged", "converge_s", "residual_m"):
+            figures[f"phases.{index}.{key}"] = getattr(phase, key)
+    for index, row in enumerate(judged.expectations):
+        for key in ("name", "wanted", "got", "held"):
+            figures[f"expectations.{index}.{key}"] = getattr(row, key)
+    return figures
+
+
+def _at(told: Any, path: str) -> Any:
+    """Return what stands at a path of keys and places in a list; None when nothing does."""
+    for key in path.split("."):
+        try:
+            told = told[int(key)] if isinstance(told, list) else told[key]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return told
