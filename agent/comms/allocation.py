@@ -14,6 +14,9 @@ HYSTERESIS_M2 = 0.5
 CONFLICT_M2 = 0.05
 """Two that claim one place: the nearer by more than this keeps the claim, else the lower id."""
 GAIN_M2 = 1e-9
+ROUNDING = 1e-12
+"""An exchange saves this share of what it costs at least: far from home, sums of squares round by
+more than GAIN_M2, and two exchanges that seem to save something could undo each other for ever."""
 
 
 def allot(
@@ -86,7 +89,7 @@ def _exchange(chosen: list[int], squares: list[list[float]]) -> None:
                 at_a, at_b = chosen[a], chosen[b]
                 row_b = squares[b]
                 saved = row_a[at_a] + row_b[at_b] - row_a[at_b] - row_b[at_a]
-                if saved > GAIN_M2:
+                if saved > GAIN_M2 and saved > ROUNDING * (row_a[at_a] + row_b[at_b]):
                     chosen[a], chosen[b] = at_b, at_a
                     improved = True
 
