@@ -13,8 +13,11 @@ RELAYED_SILENCE_ROUNDS = 14
 """2 D + 10 rounds at a hop diameter D of 2, as for the suspicion of the dead."""
 LEAST_RELAYED_SILENCE_S = 2.5
 MAX_FRAME_B = 1200
-FRAME_HEAD_B = 24
-RECORD_B = 64
+FRAME_HEAD_B = 16
+RECORD_B = 65
+"""Sizes as msgpack writes the greatest numbers that a Gossip and a Record may hold."""
+MAX_KNOWN = 1024
+"""So many subjects at most: what is passed on in one round must fit one transmission."""
 
 
 class Table:
@@ -36,9 +39,13 @@ class Table:
             self._newest[beacon.id] = beacon
 
     def adopt(self, gossip: Gossip, now_s: float, slack_s: float) -> None:
-        """Take what is news in a frame of the multihop channel; stamps of the future are not."""
+        """Take what is news in a frame of the multihop channel.
+
+        Stamps of the future are not, nor are those that would be dropped for their age at once.
+        """
+        earliest_s, latest_s = now_s - self._relayed_silence_s, now_s + slack_s
         for record in gossip.records:
-            plausible = record.id != self._own_id and record.stamp_s <= now_s + slack_s
+            plausible = record.id != self._own_id and earliest_s <= record.stamp_s <= latest_s
             if plausible and self._is_news(record.id, record.incarnation, record.version):
                 self._newest[record.id] = record
 
@@ -77,6 +84,8 @@ class Table:
 
     def _is_news(self, who: int, incarnation: int, version: int) -> bool:
         """Whether this is newer than all ever adopted of its subject; if so, remember it."""
+        if who not in self._newest and len(self._newest) >= MAX_KNOWN:
+            return False
         last = self._last.get(who)
         if last is not None and (incarnation, version) <= last:
             return False
