@@ -12,6 +12,9 @@ from agent.messages import Beacon, Place, Record, Vector
 LOCAL, MULTIHOP = 0, 1
 """Channels of the radio."""
 MEMORY = 200
+"""So many of the own beacons are remembered, for the echoes that may come."""
+MAX_ECHOES = 82
+"""So many fit beside the greatest numbers that a Beacon may hold: 133 B and 13 B for each echo."""
 
 
 class OwnState(NamedTuple):
@@ -64,17 +67,18 @@ class Broadcast:
         return tuple(frames)
 
     def _beacon(self, now_s: float, own: OwnState, echoes: tuple[tuple[int, int], ...]) -> Beacon:
+        sequence = self._numbered(now_s)
         return Beacon(
             self._id,
             self._incarnation,
-            self._numbered(now_s),
+            sequence,
             now_s,
             own.position,
             own.velocity,
             own.heading_for,
             *own.claim,
             own.speed_cap,
-            echoes,
+            _in_turns(echoes, sequence),
         )
 
     def _numbered(self, now_s: float) -> int:
@@ -82,3 +86,11 @@ class Broadcast:
         self.sent_s[self._sequence] = now_s
         self.sent_s.pop(self._sequence - MEMORY, None)
         return self._sequence
+
+
+def _in_turns(echoes: tuple[tuple[int, int], ...], turn: int) -> tuple[tuple[int, int], ...]:
+    """Return as many echoes as fit a beacon; where that is not all, others in each turn."""
+    if len(echoes) <= MAX_ECHOES:
+        return echoes
+    start = turn * MAX_ECHOES % len(echoes)
+    return (echoes + echoes)[start : start + MAX_ECHOES]
