@@ -17,8 +17,13 @@ MULTIHOP = 1
 CHANNELS = ("local", "multihop")
 
 MAX_PAYLOAD_B = 1200
-MAX_TRANSMISSION_B = 16 * 1024
+MAX_OUTGOING = 64
+MAX_TRANSMISSION_B = MAX_OUTGOING * (MAX_PAYLOAD_B + 5) + 22
 MAX_BATCH_B = 256 * 1024
+MAX_FRAMES = 4096
+FRAME_HEAD_B = 26
+BATCH_HEAD_B = 15
+"""Sizes as msgpack writes the greatest numbers round a payload, and round a batch's frames."""
 
 Count = Annotated[int, Meta(ge=0, lt=2**53)]
 AgentId = Annotated[int, Meta(ge=0, lt=2**16)]
@@ -44,7 +49,7 @@ class Transmission(
 
     slot: Count
     incarnation: Count
-    frames: Annotated[tuple[Outgoing, ...], Meta(max_length=64)]
+    frames: Annotated[tuple[Outgoing, ...], Meta(max_length=MAX_OUTGOING)]
 
 
 class Frame(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
@@ -73,11 +78,11 @@ def pack(message: msgspec.Struct) -> bytes:
     return _encode(message)
 
 
-def unpack(data: bytes, kind: type[_T], max_bytes: int, max_items: int = 4096) -> _T:
+def unpack(data: bytes, kind: type[_T], max_bytes: int, max_items: int = MAX_FRAMES) -> _T:
     """Decode and check a message from outside, or raise :class:`WireError`.
 
-    Sizes are checked before anything is built; extension types, map keys that are no strings and
-    numbers that are not finite or out of range do not pass.
+    Sizes are checked before anything is built; extension types, map keys that are no strings, text
+    for bytes, and numbers that are not finite or out of range do not pass.
     """
     if len(data) > max_bytes:
         raise WireError(f"oversize: {len(data)} B where {max_bytes} B are allowed")
@@ -93,7 +98,7 @@ def unpack(data: bytes, kind: type[_T], max_bytes: int, max_items: int = 4096) -
             max_bin_len=max_bytes,
             max_ext_len=0,
         )
-        return msgspec.convert(plain, kind)
+        return msgspec.convert(plain, kind, builtin_types=(bytes,))
     except (ValueError, TypeError, RecursionError, msgpack.exceptions.UnpackException) as error:
         raise WireError(f"malformed {kind.__name__}: {error}") from error
 
