@@ -14,7 +14,14 @@ from struct import Struct as Layout
 from netem.link import Cause, draw, verdict
 from netem.messages import MediumSetup, Position, Verdicts
 from netem.schedule import Schedule
-from netem.wire.frame import Frame, Transmission
+from netem.wire.frame import (
+    BATCH_HEAD_B,
+    FRAME_HEAD_B,
+    MAX_BATCH_B,
+    MAX_FRAMES,
+    Frame,
+    Transmission,
+)
 
 _FATE = Layout("<5qBd").pack
 DELIVERED = Cause.DELIVERED
@@ -62,10 +69,17 @@ class Medium:
             )
 
     def collect(self, receiver: int, now_s: float) -> tuple[Frame, ...]:
-        """Return, and forget, the frames that came due for one receiver by ``now_s`` [s]."""
+        """Return, and forget, the frames that came due for one receiver by ``now_s`` [s].
+
+        No more than fit one batch: what is over stays in flight, and comes first the next time.
+        """
         queue = self._queues[receiver]
-        frames = []
-        while queue and queue[0][0] <= now_s:
+        frames: list[Frame] = []
+        room_b = MAX_BATCH_B - BATCH_HEAD_B
+        while queue and queue[0][0] <= now_s and len(frames) < MAX_FRAMES:
+            room_b -= FRAME_HEAD_B + len(queue[0][-1].payload)
+            if room_b < 0:
+                break
             frames.append(heappop(queue)[-1])
         self.in_flight -= len(frames)
         self._fates[Cause.DELIVERED] += len(frames)
