@@ -20,6 +20,8 @@ from agent.setup import AgentSetup
 
 TIDY_S = 0.2
 """How often those who fell silent are looked for."""
+MAX_TOLD = 256
+"""So many neighbours are told of at most: a longer array makes a command that is refused."""
 
 
 class Outbox(NamedTuple):
@@ -139,7 +141,7 @@ class Agent:
             intent.force,
             intent.target,
             intent.place,
-            tuple(other.id for other in senses.neighbours),
+            tuple(other.id for other in senses.neighbours[:MAX_TOLD]),
             self.rejected.total(),
         )
         return Command(
