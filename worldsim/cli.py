@@ -84,6 +84,7 @@ def run(
 ) -> int:
     """Fly a fleet of real processes: netem, world and one for each agent, over Zenoh."""
     from worldsim.run.admission import PROCESS_COMMAND_TICKS
+    from worldsim.run.fleet import run as fly_processes
     from worldsim.run.rundir import RunDirectory
 
     if not isfinite(speed):
@@ -91,8 +92,6 @@ def run(
     overrides = _overrides(settings, agents, seed, duration)
     admitted = _admitted(scenario, overrides, PROCESS_COMMAND_TICKS)
     directory = RunDirectory.create(out, admitted)
-    from worldsim.run.fleet import run as fly_processes
-
     return fly_processes(admitted, directory, speed=speed, recording=not no_recording)
 
 
@@ -167,10 +166,14 @@ def check(
 @app.command(epilog=_examples("qswarm verify runs/wedge-9-20260102T030405Z"))
 def verify(run: RunFolder) -> int:
     """Judge a run again from its recording alone, and compare with its summary."""
+    from worldsim.show.telling import verified
     from worldsim.show.verify import verify as verify_run
 
     verification = verify_run(run)
-    print(verification)
+    if verification.problem is not None:
+        _say(verification.problem)
+    else:
+        print(verified(verification))
     return verification.exit_status
 
 

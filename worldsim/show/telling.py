@@ -3,7 +3,10 @@
 import sys
 from pathlib import Path
 from time import monotonic
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
+
+if TYPE_CHECKING:
+    from worldsim.show.verify import Verification
 
 Summary = dict[str, Any]
 
@@ -40,12 +43,12 @@ class ProgressLine:
 def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
     """Return the verdict of one run: what was expected, what it showed, where to look."""
     factor = summary["real_time_factor"]
-    pace = f", {factor:.0f} times real time" if factor is not None else ""
+    pace = f", {factor:.3g} times real time" if factor is not None else ""
     head = (
         f"{summary['scenario']}, seed {summary['seed']}: {summary['agents']} agents,"
         f" {summary['duration_s']:g} s{pace}"
     )
-    rows = [_expectation(row) for row in summary["expectations"]]
+    rows = [_expectation(**row) for row in summary["expectations"]]
     reason = f" ({summary['reason']})" if summary["reason"] else ""
     place = f"{folder}/run.rrd" if recorded else f"{folder}/summary.json"
     return "\n".join([head, *rows, _aside(summary), f"{summary['outcome']}{reason}  {place}"])
@@ -61,10 +64,28 @@ def table(overall: Summary, folder: Path) -> str:
     return "\n".join([*lines, f"{overall['outcome']}  {folder}/summary.json"])
 
 
-def _expectation(row: Summary) -> str:
-    wanted = f"wanted {row['wanted']:g}" if row["wanted"] is not None else "wanted at all"
-    got = f"{row['got']:.3g}" if row["got"] is not None else "never"
-    return f"  {'held' if row['held'] else 'NOT HELD':9}{row['name']}: {got} ({wanted})"
+def verified(verification: "Verification") -> str:
+    """Return what a recording shows by itself, and whether the run's summary says the same."""
+    rows = [
+        _expectation(row.name, row.wanted, row.got, row.held) for row in verification.expectations
+    ]
+    cut = "" if verification.whole else f" of {verification.duration_s:g} s"
+    agreement = [
+        f"  DIFFERS  {each.key}: {each.summary} in the summary, {each.recording} in the recording"
+        for each in verification.differences
+    ] or ["  the summary agrees" if verification.summary else "  no summary to compare with"]
+    head = (
+        f"{verification.scenario}, from its recording alone:"
+        f" {verification.ticks} ticks, {verification.until_s:g} s{cut}"
+    )
+    outcome = "held" if verification.held else "NOT HELD"
+    return "\n".join([head, *rows, *agreement, f"{outcome}  {verification.run}"])
+
+
+def _expectation(name: str, wanted: float | None, got: float | None, held: bool) -> str:
+    asked = f"wanted {wanted:g}" if wanted is not None else "wanted at all"
+    shown = f"{got:.3g}" if got is not None else "never"
+    return f"  {'held' if held else 'NOT HELD':9}{name}: {shown} ({asked})"
 
 
 def _aside(summary: Summary) -> str:
