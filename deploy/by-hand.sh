@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A fleet without the launcher: netem, the world and the agents, each started by a plain command.
-#   deploy/by-hand.sh [SCENARIO]
-# The parts may as well be typed into different shells.
+#   deploy/by-hand.sh [SCENARIO [DIR]]
+# The parts may as well be typed into different shells. QSWARM_PORT chooses another port than 7447.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -9,7 +9,7 @@ scenario=${1:-deploy/scenarios/wedge-9.toml}
 python=.venv/bin/python
 endpoint=tcp/127.0.0.1:${QSWARM_PORT:-7447}
 run=by-hand
-out=runs/by-hand-$(date -u +%Y%m%dT%H%M%SZ)
+out=${2:-runs/by-hand-$(date -u +%Y%m%dT%H%M%SZ)}
 
 agents=$("$python" -c '
 import sys, tomllib

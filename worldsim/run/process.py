@@ -64,6 +64,7 @@ class Flight:
         self._scenario = scenario
         self._outside = outside
         self._lost: set[int] = set()
+        self._begun = self._landed = False
         self._unreadable = 0
         self._pacer = Pacer(1.0 / (scenario.slot_hz * speed))
         self._progress_at_s = 0.0
@@ -78,18 +79,25 @@ class Flight:
         latest = self.loop.world.latest
         return self._unreadable + sum(last.telemetry.rejected for last in latest if last)
 
-    def fly(self, stop: Stop) -> bool:
-        """Fly the scenario's slots; return whether it got to the end."""
+    def fly(self, unwanted: Callable[[], bool]) -> bool:
+        """Fly the scenario's slots until the end, or until unwanted; return whether all of them."""
         self._pacer.start()
+        self._begun = True
         slots, world = self._scenario.slots, self.loop.world
-        while world.slot < slots and not stop.asked and self._outside.stopped is None:
-            self._slot(stop)
+        while world.slot < slots and not unwanted():
+            self._slot(unwanted)
         self.real_time_factor = world.time_s / max(self._pacer.elapsed_s, 1e-9)
+        self.land()
+        self.loop.finish()
         return world.slot == slots
 
     def land(self) -> None:
-        """End the run for everybody, and take the medium's last counters."""
-        self._outside.landing()
+        """End the run for everybody, once, and take the medium's last counters."""
+        if self._landed:
+            return
+        self._landed = True
+        if self._begun:
+            self._outside.landing()
         self._over(b"")
         deadline = time.monotonic() + FINAL_VERDICTS_WITHIN_S
         while (left_s := deadline - time.monotonic()) > 0.0:
@@ -99,11 +107,12 @@ class Flight:
             if self.verdicts is not None and self.verdicts.slot >= self.loop.world.slot:
                 break
 
-    def _slot(self, stop: Stop) -> None:
+    def _slot(self, unwanted: Callable[[], bool]) -> None:
         slot = self.loop.world.slot
         self._pacer.begin(slot)
         self._send(self.loop.open())
-        while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not stop.asked:
+        self._strike_out()
+        while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not unwanted():
             self._outside.wait(min(left_s, LOOK_EVERY_S))
             self._strike_out()
         for agent, ring in enumerate(self._commands):
@@ -200,8 +209,12 @@ def conduct(
     notes = notebook(directory, scenario, terms.run, terms.recording)
     flight = Flight(scenario, post, notes, outside, terms.speed)
     whole = False
+
+    def unwanted() -> bool:
+        return stop.asked or outside.stopped is not None
+
     try:
-        whole = assemble(muster, terms.speed, lambda: stop.asked, outside) and flight.fly(stop)
+        whole = assemble(muster, terms.speed, unwanted, outside) and flight.fly(unwanted)
     finally:
         flight.land()
         notes.close()
@@ -215,7 +228,7 @@ def _lateness(verdicts: Verdicts | None) -> str:
     if verdicts is None or verdicts.late_s is None:
         return ""
     typical_s, worst_s = verdicts.late_s
-    return f"; netem's batches left {typical_s * 1e3:.1f} ms late (median), {worst_s * 1e3:.1f} ms (worst)"
+    return f"; netem late by {typical_s * 1e3:.1f} ms (median), {worst_s * 1e3:.1f} ms (worst)"
 
 
 def _summary(scenario: Scenario, flight: Flight, interrupted: bool) -> dict[str, Any]:

@@ -1,0 +1,43 @@
+"""Fleets of real processes, gone when a test ends."""
+
+import signal
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.processes.harness import SCENARIO, Started
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Started]]:
+    started: list[Started] = []
+
+    def begin(*arguments: str) -> Started:
+        output = tmp_path / f"output-{len(started)}.txt"
+        started.append(Started(list(arguments), output, tmp_path))
+        return started[-1]
+
+    yield begin
+    for each in started:
+        if each.process.poll() is None:
+            each.kill_group(signal.SIGKILL)
+            each.process.wait(5.0)
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Callable[[float], str]:
+    def write(duration_s: float) -> str:
+        path = tmp_path / "four.toml"
+        path.write_text(SCENARIO.format(duration_s=duration_s))
+        return str(path)
+
+    return write
+
+
+@pytest.fixture
+def endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"

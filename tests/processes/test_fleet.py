@@ -1,0 +1,144 @@
+"""A launched fleet, whole and hurt: what it says, what it leaves, and that it leaves nobody."""
+
+import json
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.processes.harness import QSWARM, Started, eventually, pids
+from worldsim.run.fleet import processes
+
+pytestmark = pytest.mark.processes
+
+Start = Callable[..., Started]
+Write = Callable[[float], str]
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    return tmp_path / "run"
+
+
+def launched(start: Start, scenario: str, run: Path, *options: str) -> Started:
+    return start(*QSWARM, "run", scenario, "--out", str(run), *options)
+
+
+def summary_of(run: Path) -> dict[str, Any]:
+    summary: dict[str, Any] = json.loads((run / "summary.json").read_text())
+    return summary
+
+
+def events_of(run: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (run / "events.jsonl").read_text().splitlines()]
+
+
+def nobody_left(of: dict[str, int]) -> None:
+    eventually(lambda: not any(running(pid) for pid in of.values()), 5.0, lambda: str(of))
+
+
+def running(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except FileNotFoundError:
+        return False
+
+
+def test_a_fleet_flies_passes_and_leaves_everything_in_its_folder(
+    start: Start, scenario: Write, run: Path
+) -> None:
+    fleet = launched(start, scenario(6.0), run, "--speed", "2")
+    assert fleet.status(40.0) == 0, fleet.text
+
+    summary = summary_of(run)
+    assert (summary["outcome"], summary["mode"]) == ("pass", "processes")
+    assert summary["duration_s"] == 6.0
+    assert summary["real_time_factor"] > 1.0
+    assert summary["packets"]["delivered"] > 0
+    assert {event["agent"] for event in events_of(run) if event["kind"] == "slot"} == {0, 1, 2, 3}
+    assert "held" in fleet.text
+    assert (run / "run.rrd").stat().st_size > 0
+    assert [row.alive for row in processes(run)] == [False] * 7
+    nobody_left(pids(run))
+
+
+def test_a_killed_agent_is_said_at_once_and_the_run_ends_with_a_verdict(
+    start: Start, scenario: Write, run: Path
+) -> None:
+    fleet = launched(start, scenario(5.0), run, "--no-recording")
+    fleet.says("in place")
+    os.kill(pids(run)["agent-2"], signal.SIGKILL)
+    fleet.says("agent-2 (pid", within_s=1.0)
+    assert "was killed by signal 9" in fleet.text
+
+    assert fleet.status(20.0) in (0, 1)
+    kills = [event for event in events_of(run) if event["kind"] == "kill"]
+    assert [(kill["agent"], kill["signal"], kill["planned"]) for kill in kills] == [(2, 9, False)]
+    assert kills[0]["t_s"] < 5.0
+    assert summary_of(run)["outcome"] in ("pass", "fail")
+
+
+def test_ctrl_c_ends_everything_and_leaves_summary_and_recording(
+    start: Start, scenario: Write, run: Path
+) -> None:
+    fleet = launched(start, scenario(60.0), run)
+    fleet.says("in place")
+    fleet.kill_group(signal.SIGINT)
+
+    assert fleet.status(8.0) == 130, fleet.text
+    summary = summary_of(run)
+    assert summary["outcome"] == "inconclusive"
+    assert "interrupted" in summary["reason"]
+    assert 0.0 < summary["duration_s"] < 60.0
+    assert recorded_ticks(run / "run.rrd") > 0
+    nobody_left(pids(run))
+
+
+def test_kill_9_of_the_launcher_leaves_no_process_and_a_summary(
+    start: Start, scenario: Write, run: Path
+) -> None:
+    fleet = launched(start, scenario(60.0), run, "--no-recording")
+    fleet.says("in place")
+    everybody = pids(run)
+    assert len(everybody) == 7
+    fleet.process.kill()
+    nobody_left(everybody)
+    assert summary_of(run)["outcome"] == "inconclusive"
+
+
+def test_when_the_medium_dies_the_run_ends_and_says_so(
+    start: Start, scenario: Write, run: Path
+) -> None:
+    fleet = launched(start, scenario(60.0), run, "--no-recording")
+    fleet.says("in place")
+    os.kill(pids(run)["netem"], signal.SIGKILL)
+    assert fleet.status(10.0) == 3
+    assert "netem was killed by signal 9" in fleet.text
+    assert summary_of(run)["outcome"] == "inconclusive"
+    nobody_left(pids(run))
+
+
+def test_an_agent_that_does_not_come_up_is_said_with_its_last_words(
+    start: Start, scenario: Write, run: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "broken.py").write_text(
+        "class Broken:\n"
+        "    def __init__(self, setup):\n        raise OSError('no battery')\n"
+        "    def decide(self, senses):\n        return None\n"
+    )
+    controller = 'control.controller="broken:Broken"'
+    fleet = launched(start, scenario(6.0), run, "--no-recording", "--set", controller)
+    assert fleet.status(20.0) == 2, fleet.text
+    assert "did not start" in fleet.text
+    assert "no battery" in fleet.text
+    nobody_left(pids(run))
+
+
+def recorded_ticks(recording: Path) -> int:
+    from rerun.chunk import RrdReader  # noqa: PLC0415 - a second that the other tests save
+
+    chunks = RrdReader(recording).stream().filter(content="/world/agents", is_static=False)
+    return sum(chunk.to_record_batch().num_rows for chunk in chunks)

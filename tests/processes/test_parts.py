@@ -1,0 +1,110 @@
+"""The parts started by hand: what stands in their way is one line and status 2."""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from netem.messages import Conditions, MediumSetup
+from netem.wire.keys import Keys
+from netem.wire.post import Post, RefusedError
+from netem.wire.session import SessionError, open_client, open_router
+from tests.processes.harness import Started
+
+pytestmark = pytest.mark.processes
+
+Start = Callable[..., Started]
+PYTHON = [sys.executable, "-m"]
+REPOSITORY = Path(__file__).parents[2]
+
+
+def test_without_a_router_agent_and_world_say_so_within_ten_seconds(
+    start: Start, scenario: Callable[[float], str], endpoint: str, tmp_path: Path
+) -> None:
+    agent = start(*PYTHON, "agent", "--id", "0", "--run", "lonely", "--connect", endpoint)
+    out = tmp_path / "run"
+    world = start(*PYTHON, "worldsim", scenario(6.0), "--connect", endpoint, "--out", str(out))
+    said = f"no router answers at {endpoint} within 8 s"
+    assert (agent.status(10.0), agent.text) == (2, f"agent-0: {said}\n")
+    assert (world.status(10.0), world.text) == (2, f"world: {said}\n")
+    assert not out.exists()
+
+
+def test_a_port_in_use_is_one_line(start: Start, endpoint: str) -> None:
+    with open_router(endpoint):
+        netem = start(*PYTHON, "netem", "--listen", endpoint)
+        assert netem.status(10.0) == 2
+    assert netem.text == f"netem: {endpoint}: the port is in use\n"
+
+
+def test_netem_serves_the_run_that_asks_first_and_refuses_a_second(
+    start: Start, endpoint: str
+) -> None:
+    netem = start(*PYTHON, "netem", "--listen", endpoint)
+    netem.says("netem listens at")
+    question = msgspec.json.encode(MediumSetup(1, 2, 4, 80.0, Conditions()))
+    with open_client(endpoint) as session:
+        first, second = Post(session, Keys("first")), Post(session, Keys("second"))
+        assert first.ask("medium", None, question, timeout_s=5.0) == b""
+        with pytest.raises(RefusedError, match="serves run 'first' already"):
+            second.ask("medium", None, question, timeout_s=5.0)
+        assert first.ask("medium", None, question, timeout_s=5.0) == b""
+        first.putter("over")(b"")
+        assert netem.status(5.0) == 0, netem.text
+
+
+def test_netem_refuses_conditions_that_make_no_sense(start: Start, endpoint: str) -> None:
+    netem = start(*PYTHON, "netem", "--listen", endpoint)
+    netem.says("netem listens at")
+    with open_client(endpoint) as session, pytest.raises(RefusedError, match="conditions: "):
+        Post(session, Keys("odd")).ask("medium", None, b'{"seed": -1}', timeout_s=5.0)
+
+
+def test_a_fleet_started_by_a_shell_loop_passes(
+    start: Start, scenario: Callable[[float], str], tmp_path: Path
+) -> None:
+    fleet = start("bash", str(REPOSITORY / "deploy/by-hand.sh"), scenario(6.0), f"{tmp_path}/run")
+    assert fleet.status(30.0) == 0, fleet.text
+    assert json.loads((tmp_path / "run/summary.json").read_text())["outcome"] == "pass"
+    assert "outcome: pass" in fleet.text
+
+
+def test_netem_that_nobody_asked_ends_when_told_to(start: Start, endpoint: str) -> None:
+    netem = start(*PYTHON, "netem", "--listen", endpoint)
+    netem.says("netem listens at")
+    netem.process.terminate()
+    assert netem.status(5.0) == 0
+
+
+@pytest.mark.parametrize(
+    ("listen", "said"),
+    [
+        ("tcp/0.0.0.0:7447", "not a loopback address"),
+        ("tcp/192.168.1.2:7447", "not a loopback address"),
+        ("tcp/[::]:7447", "not a loopback address"),
+        ("tcp/example.org:7447", "not a loopback address"),
+        ("tcp/127.0.0.1", "the port is missing or wrong"),
+        ("tcp/127.0.0.1:99999", "the port is missing or wrong"),
+        ("127.0.0.1:7447", "no endpoint"),
+        ("", "no endpoint"),
+    ],
+)
+def test_a_router_listens_on_loopback_only(listen: str, said: str) -> None:
+    with pytest.raises(SessionError, match=said) as refusal:
+        open_router(listen)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_client_needs_an_endpoint() -> None:
+    with pytest.raises(SessionError, match="no endpoint"):
+        open_client("localhost:7447")
+
+
+def test_an_unknown_protocol_is_one_line() -> None:
+    with pytest.raises(SessionError, match="not supported") as refusal:
+        open_router("pigeon/127.0.0.1:7447")
+    assert "\n" not in str(refusal.value)
+    assert ".rs" not in str(refusal.value)
