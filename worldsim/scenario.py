@@ -103,7 +103,8 @@ def _told_as_override(error: ScenarioError, overrides: Mapping[str, str]) -> Sce
 
 def _on_one_line(array: re.Match[str]) -> str:
     """Write an array of numbers or names as people do."""
-    return "[" + " ".join(line.strip() for line in array[1].splitlines()).rstrip(",") + "]"
+    items = [line.strip(" ") for line in array[1].removesuffix(",\n").split("\n")]
+    return f"[{' '.join(items)}]"
 
 
 def _without_none(value: Any) -> Any:

@@ -1,0 +1,89 @@
+"""What is unwise but allowed, and what only one of the clocks can fly."""
+
+from pathlib import Path
+
+import pytest
+
+from worldsim.rules import cautions, too_fast
+from worldsim.run.admission import VIRTUAL_COMMAND_TICKS, admit
+from worldsim.run.virtual import COMMAND_TICKS
+from worldsim.scenario import Scenario, ScenarioError, load
+
+WEDGE = Path("deploy/scenarios/wedge-9.toml")
+
+
+def wedge(**overrides: str) -> Scenario:
+    return load(WEDGE, {key.replace("__", "."): value for key, value in overrides.items()})
+
+
+def test_the_library_raises_no_eyebrow() -> None:
+    assert cautions(wedge()) == []
+
+
+def test_a_cast_zone_beyond_lemma_7_is_cautioned_with_the_bound() -> None:
+    assert not cautions(wedge(netem__range_m="3", control__cast_far_m="0.5"))
+    (caution,) = cautions(wedge(netem__range_m="2", control__cast_far_m="0.5"))
+    assert caution.key == "control.cast_far_m"
+    assert "at most 0.25 " in caution.detail
+
+
+def test_neighbours_beyond_range_are_cautioned() -> None:
+    (caution,) = cautions(wedge(netem__local__range_m="0.9"))
+    assert caution.key == "netem.range_m"
+
+
+def test_a_run_too_short_to_see_convergence_is_cautioned() -> None:
+    assert not cautions(wedge(duration_s="14"))
+    (caution,) = cautions(wedge(duration_s="13.9"))
+    assert caution.key == "expect.converge_within_s"
+
+
+@pytest.mark.parametrize(
+    ("speed", "ticks", "tick_hz"),
+    [("0.5", 1, None), ("1", 2, None), ("1.01", 2, 21), ("2", 1, None), ("2", 2, 40)],
+)
+def test_fast_vehicles_need_a_tick_rate_that_does(
+    speed: str, ticks: int, tick_hz: int | None
+) -> None:
+    found = too_fast(wedge(vehicle__max_speed_mps=speed), ticks)
+    if tick_hz is None:
+        assert found is None
+        return
+    assert found is not None
+    assert f"fleet.tick_hz = {tick_hz} would do" in found.detail
+    faster = wedge(vehicle__max_speed_mps=speed, fleet__tick_hz=str(tick_hz))
+    assert too_fast(faster, ticks) is None
+
+
+def test_admission_knows_the_virtual_clock() -> None:
+    assert VIRTUAL_COMMAND_TICKS == COMMAND_TICKS
+
+
+def refusal(tmp_path: Path, scenario: Scenario) -> str:
+    with pytest.raises(ScenarioError) as caught:
+        admit(scenario, tmp_path / "s.toml", 1)
+    return str(caught.value).removeprefix(str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    "name", ["q_structur", "no.such:Thing", "json:Nothing", "json:loads", ":", "a b:c", "."]
+)
+def test_a_controller_that_cannot_be_had(tmp_path: Path, name: str) -> None:
+    told = refusal(tmp_path, wedge(control__controller=f"'{name}'"))
+    assert told.startswith("/s.toml: control.controller: ")
+    assert "\n" not in told
+
+
+def test_a_controller_that_breaks_while_imported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "broken_controller.py").write_text("class :\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    told = refusal(tmp_path, wedge(control__controller="broken_controller:Mine"))
+    assert "cannot be imported: SyntaxError" in told
+
+
+@pytest.mark.parametrize("agents", ["9", "1000"])
+def test_a_box_without_room_is_refused_soon(tmp_path: Path, agents: str) -> None:
+    scenario = wedge(fleet__agents=agents, fleet__start__size_m="[0.5, 0.5, 0.5]")
+    assert refusal(tmp_path, scenario).startswith("/s.toml: fleet.start: no room for ")
