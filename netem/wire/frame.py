@@ -22,7 +22,7 @@ MAX_TRANSMISSION_B = MAX_OUTGOING * (MAX_PAYLOAD_B + 5) + 22
 MAX_BATCH_B = 256 * 1024
 MAX_FRAMES = 4096
 FRAME_HEAD_B = 26
-BATCH_HEAD_B = 15
+BATCH_HEAD_B = 13
 """Sizes as msgpack writes the greatest numbers round a payload, and round a batch's frames."""
 
 Count = Annotated[int, Meta(ge=0, lt=2**53)]

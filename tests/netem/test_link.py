@@ -1,0 +1,133 @@
+"""A link as statistics: what is lost, when the rest arrives, and what depends on what."""
+
+from itertools import pairwise
+from math import inf, nan, sqrt
+
+import pytest
+
+from netem.link import Cause, LinkModel, Verdict, draw, verdict
+
+PACKETS = 100_000
+SEED = bytes(range(32))
+KEY = {"seed": SEED, "source": 0, "incarnation": 0, "destination": 1, "channel": 0, "count": 0}
+
+
+def draws(packets=PACKETS, **other):
+    key = {**KEY, **other}
+    return [draw(**{**key, "count": count}) for count in range(packets)]
+
+
+def kolmogorov_smirnov(samples, distribution):
+    """The largest distance between the samples' distribution and the one that they should have."""
+    count = len(samples)
+    return max(
+        max((k + 1) / count - distribution(x), distribution(x) - k / count)
+        for k, x in enumerate(sorted(samples))
+    )
+
+
+def uniform(low, high):
+    return lambda x: min(1.0, max(0.0, (x - low) / (high - low)))
+
+
+@pytest.fixture(scope="module")
+def frames():
+    return draws()
+
+
+@pytest.mark.parametrize("loss_percent", [1.0, 10.0, 50.0, 80.0, 99.0])
+def test_loss_is_what_the_link_says(frames, loss_percent):
+    link = LinkModel(loss_percent=loss_percent)
+    lost = sum(verdict(link, 1.0, each).cause is Cause.DROPPED_LOSS for each in frames)
+    share = loss_percent / 100.0
+    bound = 3.29 * sqrt(share * (1.0 - share) / PACKETS)
+    assert bound <= 0.0052 + 1e-5
+    assert abs(lost / PACKETS - share) < bound
+
+
+def test_no_loss_loses_nothing_and_full_loss_everything(frames):
+    clean, dead = LinkModel(jitter_ms=1.0), LinkModel(loss_percent=100.0)
+    assert all(verdict(clean, 1.0, each).cause is Cause.DELIVERED for each in frames[:20_000])
+    assert all(verdict(dead, 1.0, each).cause is Cause.DROPPED_LOSS for each in frames[:20_000])
+
+
+def test_delay_is_uniform(frames):
+    link = LinkModel(delay_ms=100.0, jitter_ms=40.0)
+    delays = [verdict(link, 1.0, each).delay_s for each in frames]
+    assert kolmogorov_smirnov(delays, uniform(0.060, 0.140)) < 0.0062
+
+
+def test_delay_of_what_survives_is_uniform_too(frames):
+    link = LinkModel(delay_ms=100.0, jitter_ms=40.0, loss_percent=50.0)
+    verdicts = [verdict(link, 1.0, each) for each in frames]
+    delays = [each.delay_s for each in verdicts if each.cause is Cause.DELIVERED]
+    assert kolmogorov_smirnov(delays, uniform(0.060, 0.140)) < 1.95 / sqrt(len(delays))
+
+
+def test_delay_is_never_negative(frames):
+    link = LinkModel(delay_ms=10.0, jitter_ms=40.0)
+    delays = [verdict(link, 1.0, each).delay_s for each in frames]
+    assert min(delays) == 0.0
+    at_once = sum(delay == 0.0 for delay in delays) / PACKETS
+    assert abs(at_once - 30.0 / 80.0) < 0.0052
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"destination": 2},
+        {"source": 1, "destination": 0},
+        {"source": 7},
+        {"channel": 1},
+        {"incarnation": 1},
+        {"seed": bytes(32)},
+    ],
+    ids="-".join,
+)
+def test_two_links_lose_independently(frames, other):
+    agree = sum((a[0] < 0.5) == (b[0] < 0.5) for a, b in zip(frames, draws(**other), strict=True))
+    assert abs(agree / PACKETS - 0.5) < 0.0052
+
+
+def test_one_frame_says_nothing_about_the_next(frames):
+    agree = sum((a[0] < 0.5) == (b[0] < 0.5) for a, b in pairwise(frames))
+    assert abs(agree / (PACKETS - 1) - 0.5) < 0.0052
+
+
+def test_a_draw_belongs_to_its_frame_alone():
+    assert draw(**KEY) == draw(**KEY)
+    assert len({each for key in KEY if key != "seed" for each in [draw(**{**KEY, key: 9})]}) == 5
+    assert all(0.0 <= number < 1.0 for each in draws(1000) for number in each)
+
+
+@pytest.mark.parametrize("distance_m", [6.0 + 1e-9, inf, nan])
+def test_beyond_the_range_nothing_gets_across(distance_m):
+    link = LinkModel(range_m=6.0)
+    assert verdict(link, distance_m, None) == Verdict(Cause.DROPPED_RANGE)
+
+
+@pytest.mark.parametrize("distance_m", [0.0, 1.0, 6.0])
+def test_within_the_range_all_gets_across(distance_m):
+    link = LinkModel(range_m=6.0, delay_ms=20.0)
+    assert verdict(link, distance_m, None) == Verdict(Cause.DELIVERED, 0.02)
+
+
+def test_range_comes_before_loss():
+    link = LinkModel(range_m=6.0, loss_percent=100.0)
+    assert verdict(link, 7.0, (0.0, 0.0, 0.0, 0.0)).cause is Cause.DROPPED_RANGE
+
+
+def test_where_there_is_no_limit_a_missing_position_hears_nothing():
+    assert verdict(LinkModel(), nan, None).cause is Cause.DROPPED_RANGE
+
+
+@pytest.mark.parametrize(
+    ("link", "needs"),
+    [
+        (LinkModel(range_m=3.0, delay_ms=5.0), False),
+        (LinkModel(jitter_ms=1.0), True),
+        (LinkModel(loss_percent=1.0), True),
+    ],
+)
+def test_a_link_says_whether_it_needs_numbers(link, needs):
+    assert link.draws is needs
