@@ -87,7 +87,7 @@ def _place_formation(data: Data, file: Path) -> tuple[Path, str]:
 
 def _check_formation(spec: FormationSpec, file: Path, prefix: str) -> None:
     try:
-        Formation(spec)
+        Formation(spec, 1.0)
     except FormationError as error:
         raise ScenarioError(file, prefix + error.key, error.detail) from error
 

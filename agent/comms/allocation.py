@@ -14,6 +14,8 @@ HYSTERESIS_M2 = 0.5
 CONFLICT_M2 = 0.05
 """Two that claim one place: the nearer by more than this keeps the claim, else the lower id."""
 GAIN_M2 = 1e-9
+UNPLACED_M2 = 0.0
+"""What it costs to have no place: the same for all, so that the nearest get the places."""
 ROUNDING = 1e-12
 """An exchange saves this share of what it costs at least: far from home, sums of squares round by
 more than GAIN_M2, and two exchanges that seem to save something could undo each other for ever."""
@@ -24,14 +26,15 @@ def allot(
     places: Sequence[Place],
     slots: Sequence[Vector],
     hysteresis_m2: float = HYSTERESIS_M2,
-) -> dict[int, Place]:
-    """Return a place for each member of the team, by id.
+) -> dict[int, Place | None]:
+    """Return a place for each member of the team, by id; None where there are too few.
 
-    team: sorted by id; places, slots [m; world frame]: as many as the team has members, the same
-    in every agent's order. Claims come first, then the nearest pairs, then pairwise exchanges
-    until none saves anything.
+    team: sorted by id; places, slots [m; world frame]: as many as the team has members, or fewer;
+    in the same order in every agent. Claims come first, then the nearest pairs, then pairwise
+    exchanges until none saves anything.
     """
-    squares = [[_square(peer.position, slot) for slot in slots] for peer in team]
+    nowhere = [UNPLACED_M2] * (len(team) - len(places))
+    squares = [[_square(peer.position, slot) for slot in slots] + nowhere for peer in team]
     column_of = {place: column for column, place in enumerate(places)}
     claims = _undisputed(
         [column_of.get(peer.place) if peer.place else None for peer in team], squares
@@ -41,7 +44,10 @@ def allot(
             squares[row][column] -= hysteresis_m2
     chosen = _filled(claims, squares)
     _exchange(chosen, squares)
-    return {peer.id: places[column] for peer, column in zip(team, chosen, strict=True)}
+    return {
+        peer.id: places[column] if column < len(places) else None
+        for peer, column in zip(team, chosen, strict=True)
+    }
 
 
 def _undisputed(claims: list[int | None], squares: list[list[float]]) -> list[int | None]:

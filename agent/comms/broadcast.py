@@ -3,6 +3,7 @@
 Fig. 3's two layers: high frequency to whoever hears it, low frequency to be passed on.
 """
 
+from math import inf
 from typing import NamedTuple
 
 from agent.codec import encode
@@ -46,7 +47,7 @@ class Broadcast:
         self._beacon_period_s = beacon_period_s
         self._round_period_s = round_period_s
         self._next_beacon_s = 0.0
-        self._next_round_s = 0.0
+        self._next_round_s = 0.0 if round_period_s < inf else inf
         self._sequence = 0
         self.sent_s: dict[int, float] = {}
 

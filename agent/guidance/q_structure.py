@@ -4,7 +4,7 @@ Target-on-queue (Algorithm 1, at 5 Hz), bobber (Algorithm 2), potentials (18)-(2
 turn. Plain floats throughout.
 """
 
-from math import pi, radians, sqrt
+from math import dist, pi, radians, sqrt
 
 from agent.controller import Intent, Senses
 from agent.guidance.bobber import bobber, cast_zone
@@ -12,14 +12,17 @@ from agent.guidance.movement import saturated, steer
 from agent.guidance.potential import Potential
 from agent.guidance.target_on_queue import TargetOnQueue
 from agent.messages import Place
-from agent.qstructure.formation import Formation
+from agent.qstructure.formation import Formation, Slot
 from agent.qstructure.frame import Frame
+from agent.qstructure.orientation import FREE
 from agent.setup import AgentSetup
 
 GAIN = 2.0
 """c of (28) [1/s]."""
 CHOICE_HZ = 5.0
 CAST_FAR_M = 0.5
+AT_SLOT_M = 0.02
+"""So near its slot an agent takes up the queue's orientation."""
 
 
 class QStructure:
@@ -37,26 +40,38 @@ class QStructure:
             radians(vehicle.max_yaw_rate_dps),
         )
         self._potential = Potential(control.separation_m)
-        self._targets = TargetOnQueue(setup.id, Formation(setup.formation), control.spacing_m)
+        formation = Formation(setup.formation, control.spacing_m)
+        self._targets = TargetOnQueue(setup.id, formation)
         self._frame = Frame()
-        self._place: Place | None = None
-        self._choice_period_s = 1.0 / CHOICE_HZ
+        self._mine: tuple[Place, Slot] | None = None
         self._choose_at_s = -1.0
 
     def decide(self, senses: Senses) -> Intent:
-        """Return what to do now."""
-        place = self._own_place(senses)
+        """Return what to do now; without a place, stay and give way."""
+        self._choose(senses)
         q = senses.position
-        q_toq = self._targets.slot(place, self._frame)
+        q_toq, attitude = q, FREE
+        if self._mine is not None:
+            slot = self._mine[1]
+            q_toq, attitude = self._frame.to_world(slot.point), slot.attitude
         q_tg = bobber(q, senses.yaw, q_toq, self._zone)
         x, y, z = self._potential.omega(q, q_tg, senses.neighbours)
-        force = GAIN * sqrt(x * x + y * y + z * z)
         wanted = saturated((-GAIN * x, -GAIN * y, -GAIN * z), self._max_speed, self._max_climb)
         velocity, yaw = steer(wanted, senses.yaw, self._theta)
-        return Intent(wanted, velocity, yaw % (2.0 * pi), force, q_tg, q_toq, place)
+        if attitude.yaw is not None and dist(q, q_toq) < AT_SLOT_M and velocity == wanted:
+            yaw = attitude.yaw + self._frame.yaw
+        return Intent(
+            wanted,
+            velocity,
+            yaw % (2.0 * pi),
+            GAIN * sqrt(x * x + y * y + z * z),
+            q_tg,
+            q_toq if self._mine is not None else None,
+            self._mine[0] if self._mine is not None else None,
+        )
 
-    def _own_place(self, senses: Senses) -> Place:
-        if self._place is None or senses.now_s >= self._choose_at_s:
-            self._choose_at_s = senses.now_s + self._choice_period_s - 1e-9
-            self._place = self._targets.choose(senses.team(), self._frame)
-        return self._place
+    def _choose(self, senses: Senses) -> None:
+        """Choose the own place anew, when it is time to (Algorithm 1 at 5 Hz)."""
+        if senses.now_s >= self._choose_at_s:
+            self._choose_at_s = senses.now_s + 1.0 / CHOICE_HZ - 1e-9
+            self._mine = self._targets.choose(senses.team(), self._frame)

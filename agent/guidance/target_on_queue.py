@@ -9,32 +9,24 @@ from collections.abc import Sequence
 
 from agent.comms.allocation import allot
 from agent.controller import Peer
-from agent.messages import Place, Vector
-from agent.qstructure.formation import Formation
+from agent.messages import Place
+from agent.qstructure.formation import Formation, Slot
 from agent.qstructure.frame import Frame
 
 
 class TargetOnQueue:
-    """Chooses an agent's place, and says where that place is.
+    """Chooses an agent's place, and says where that place is."""
 
-    spacing: d_ir [m].
-    """
-
-    def __init__(self, own_id: int, formation: Formation, spacing: float) -> None:
+    def __init__(self, own_id: int, formation: Formation) -> None:
         self._own_id = own_id
         self._formation = formation
-        self._spacing = spacing
-        self._slots: dict[Place, Vector] = {}
 
-    def choose(self, team: Sequence[Peer], frame: Frame) -> Place:
-        """Return the own place, given all members known, oneself included, sorted by id."""
-        places = self._formation.places(len(team))
-        slots = [self.slot(place, frame) for place in places]
-        return allot(team, places, slots)[self._own_id]
+    def choose(self, team: Sequence[Peer], frame: Frame) -> tuple[Place, Slot] | None:
+        """Return the own place and its slot [m, rad; target's frame].
 
-    def slot(self, place: Place, frame: Frame) -> Vector:
-        """Return the target-on-queue of a place [m; world frame]: s_i = s_k + d_ir (E13)."""
-        on_queue = self._slots.get(place)
-        if on_queue is None:
-            on_queue = self._slots[place] = self._formation.slot(place, self._spacing)
-        return frame.to_world(on_queue)
+        team: all members known, oneself included, sorted by id. None where all queues are full.
+        """
+        layout = self._formation.layout(len(team))
+        points = [frame.to_world(layout.slots[place].point) for place in layout.places]
+        place = allot(team, layout.places, points)[self._own_id]
+        return None if place is None else (place, layout.slots[place])

@@ -1,18 +1,27 @@
-"""Formations and queues: Definitions 3 and 4.
+"""Formations: Definition 3. What a team looks like, not who stands where.
 
-A formation says what a team looks like, not who stands where: queues with a shape and a share of
-the team, anchored on vertices. The ``...Spec`` structures are the tables of a formation file;
-:class:`Formation` is what agents compute with.
+The ``...Spec`` structures are the tables of a formation file; :class:`Formation` is what agents
+compute with, and a :class:`Layout` is the formation filled by a team of one size.
 """
 
 from functools import cache
-from typing import Annotated
+from math import dist, inf
+from typing import Annotated, NamedTuple
 
 import msgspec
 from msgspec import Meta
 
 from agent.messages import Metres, Place, Vector
-from agent.qstructure.shape import Shape, ShapeError, ShapeSpec, shape_of
+from agent.qstructure.curve import CurveError
+from agent.qstructure.expression import ExpressionError
+from agent.qstructure.orientation import (
+    Attitude,
+    Orientation,
+    OrientationError,
+    OrientationSpec,
+)
+from agent.qstructure.queue import Queue, QueueError
+from agent.qstructure.shape import ShapeError, ShapeSpec, Straight, shape_of
 
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
 
@@ -27,15 +36,18 @@ class FormationError(ValueError):
 
 
 class QueueSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A queue's table: Q_j = (V_j, S_j, C_j) of Definition 4.
+    """A queue's table: Q_j = (V_j, S_j, C_j, O_j) of Definition 4.
 
-    vertices: names; one for an open queue. capacity: share of the team, left out: equal shares.
+    vertices: names; one for an open queue, more for a closed one. shape: may be left out of a
+    closed queue, which then runs straight from vertex to vertex. capacity: share of the team, left
+    out: equal shares. orientation: left out: free.
     """
 
     name: Name
-    vertices: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=1)]
-    shape: ShapeSpec
+    vertices: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=64)]
+    shape: ShapeSpec | None = None
     capacity: Annotated[float, Meta(gt=0, le=1)] | None = None
+    orientation: OrientationSpec | None = None
 
 
 class FormationSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -48,90 +60,182 @@ class FormationSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omi
     queue: Annotated[tuple[QueueSpec, ...], Meta(min_length=1, max_length=64)]
 
 
-class Queue:
-    """An open queue: a vertex and a shape that starts on it."""
+class Slot(NamedTuple):
+    """Where a place is: point [m; target's frame], arc length [m], attitude wanted."""
 
-    __slots__ = ("_shape", "_vertex", "capacity", "first_rank", "name")
+    point: Vector
+    arc_length: float
+    attitude: Attitude
 
-    def __init__(
-        self, name: str, vertex: Vector, shape: Shape, capacity: float, first_rank: int
-    ) -> None:
-        self.name = name
-        self.capacity = capacity
-        self.first_rank = first_rank
-        self._vertex = vertex
-        self._shape = shape
 
-    def point(self, s: float) -> Vector:
-        """Return the point at arc length s [m] from the vertex [m; target's frame]."""
-        x, y, z = self._shape.point(s)
-        return (self._vertex[0] + x, self._vertex[1] + y, self._vertex[2] + z)
+class Layout(NamedTuple):
+    """A formation filled by a team: its places in the order they fill, and where each is.
+
+    unplaced: how many of the team find no place, because every queue is closed and full.
+    """
+
+    places: tuple[Place, ...]
+    slots: dict[Place, Slot]
+    unplaced: int
 
 
 class Formation:
-    """The geometry of a formation and the division of a team over its queues.
+    """The geometry of a formation, d_ir = ``spacing`` [m], and a team's division over its queues.
 
-    ``first_rank`` of a queue is 0, or 1 where its vertex is held in common and counted elsewhere.
-    Raises :class:`FormationError` when the tables contradict themselves.
+    A place is (queue, rank): the ranks of a queue's vertices come first, in order, then its members
+    along the curve. A vertex that queues share is held in common, under the name of the first of
+    them. Raises :class:`FormationError` when the tables contradict themselves.
     """
 
-    def __init__(self, spec: FormationSpec) -> None:
+    def __init__(self, spec: FormationSpec, spacing: float) -> None:
         self.name = spec.name
-        self.vertices = tuple(spec.vertices)
         _check_names(spec)
-        shares = _capacities(spec)
-        holders: dict[str, list[int]] = {name: [] for name in spec.vertices}
-        for index, table in enumerate(spec.queue):
-            holders[table.vertices[0]].append(index)
-        self.common = tuple(Place(who[0], 0) for who in holders.values() if len(who) > 1)
-        self.vertex_places = {name: Place(who[0], 0) for name, who in holders.items() if who}
-        self.queues = tuple(
-            Queue(
-                table.name,
-                spec.vertices[table.vertices[0]],
-                _shape(index, table),
-                shares[index],
-                1 if len(holders[table.vertices[0]]) > 1 else 0,
-            )
-            for index, table in enumerate(spec.queue)
-        )
-        self.places = cache(self._places)
+        self.vertices = dict(spec.vertices)
+        self.capacities = _capacities(spec)
+        self.queues = tuple(_queue(table, self.vertices, spacing) for table in spec.queue)
+        self._vertices_of = [table.vertices for table in spec.queue]
+        holders = self._holders()
+        self.vertex_places = {name: places[0] for name, places in holders.items()}
+        self.common = tuple(places[0] for places in holders.values() if len(places) > 1)
+        self._own = self._own_vertices(holders)
+        self.layout = cache(self._layout)
 
-    def slot(self, place: Place, spacing: float) -> Vector:
-        """Return where a place is [m; target's frame], ``spacing`` = d_ir [m] along the queue.
+    def slot(self, place: Place, agents: int) -> Slot | None:
+        """Return where a place is in a team of that size; None for a place that there is not.
 
-        By arc length, s = rank * d_ir (E13); never by the chord.
+        On an open queue a place is where it is, whatever the size of the team.
         """
-        return self.queues[place.queue].point(place.rank * spacing)
-
-    def holds(self, place: Place) -> bool:
-        """Whether this is a place of the formation, and its first name."""
-        if not 0 <= place.queue < len(self.queues) or place.rank < 0:
-            return False
-        return place.rank >= self.queues[place.queue].first_rank or place in self.common
+        found = self.layout(agents).slots.get(place)
+        if found is not None:
+            return found
+        if not 0 <= place.queue < len(self.queues) or place.rank < 1:
+            return None
+        if self.queues[place.queue].closed:
+            return None
+        return self._slot(place.queue, self.queues[place.queue].members(place.rank)[-1])
 
     def divide(self, agents: int) -> tuple[int, ...]:
         """Return how many agents each queue gets besides the common ones of shared vertices.
 
-        Largest remainder over the capacities, ties to the queue named first (E16).
+        Largest remainder over the capacities, ties to the queue named first (E16). What a closed
+        queue cannot hold goes to those that can.
         """
-        free = max(0, agents - len(self.common))
-        quotas = [queue.capacity * free for queue in self.queues]
-        counts = [int(quota + 1e-9) for quota in quotas]
-        order = sorted(range(len(quotas)), key=lambda j: (-round(quotas[j] - counts[j], 9), j))
-        for j in order[: free - sum(counts)]:
-            counts[j] += 1
+        left = max(0, agents - len(self.common))
+        counts = [0] * len(self.queues)
+        while left:
+            free = [j for j in range(len(counts)) if counts[j] < self._most(j)]
+            if not free:
+                break
+            for j, share in zip(free, self._shares(free, left), strict=True):
+                taken = int(min(share, self._most(j) - counts[j]))
+                counts[j] += taken
+                left -= taken
         return tuple(counts)
 
-    def _places(self, agents: int) -> tuple[Place, ...]:
-        """Return the places that ``agents`` agents fill: vertices first, then rank by rank."""
+    def check(self, agents: int, least_m: float) -> None:
+        """Raise FormationError unless such a team can stand in it, ``least_m`` [m] apart."""
+        layout = self._checked_layout(agents)
+        if layout.unplaced:
+            raise FormationError(
+                "queue",
+                f"all queues are closed and full: {layout.unplaced} of {agents} agents find no "
+                "place; allowed is one open queue, or fewer agents",
+            )
+        for j, wanted in enumerate(
+            self._shares(range(len(self.queues)), agents - len(self.common))
+        ):
+            if wanted > self._most(j):
+                raise FormationError(
+                    f"queue {self.queues[j].name!r}",
+                    f"its capacity asks for {wanted} members, {self._most(j):g} fit",
+                )
+        _check_apart(layout, self.queues, least_m)
+
+    def _checked_layout(self, agents: int) -> Layout:
+        try:
+            return self.layout(agents)
+        except (CurveError, ExpressionError) as error:
+            raise FormationError("queue", str(error)) from error
+
+    def _layout(self, agents: int) -> Layout:
         counts = self.divide(agents)
-        own = [
-            Place(j, queue.first_rank + k)
-            for j, queue in enumerate(self.queues)
-            for k in range(counts[j])
-        ]
-        return (*self.common[:agents], *sorted(own, key=lambda place: (place.rank, place.queue)))
+        ordered = [(0, 0, place) for place in self.common[:agents]]
+        slots: dict[Place, Slot] = {}
+        for j, queue in enumerate(self.queues):
+            own = self._own[j][: counts[j]]
+            members = queue.members(counts[j] - len(own))
+            first = len(queue.stations)
+            ordered += [(0, 1, place) for place in own]
+            ordered += [(1 + k, j, Place(j, first + k)) for k in range(len(members))]
+            for k, s in enumerate(members):
+                slots[Place(j, first + k)] = self._slot(j, s)
+        for _, _, place in ordered:
+            if place not in slots:
+                slots[place] = self._slot(
+                    place.queue, self.queues[place.queue].stations[place.rank]
+                )
+        ordered.sort()
+        places = tuple(place for _, _, place in ordered)
+        return Layout(places, slots, agents - len(places))
+
+    def _slot(self, queue: int, s: float) -> Slot:
+        where = self.queues[queue]
+        try:
+            return Slot(where.point(s), s, where.attitude(s))
+        except OrientationError as error:
+            key = f"queue {where.name!r}, orientation.{error.key}"
+            raise FormationError(key, str(error)) from error
+        except (CurveError, ExpressionError) as error:
+            raise FormationError(f"queue {where.name!r}, shape", str(error)) from error
+
+    def _holders(self) -> dict[str, list[Place]]:
+        """Return for each vertex its places, one in each queue that passes through it."""
+        holders: dict[str, list[Place]] = {}
+        for j, names in enumerate(self._vertices_of):
+            for rank, name in enumerate(names):
+                holders.setdefault(name, []).append(Place(j, rank))
+        return holders
+
+    def _own_vertices(self, holders: dict[str, list[Place]]) -> list[list[Place]]:
+        """Return for each queue the places of those vertices that no other queue passes."""
+        own: list[list[Place]] = [[] for _ in self._vertices_of]
+        for places in holders.values():
+            if len(places) == 1:
+                own[places[0].queue].append(places[0])
+        return [sorted(places) for places in own]
+
+    def _most(self, queue: int) -> float:
+        """Return how many agents a queue can hold besides the common ones."""
+        room = self.queues[queue].room
+        return inf if room is None else len(self._own[queue]) + room
+
+    def _shares(self, among: list[int] | range, agents: int) -> list[int]:
+        """Return the largest-remainder division of agents among some of the queues."""
+        total = sum(self.capacities[j] for j in among)
+        quotas = [self.capacities[j] / total * agents for j in among]
+        counts = [int(quota + 1e-9) for quota in quotas]
+        order = sorted(range(len(quotas)), key=lambda i: (-round(quotas[i] - counts[i], 9), i))
+        for i in order[: agents - sum(counts)]:
+            counts[i] += 1
+        return counts
+
+
+def _queue(table: QueueSpec, vertices: dict[str, Vector], spacing: float) -> Queue:
+    """Return a queue's geometry, or raise FormationError naming the queue."""
+    through = [vertices[name] for name in table.vertices]
+    label = f"queue {table.name!r}"
+    if table.shape is None and len(through) == 1:
+        raise FormationError(f"{label}, shape", "an open queue needs a shape")
+    try:
+        shape = shape_of(table.shape) if table.shape is not None else Straight(through)
+        orientation = Orientation(table.orientation) if table.orientation is not None else None
+        return Queue(table.name, through, shape, spacing, orientation)
+    except (ShapeError, OrientationError, QueueError) as error:
+        part = {ShapeError: "shape", OrientationError: "orientation"}.get(type(error))
+        key = ".".join(each for each in (part, error.key) if each)
+        raise FormationError(f"{label}, {key}", str(error)) from error
+    except (CurveError, ExpressionError) as error:
+        raise FormationError(f"{label}, shape", str(error)) from error
 
 
 def _check_names(spec: FormationSpec) -> None:
@@ -146,10 +250,12 @@ def _check_names(spec: FormationSpec) -> None:
                 raise FormationError(
                     f"queue[{index}].vertices", f"no vertex {vertex!r}; there are {known}"
                 )
+        if len(set(queue.vertices)) < len(queue.vertices):
+            raise FormationError(f"queue[{index}].vertices", "a vertex is named twice")
     used = {vertex for queue in spec.queue for vertex in queue.vertices}
     for name in spec.vertices:
         if name not in used:
-            raise FormationError(f"vertices.{name}", "no queue starts at it")
+            raise FormationError(f"vertices.{name}", "no queue passes through it")
 
 
 def _capacities(spec: FormationSpec) -> tuple[float, ...]:
@@ -164,8 +270,14 @@ def _capacities(spec: FormationSpec) -> tuple[float, ...]:
     return tuple(share for share in given if share is not None)
 
 
-def _shape(index: int, queue: QueueSpec) -> Shape:
-    try:
-        return shape_of(queue.shape)
-    except ShapeError as error:
-        raise FormationError(f"queue[{index}].shape.{error.key}", str(error)) from error
+def _check_apart(layout: Layout, queues: tuple[Queue, ...], least_m: float) -> None:
+    placed = [(place, layout.slots[place].point) for place in layout.places]
+    for index, (place, point) in enumerate(placed):
+        for other, there in placed[:index]:
+            apart = dist(point, there)
+            if apart < least_m - 1e-9:
+                names = sorted({queues[place.queue].name, queues[other.queue].name})
+                raise FormationError(
+                    f"queue {' and '.join(map(repr, names))}",
+                    f"two of its slots are {apart:.3f} m apart, at least {least_m:g} m is allowed",
+                )

@@ -1,20 +1,27 @@
-"""Shapes of queues, by arc length: S_j of Definition 4.
+"""Shapes of queues: S_j of Definition 4, each a curve by arc length.
 
-A shape starts at the origin; a queue puts that origin on its first vertex. An open shape goes on
-for ever: past its last point it continues straight.
+A shape starts at the origin; a queue puts that origin on its first vertex. A shape that ends goes
+on straight, in the direction it had: an open queue never ends.
 """
 
-import itertools
-from bisect import bisect_right
-from math import sqrt
-from typing import Annotated, Protocol
+from collections.abc import Callable
+from itertools import pairwise
+from math import cos, dist, hypot, pi, radians, sin
+from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta
 
 from agent.messages import Metres, Vector
+from agent.qstructure.curve import CurveError, Walk
+from agent.qstructure.expression import Expression, ExpressionError
 
 Triple = tuple[Metres, Metres, Metres]
+Length = Annotated[float, Meta(gt=0, le=1e4)]
+Degrees = Annotated[float, Meta(ge=-1e4, le=1e4)]
+Points = Annotated[tuple[Triple, ...], Meta(min_length=2, max_length=256)]
+Text = Annotated[str, Meta(min_length=1, max_length=300)]
+AHEAD_M = 1e-4
 
 
 class ShapeError(ValueError):
@@ -25,67 +32,211 @@ class ShapeError(ValueError):
         self.key = key
 
 
-class Ray(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="ray", tag_field="kind"):
+class _Spec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind"):
+    """A shape's table; ``kind`` says which."""
+
+
+class Ray(_Spec, frozen=True, tag="ray"):
     """A straight line from the vertex on. ``direction`` need not be of unit length."""
 
     direction: Triple
 
 
-class Polyline(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="polyline", tag_field="kind"
-):
+class Polyline(_Spec, frozen=True, tag="polyline"):
     """Straight pieces from point to point [m], shifted so that the first lies on the vertex."""
 
-    points_m: Annotated[tuple[Triple, ...], Meta(min_length=2, max_length=256)]
+    points_m: Points
 
 
-ShapeSpec = Ray | Polyline
+class Arc(_Spec, frozen=True, tag="arc"):
+    """A level arc: it leaves the vertex towards ``heading_deg``, and turns left for a sweep > 0."""
+
+    radius_m: Length
+    sweep_deg: Annotated[float, Meta(ge=-360, le=360)]
+    heading_deg: Degrees = 0.0
 
 
-class Shape(Protocol):
-    """A curve by arc length."""
+class Helix(_Spec, frozen=True, tag="helix"):
+    """A left-turning helix about a vertical axis; ``pitch_m`` is its climb per turn, signed."""
+
+    radius_m: Length
+    pitch_m: Metres
+    heading_deg: Degrees = 0.0
+
+
+class Spline(_Spec, frozen=True, tag="spline"):
+    """A smooth curve through points [m] (Catmull-Rom, centripetal), shifted like a polyline."""
+
+    points_m: Points
+
+
+class Curve(_Spec, frozen=True, tag="curve"):
+    """Expressions in s >= 0 [m], shifted so that s = 0 lies on the vertex."""
+
+    x: Text
+    y: Text
+    z: Text
+
+
+ShapeSpec = Ray | Polyline | Arc | Helix | Spline | Curve
+
+
+class Shape:
+    """A curve by arc length. ``end`` [m]: where it goes over into its straight continuation."""
+
+    def __init__(self, walk: Walk, *, endless: bool) -> None:
+        self._walk = walk
+        self.end = float("inf") if endless else walk.length()
+        self._origin = walk.point(0.0)
 
     def point(self, s: float) -> Vector:
         """Return the point at arc length s >= 0 [m] from the vertex, relative to it [m]."""
+        x, y, z = self._walk.point(min(s, self.end))
+        beyond = max(0.0, s - self.end)
+        if beyond:
+            u, v, w = self._last_direction()
+            x, y, z = x + beyond * u, y + beyond * v, z + beyond * w
+        return (x - self._origin[0], y - self._origin[1], z - self._origin[2])
+
+    def _last_direction(self) -> Vector:
+        here, before = self._walk.point(self.end), self._walk.point(self.end - AHEAD_M)
+        return _unit(before, here)
 
 
-class _Pieces:
-    """Straight pieces; the last one goes on for ever."""
+class Straight:
+    """Straight pieces; the last one goes on for ever, past ``end`` [m]."""
 
     def __init__(self, corners: list[Vector]) -> None:
         self._corners = corners
-        self._units: list[Vector] = []
         self._starts = [0.0]
-        for a, b in itertools.pairwise(corners):
-            step = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
-            length = _length(step)
-            self._units.append((step[0] / length, step[1] / length, step[2] / length))
-            self._starts.append(self._starts[-1] + length)
+        for a, b in pairwise(corners):
+            self._starts.append(self._starts[-1] + dist(a, b))
+        self._units = [_unit(a, b) for a, b in pairwise(corners)]
+        self.end = self._starts[-1]
 
     def point(self, s: float) -> Vector:
-        piece = min(max(bisect_right(self._starts, s) - 1, 0), len(self._units) - 1)
-        corner, unit = self._corners[piece], self._units[piece]
-        along = s - self._starts[piece]
+        """Return the point at arc length s >= 0 [m] from the first corner, relative to it [m]."""
+        piece = 0
+        while piece < len(self._units) - 1 and s >= self._starts[piece + 1]:
+            piece += 1
+        corner, unit, along = self._corners[piece], self._units[piece], s - self._starts[piece]
+        origin = self._corners[0]
         return (
-            corner[0] + along * unit[0],
-            corner[1] + along * unit[1],
-            corner[2] + along * unit[2],
+            corner[0] - origin[0] + along * unit[0],
+            corner[1] - origin[1] + along * unit[1],
+            corner[2] - origin[2] + along * unit[2],
         )
 
 
-def shape_of(spec: ShapeSpec) -> Shape:
+def shape_of(spec: ShapeSpec) -> Shape | Straight:
     """Return the curve that a shape's table describes, or raise :class:`ShapeError`."""
-    if isinstance(spec, Ray):
-        if _length(spec.direction) < 1e-9:
-            raise ShapeError("direction", "must not be of zero length")
-        return _Pieces([(0.0, 0.0, 0.0), spec.direction])
-    first = spec.points_m[0]
-    corners = [(p[0] - first[0], p[1] - first[1], p[2] - first[2]) for p in spec.points_m]
-    for index, (a, b) in enumerate(itertools.pairwise(corners)):
-        if _length((b[0] - a[0], b[1] - a[1], b[2] - a[2])) < 1e-9:
+    try:
+        return _MAKERS[type(spec)](spec)
+    except (CurveError, ExpressionError) as error:
+        raise ShapeError("", str(error)) from error
+
+
+def _ray(spec: Ray) -> Straight:
+    if hypot(*spec.direction) < 1e-9:
+        raise ShapeError("direction", "must not be of zero length")
+    return Straight([(0.0, 0.0, 0.0), spec.direction])
+
+
+def _polyline(spec: Polyline) -> Straight:
+    _check_points(spec.points_m)
+    return Straight(list(spec.points_m))
+
+
+def _arc(spec: Arc) -> Shape:
+    if spec.sweep_deg == 0.0:
+        raise ShapeError("sweep_deg", "must not be 0; a straight queue is a ray")
+    sweep, heading = radians(spec.sweep_deg), radians(spec.heading_deg)
+    side = 1.0 if sweep > 0.0 else -1.0
+
+    def at(angle: float) -> Vector:
+        radius, turned = side * spec.radius_m, heading + side * angle
+        return (radius * (sin(turned) - sin(heading)), radius * (cos(heading) - cos(turned)), 0.0)
+
+    return Shape(Walk(at, abs(sweep)), endless=False)
+
+
+def _helix(spec: Helix) -> Shape:
+    heading = radians(spec.heading_deg)
+
+    def at(angle: float) -> Vector:
+        x = spec.radius_m * (sin(heading + angle) - sin(heading))
+        y = spec.radius_m * (cos(heading) - cos(heading + angle))
+        return (x, y, spec.pitch_m * angle / (2.0 * pi))
+
+    return Shape(Walk(at), endless=True)
+
+
+def _spline(spec: Spline) -> Shape:
+    _check_points(spec.points_m)
+    return Shape(Walk(_catmull_rom(spec.points_m), len(spec.points_m) - 1.0), endless=False)
+
+
+def _curve(spec: Curve) -> Shape:
+    parts = []
+    for key in ("x", "y", "z"):
+        try:
+            parts.append(Expression(getattr(spec, key), "s"))
+        except ExpressionError as error:
+            raise ShapeError(key, str(error)) from error
+    x, y, z = parts
+    return Shape(Walk(lambda s: (x(s), y(s), z(s))), endless=True)
+
+
+_MAKERS: dict[type, Callable[[Any], Shape | Straight]] = {
+    Ray: _ray,
+    Polyline: _polyline,
+    Arc: _arc,
+    Helix: _helix,
+    Spline: _spline,
+    Curve: _curve,
+}
+
+
+def _check_points(points: tuple[Vector, ...]) -> None:
+    for index, (a, b) in enumerate(pairwise(points)):
+        if dist(a, b) < 1e-9:
             raise ShapeError("points_m", f"points {index} and {index + 1} must not coincide")
-    return _Pieces(corners)
 
 
-def _length(v: Vector) -> float:
-    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+def _catmull_rom(points: tuple[Vector, ...]) -> Callable[[float], Vector]:
+    """Return the centripetal Catmull-Rom spline; parameter k is at point k.
+
+    Its knots follow from the square root of the distances, which keeps it free of loops; the two
+    outer pieces see their last point mirrored.
+    """
+    first = _mirrored(points[1], points[0])
+    last = _mirrored(points[-2], points[-1])
+    padded = (first, *points, last)
+
+    def at(parameter: float) -> Vector:
+        piece = min(int(parameter), len(points) - 2)
+        p0, p1, p2, p3 = padded[piece : piece + 4]
+        t0, t1 = 0.0, dist(p0, p1) ** 0.5
+        t2 = t1 + dist(p1, p2) ** 0.5
+        t3 = t2 + dist(p2, p3) ** 0.5
+        t = t1 + (parameter - piece) * (t2 - t1)
+        a1, a2, a3 = _mix(p0, p1, t0, t1, t), _mix(p1, p2, t1, t2, t), _mix(p2, p3, t2, t3, t)
+        b1, b2 = _mix(a1, a2, t0, t2, t), _mix(a2, a3, t1, t3, t)
+        return _mix(b1, b2, t1, t2, t)
+
+    return at
+
+
+def _mix(a: Vector, b: Vector, at_a: float, at_b: float, t: float) -> Vector:
+    """Return the point on the line through a and b that belongs to t."""
+    w = (t - at_a) / (at_b - at_a)
+    return (a[0] + w * (b[0] - a[0]), a[1] + w * (b[1] - a[1]), a[2] + w * (b[2] - a[2]))
+
+
+def _mirrored(a: Vector, about: Vector) -> Vector:
+    return (2.0 * about[0] - a[0], 2.0 * about[1] - a[1], 2.0 * about[2] - a[2])
+
+
+def _unit(a: Vector, b: Vector) -> Vector:
+    length = dist(a, b)
+    return ((b[0] - a[0]) / length, (b[1] - a[1]) / length, (b[2] - a[2]) / length)

@@ -156,11 +156,12 @@ def bobber_cycles_reach_the_target() -> None:
 
 def slots_stand_by_arc_length() -> None:
     """E13: neighbouring slots are d_ir apart along the queue, round corners too."""
-    formation = Formation(ZIGZAG)
     for spacing in (0.7, 1.0):
+        formation = Formation(ZIGZAG, spacing)
+        slots = formation.layout(7).slots
         for rank in range(1, 7):
-            end = formation.slot(Place(0, rank), spacing)
-            walked, before = 0.0, formation.slot(Place(0, rank - 1), spacing)
+            end = slots[Place(0, rank)].point
+            walked, before = 0.0, slots[Place(0, rank - 1)].point
             s = (rank - 1) * spacing
             while dist(before, end) > 2e-4 and walked < 3.0 * spacing:
                 s += 1e-4
@@ -172,9 +173,10 @@ def slots_stand_by_arc_length() -> None:
 
 def everybody_gets_a_slot_of_their_own() -> None:
     """E16: a shared vertex has one agent; no two of a team's slots coincide."""
-    formation = Formation(WEDGE)
+    formation = Formation(WEDGE, 1.0)
     for agents in range(1, 40):
-        slots = [formation.slot(place, 1.0) for place in formation.places(agents)]
+        layout = formation.layout(agents)
+        slots = [layout.slots[place].point for place in layout.places]
         assert len(slots) == agents
         for index, slot in enumerate(slots):
             assert all(dist(slot, other) > 0.5 for other in slots[:index]), (agents, slot)

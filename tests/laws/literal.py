@@ -78,24 +78,25 @@ def bobber(q, yaw, q_toq, zone):
     return best
 
 
-def slot_by_chord(self, place, spacing):
+def members_by_chord(self, count):
     """Algorithm 1, line 18: the next point of the queue at the straight distance d_ir."""
-    queue = self.queues[place.queue]
-    s = 0.0
-    for _ in range(place.rank):
-        before = queue.point(s)
+    s, placed = 0.0, []
+    for _ in range(count):
+        before = self.point(s)
         s += STEP_M
-        while dist(queue.point(s), before) < spacing:
+        while dist(self.point(s), before) < self._spacing:
             s += STEP_M
-    return queue.point(s)
+        placed.append(s)
+    return placed
 
 
-def places_queue_by_queue(self, agents):
+def holders_queue_by_queue(self):
     """Algorithm 1, line 15 in each queue by itself: its first agent takes the vertex."""
-    counts = [agents // len(self.queues)] * len(self.queues)
-    for extra in range(agents % len(self.queues)):
-        counts[extra] += 1
-    return tuple(Place(j, k) for j, count in enumerate(counts) for k in range(count))
+    return {
+        f"{name} of {j}": [Place(j, rank)]
+        for j, names in enumerate(self._vertices_of)
+        for rank, name in enumerate(names)
+    }
 
 
 def allot_by_distance(team, places, slots):

@@ -6,6 +6,7 @@ from agent.comms import allocation
 from agent.guidance import bobber as bobber_room
 from agent.guidance.potential import Potential
 from agent.qstructure.formation import Formation
+from agent.qstructure.queue import Queue
 from tests.laws import literal
 from tests.laws.laws import LAWS
 
@@ -28,8 +29,8 @@ LITERAL = {
     ),
     "E3 (b)": ("(a)-(e)", Potential, {"slope": literal.slope_two_sided}),
     "E7": ("E7", bobber_room, {"bobber": literal.bobber}),
-    "E13": ("E13", Formation, {"slot": literal.slot_by_chord}),
-    "E16": ("E16", Formation, {"_places": literal.places_queue_by_queue}),
+    "E13": ("E13", Queue, {"_behind": literal.members_by_chord}),
+    "E16": ("E16", Formation, {"_holders": literal.holders_queue_by_queue}),
     "E17": ("E17", allocation, {"allot": literal.allot_by_distance}),
 }
 

@@ -47,15 +47,14 @@ class Expectation:
 class Phase:
     """The time of one formation, and how the team came into it."""
 
-    def __init__(self, formation: Formation, spacing: float, from_s: float) -> None:
+    def __init__(self, formation: Formation, from_s: float) -> None:
         self.formation = formation
         self.from_s = from_s
         self.converge_s: float | None = None
         self.residual_m: float | None = None
-        self._spacing = spacing
         self._frame = Frame()
         self._since_s: float | None = None
-        self._slots: dict[tuple[int, int], Vector] = {}
+        self._slots: dict[tuple[int, int, int], Vector | None] = {}
 
     def slot_error(self, tick: Tick) -> Floats:
         """Return each agent's distance to the slot it claims [m]; infinite without a valid one.
@@ -65,24 +64,25 @@ class Phase:
         error = np.full(len(tick.place), np.inf)
         claims = [(queue, rank) for queue, rank in tick.place.tolist()]
         holders = Counter(claim for claim, alive in zip(claims, tick.alive, strict=True) if alive)
-        rows = [
-            row
+        team = int(np.sum(tick.alive))
+        stands = {
+            row: slot
             for row, claim in enumerate(claims)
-            if holders[claim] <= 1 and self.formation.holds(Place(*claim))
-        ]
-        if rows:
-            off = tick.position[rows].astype(np.float64)
-            off -= np.array([self._slot(claims[row]) for row in rows])
+            if holders[claim] <= 1 and (slot := self._slot(*claim, team)) is not None
+        }
+        if stands:
+            rows = list(stands)
+            off = tick.position[rows].astype(np.float64) - np.array(list(stands.values()))
             error[rows] = np.sqrt(np.sum(off * off, axis=1))
         error[np.isnan(tick.position[:, 0])] = np.nan
         return error
 
-    def _slot(self, claim: tuple[int, int]) -> Vector:
-        slot = self._slots.get(claim)
-        if slot is None:
-            slot = self._frame.to_world(self.formation.slot(Place(*claim), self._spacing))
-            self._slots[claim] = slot
-        return slot
+    def _slot(self, queue: int, rank: int, team: int) -> Vector | None:
+        key = (queue, rank, team)
+        if key not in self._slots:
+            slot = self.formation.slot(Place(queue, rank), team)
+            self._slots[key] = self._frame.to_world(slot.point) if slot is not None else None
+        return self._slots[key]
 
     def see(self, time_s: float, error: Floats) -> bool:
         """Take the living agents' slot errors [m] at a tick; return whether all are in place."""
@@ -105,8 +105,8 @@ class Judge:
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        self._formation = Formation(scenario.formation)
-        self.phases = [Phase(self._formation, scenario.control.spacing_m, 0.0)]
+        self._formation = Formation(scenario.formation, scenario.control.spacing_m)
+        self.phases = [Phase(self._formation, 0.0)]
         self.ticks = 0
         self.min_separation_m: float | None = None
         self.separation_violations = 0

@@ -1,13 +1,14 @@
 """What stands still in a recording: styles, names, the formation, the scenario's text."""
 
 from collections.abc import Iterator
+from math import ceil
 from typing import Any
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from agent.messages import Place
+from agent.messages import Vector
 from agent.qstructure.formation import Formation
 from agent.qstructure.frame import Frame
 from worldsim.judge.verdict import CONVERGED_M
@@ -15,6 +16,7 @@ from worldsim.scenario import Scenario, dump
 from worldsim.show import layout, palette
 
 TRAIL_RADIUS_M = 0.018
+DRAWN_EVERY_M = 0.05
 TARGET_RADIUS_M = 0.035
 
 
@@ -28,8 +30,12 @@ class Scenery:
         self._scenario = scenario
         self._formation = formation
         self._frame = Frame()
-        self._places = formation.places(scenario.fleet.agents)
-        self.slots: NDArray[np.float64] = np.array([self._slot(place) for place in self._places])
+        filled = formation.layout(scenario.fleet.agents)
+        self._places = filled.places
+        self._stands = {place: slot.arc_length for place, slot in filled.slots.items()}
+        self.slots: NDArray[np.float64] = np.array(
+            [self._frame.to_world(filled.slots[place].point) for place in self._places]
+        )
 
     def lasting(self) -> Iterator[tuple[str, list[Any]]]:
         """Return what holds for the whole run, entity by entity."""
@@ -84,12 +90,16 @@ class Scenery:
         strips = []
         queues = np.arange(len(self._formation.queues))
         for index in queues.tolist():
-            last = max((place.rank for place in self._places if place.queue == index), default=0)
-            strips.append([self._slot(Place(index, rank)) for rank in range(last + 1)])
+            strips.append(self._edge(index))
         return strips, palette.faint(palette.QUEUES[queues % len(palette.QUEUES)], 90)
 
-    def _slot(self, place: Place) -> tuple[float, float, float]:
-        return self._frame.to_world(self._formation.slot(place, self._scenario.control.spacing_m))
+    def _edge(self, index: int) -> list[Vector]:
+        """Return a queue's curve from its first vertex to its last slot, drawn every 5 cm."""
+        queue = self._formation.queues[index]
+        ends = [s for place, s in self._stands.items() if place.queue == index]
+        end = max([*queue.stations, *ends])
+        steps = max(1, ceil(end / DRAWN_EVERY_M))
+        return [self._frame.to_world(queue.point(end * k / steps)) for k in range(steps + 1)]
 
 
 def _reference(lines: int) -> rr.SeriesLines:

@@ -1,0 +1,95 @@
+"""Curves by arc length: whatever parameter a curve is written in, slots stand by metres along it.
+
+The curve is walked once, in pieces of at most a centimetre, as far as somebody asks; a table then
+answers which parameter belongs to an arc length. The walk halves its step where the curve is fast
+or bends, so a jump shows as a step that no halving makes short.
+"""
+
+from bisect import bisect_right
+from collections.abc import Callable
+from math import dist, inf
+
+from agent.messages import Vector
+
+PIECE_M = 0.01
+BEND_M = 1e-5
+LEAST_STEP = 1e-10
+GREATEST_STEP = 0.5
+STANDSTILL_STEPS = 2000
+STANDSTILL_M = 1e-6
+
+
+class CurveError(ValueError):
+    """A curve that cannot be walked: it jumps, stands still, or ends too soon."""
+
+
+class Walk:
+    """A curve, walked from parameter 0 on.
+
+    at: the curve by its parameter [m]; ends: the last parameter there is.
+    """
+
+    def __init__(self, at: Callable[[float], Vector], ends: float = inf) -> None:
+        self._at = at
+        self._ends = ends
+        self._parameters = [0.0]
+        self._lengths = [0.0]
+        self._here = at(0.0)
+        self._step = 1e-3
+
+    def reaches(self, s: float) -> bool:
+        """Walk on, and return whether the curve is at least that long [m]."""
+        while self._lengths[-1] < s:
+            if self._parameters[-1] >= self._ends:
+                return False
+            self._walk_on()
+        return True
+
+    def length(self) -> float:
+        """Return the whole length of a curve that ends [m]."""
+        self.reaches(inf)
+        return self._lengths[-1]
+
+    def parameter(self, s: float) -> float:
+        """Return the parameter at arc length s [m], or raise CurveError past the curve's end."""
+        if not self.reaches(s):
+            raise CurveError(f"it is only {self._lengths[-1]:.3f} m long")
+        upper = min(max(bisect_right(self._lengths, s), 1), len(self._lengths) - 1)
+        if upper == 0:
+            return 0.0
+        low, high = self._lengths[upper - 1], self._lengths[upper]
+        share = (s - low) / (high - low) if high > low else 0.0
+        before, after = self._parameters[upper - 1], self._parameters[upper]
+        return before + share * (after - before)
+
+    def point(self, s: float) -> Vector:
+        """Return the point at arc length s [m]."""
+        return self._at(self.parameter(s))
+
+    def _walk_on(self) -> None:
+        """Add one piece, of a length that the table can be straight between."""
+        start = self._parameters[-1]
+        while True:
+            step = min(self._step, self._ends - start)
+            middle, end = self._at(start + 0.5 * step), self._at(start + step)
+            piece = dist(self._here, middle) + dist(middle, end)
+            if piece <= PIECE_M and piece - dist(self._here, end) <= BEND_M:
+                break
+            self._step = 0.5 * step
+            if self._step < LEAST_STEP:
+                raise CurveError(f"it jumps near {start:.6g}: a pole?")
+        self._parameters.append(start + step)
+        self._lengths.append(self._lengths[-1] + piece)
+        self._here = end
+        if piece < 0.4 * PIECE_M:
+            self._step = min(2.0 * step, GREATEST_STEP) if step == self._step else self._step
+        self._check_progress()
+
+    def _check_progress(self) -> None:
+        if len(self._lengths) <= STANDSTILL_STEPS:
+            return
+        if self._lengths[-1] - self._lengths[-STANDSTILL_STEPS] < STANDSTILL_M:
+            raise CurveError(
+                f"it stands still from {self._parameters[-STANDSTILL_STEPS]:.6g} on, "
+                f"{self._lengths[-1]:.3f} m from its start"
+            )

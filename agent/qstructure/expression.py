@@ -1,0 +1,80 @@
+"""Expressions in one variable, as formation files write them: ``"2*cos(s)"``, ``"5*d"``.
+
+Parsed by simpleeval, which walks the syntax tree and cannot run code; of its operators only
+arithmetic is left.
+"""
+
+import ast
+import math
+import operator
+from typing import Any
+
+from simpleeval import InvalidExpression, SimpleEval, safe_power
+
+MAX_LENGTH = 300
+OPERATORS: dict[type[ast.AST], Any] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: safe_power,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
+FUNCTIONS = {
+    name: getattr(math, name)
+    for name in (
+        *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh"),
+        *("sqrt", "exp", "log", "hypot", "floor", "ceil", "degrees", "radians"),
+    )
+} | {"abs": abs, "min": min, "max": max}
+CONSTANTS = {"pi": math.pi, "e": math.e, "tau": math.tau}
+
+
+class ExpressionError(ValueError):
+    """An expression that is none, or that has no finite value somewhere."""
+
+
+class Expression:
+    """A function of one variable. Raises ExpressionError if the text cannot be parsed."""
+
+    def __init__(self, text: str, variable: str) -> None:
+        self.text = text
+        self.variable = variable
+        self._evaluator = SimpleEval(
+            operators=OPERATORS, functions=FUNCTIONS, names={**CONSTANTS, variable: 0.0}
+        )
+        if len(text) > MAX_LENGTH:
+            raise ExpressionError(f"longer than {MAX_LENGTH} characters")
+        try:
+            self._tree = self._evaluator.parse(text.strip())
+        except (SyntaxError, InvalidExpression, ValueError) as error:
+            raise ExpressionError(f"{text!r} is no expression in {variable}") from error
+        self._check_names()
+
+    def __call__(self, value: float) -> float:
+        """Return the value there, or raise ExpressionError where there is no finite one."""
+        self._evaluator.names[self.variable] = value
+        try:
+            result = self._evaluator.eval(self.text, previously_parsed=self._tree)
+        except (ArithmeticError, ValueError, TypeError) as error:
+            raise ExpressionError(f"{self._at(value)}: {error}") from error
+        except InvalidExpression as error:
+            raise ExpressionError(f"{self.text!r}: {error}") from error
+        if isinstance(result, bool | complex) or not isinstance(result, int | float):
+            raise ExpressionError(f"{self._at(value)} is no real number")
+        if not math.isfinite(result):
+            raise ExpressionError(f"{self._at(value)} is not finite")
+        return float(result)
+
+    def _at(self, value: float) -> str:
+        return f"{self.text!r} at {self.variable} = {value:g}"
+
+    def _check_names(self) -> None:
+        known = {*CONSTANTS, *FUNCTIONS, self.variable}
+        for node in ast.walk(self._tree):
+            if isinstance(node, ast.Name) and node.id not in known:
+                raise ExpressionError(
+                    f"{self.text!r}: {node.id!r} is unknown; there are {self.variable}, "
+                    f"{', '.join(CONSTANTS)} and functions like sin, sqrt, min"
+                )

@@ -1,0 +1,65 @@
+"""Orientation along a queue: O_j of Definition 4, angles as functions of the arc length."""
+
+from math import radians
+from typing import Annotated, NamedTuple
+
+import msgspec
+from msgspec import Meta
+
+from agent.qstructure.expression import Expression, ExpressionError
+
+Angle = Annotated[float, Meta(ge=-1e4, le=1e4)] | Annotated[str, Meta(min_length=1, max_length=300)]
+ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
+
+
+class OrientationSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Angles [deg] as expressions in d, the arc length from the first vertex [m]; or numbers.
+
+    What is left out is free. Yaw is counted in the target's frame.
+    """
+
+    yaw_deg: Angle | None = None
+    pitch_deg: Angle | None = None
+    roll_deg: Angle | None = None
+
+
+class Attitude(NamedTuple):
+    """Yaw, pitch and roll wanted [rad], each None where it is free."""
+
+    yaw: float | None = None
+    pitch: float | None = None
+    roll: float | None = None
+
+
+FREE = Attitude()
+
+
+class OrientationError(ValueError):
+    """An angle that cannot be computed; ``key`` says which."""
+
+    def __init__(self, key: str, detail: str) -> None:
+        super().__init__(detail)
+        self.key = key
+
+
+class Orientation:
+    """Angles along a queue. Raises OrientationError for an expression that is none."""
+
+    def __init__(self, spec: OrientationSpec) -> None:
+        self._angles: list[Expression | None] = []
+        for key in ANGLES:
+            given = getattr(spec, key)
+            try:
+                self._angles.append(None if given is None else Expression(str(given), "d"))
+            except ExpressionError as error:
+                raise OrientationError(key, str(error)) from error
+
+    def at(self, d: float) -> Attitude:
+        """Return the attitude at arc length d [m], or raise OrientationError."""
+        angles: list[float | None] = []
+        for key, angle in zip(ANGLES, self._angles, strict=True):
+            try:
+                angles.append(None if angle is None else radians(angle(d)))
+            except ExpressionError as error:
+                raise OrientationError(key, str(error)) from error
+        return Attitude(*angles)
