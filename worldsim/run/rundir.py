@@ -72,11 +72,10 @@ class RunDirectory:
 def make_folder(path: Path | None, name: str) -> Path:
     """Make a new folder, ``runs/<name>-<UTC time>`` for None. Raises RunDirectoryError."""
     chosen = path if path is not None else _named_after_now(name)
+    if chosen.exists():
+        raise RunDirectoryError(chosen, "exists; a run is never overwritten")
     try:
-        chosen.parent.mkdir(parents=True, exist_ok=True)
-        chosen.mkdir()
-    except FileExistsError:
-        raise RunDirectoryError(chosen, "exists; a run is never overwritten") from None
+        chosen.mkdir(parents=True)
     except OSError as error:
         raise RunDirectoryError(chosen, f"cannot be made: {_reason(error)}") from error
     return chosen
