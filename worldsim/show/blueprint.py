@@ -12,9 +12,9 @@ from worldsim.show import layout
 
 TRAIL_S = 4.0
 BACKGROUND = (13, 17, 24)
-GRID = (255, 255, 255, 22)
-EYE_FROM = np.array([0.62, -1.0, 0.42])
-EYE_DISTANCE = 1.75
+GRID = (38, 46, 60)
+EYE_FROM = np.array([-0.8, -1.0, 0.5])
+EYE_DISTANCE = 1.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ def stage_of(scenario: Scenario, slots: NDArray[np.float64]) -> Stage:
     """Return the ball around a scenario's start and its formation's slots (N, 3) [m; world]."""
     points = np.vstack([_start_corners(scenario), slots])
     low, high = points.min(axis=0), points.max(axis=0)
-    return Stage((low + high) / 2.0, max(float(np.linalg.norm(high - low)) / 2.0, 1.0))
+    return Stage(((low + high) / 2.0 + slots.mean(axis=0)) / 2.0, max(float(np.linalg.norm(high - low)) / 2.0, 1.0))
 
 
 def blueprint_of(stage: Stage) -> rrb.Blueprint:
@@ -42,11 +42,15 @@ def blueprint_of(stage: Stage) -> rrb.Blueprint:
     )
     main = rrb.Vertical(
         _flight(stage),
-        rrb.TextLogView(origin=layout.EVENTS, name="Events"),
+        rrb.TextLogView(
+            origin=layout.EVENTS,
+            name="Events",
+            columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"]),
+        ),
         row_shares=[4, 1],
     )
     return rrb.Blueprint(
-        rrb.Horizontal(main, figures, column_shares=[5, 3]),
+        rrb.Horizontal(main, figures, column_shares=[2, 1]),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=layout.SIM_TIME, playback_speed=1.0),

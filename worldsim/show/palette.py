@@ -21,7 +21,7 @@ QUEUES = np.array(
 SHARED = np.uint32(0xFFD54FFF)
 UNPLACED = np.uint32(0xC8CDD6FF)
 DEAD = np.uint32(0x5A5F69FF)
-LINK = np.uint32(0x8FA3BF38)
+LINK = np.uint32(0x333D4DFF)
 LIMIT = np.uint32(0xFF5252FF)
 
 

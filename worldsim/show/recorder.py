@@ -52,7 +52,7 @@ class RunRecorder:
         self._say = say
         self._working = True
         self._scenario = scenario
-        self._formation = Formation(scenario.formation)
+        self._formation = Formation(scenario.formation, scenario.control.spacing_m)
         shared = np.array(self._formation.common, dtype=np.int16).reshape(-1, 2)
         self._sheets = Sheets(shared, scenario.fleet.tick_hz, limits(scenario))
         self._every = max(1, round(scenario.fleet.tick_hz))
@@ -160,9 +160,11 @@ class RunRecorder:
 def sentence(event: Event) -> str:
     """Return an event as a person reads it: its kind, the agent, and the rest as it stands."""
     agent = "" if event.get("agent") is None else f" a{event['agent']}"
+    kind = event["kind"]
     rest = {key: value for key, value in event.items() if key not in {"t_s", "kind", "agent"}}
-    details = ", ".join(f"{key} {value}" for key, value in rest.items())
-    return f"{event['kind']}{agent}" + (f": {details}" if details else "")
+    words = (f"{value}" if key == kind else f"{key} {value}" for key, value in rest.items())
+    details = ", ".join(words)
+    return f"{kind}{agent}" + (f": {details}" if details else "")
 
 
 def _indexes(times_s: list[float], ticks: list[int]) -> list[rr.TimeColumn]:

@@ -7,7 +7,7 @@ together.
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +59,7 @@ class Verification:
     min_separation_m: Figure = None
     turns_over_limit_fraction: Figure = None
     phases: tuple[PhaseFigures, ...] = ()
+    invariants: dict[str, dict[str, int]] = field(default_factory=dict)
     summary: bool = False
     differences: tuple[Difference, ...] = ()
 
@@ -69,9 +70,14 @@ class Verification:
 
     @property
     def held(self) -> bool:
-        """Whether every expectation held and no figure differs from the summary's."""
-        judged = self.problem is None and self.ticks > 0
-        return judged and all(row.held for row in self.expectations) and not self.differences
+        """Whether the run shows what it must, and no figure differs from the summary's."""
+        return self.shown and not self.differences
+
+    @property
+    def shown(self) -> bool:
+        """Whether every expectation held and no invariant was violated, at one tick or more."""
+        violations = sum(counts["violations"] for counts in self.invariants.values())
+        return self.ticks > 0 and not violations and all(row.held for row in self.expectations)
 
     @property
     def exit_status(self) -> int:
@@ -115,6 +121,7 @@ def _judged(run: Path, recording: Path) -> Verification:
             )
             for phase in judge.phases
         ),
+        invariants=judge.invariants(),
     )
 
 
@@ -134,7 +141,7 @@ def _differences(told: Any, judged: Verification) -> Iterator[Difference]:
         said = _at(told, key)
         if said != shown:
             yield Difference(key, said, shown)
-    if told.get("outcome") == "pass" and not all(row.held for row in judged.expectations):
+    if _at(told, "outcome") == "pass" and not judged.shown:
         yield Difference("outcome", "pass", "fail")
 
 
@@ -144,6 +151,8 @@ def _figures(judged: Verification) -> dict[str, Any]:
         "min_separation_m": judged.min_separation_m,
         "turns_over_limit_fraction": judged.turns_over_limit_fraction,
     }
+    for name, counts in judged.invariants.items():
+        figures[f"invariants.{name}"] = counts
     for index, phase in enumerate(judged.phases):
         for key in ("formation", "from_s", "converged", "converge_s", "residual_m"):
             figures[f"phases.{index}.{key}"] = getattr(phase, key)
