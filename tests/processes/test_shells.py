@@ -9,8 +9,11 @@ from agent.messages import Command, Telemetry
 from netem.messages import Conditions, MediumSetup
 from netem.process import Intake, Lateness
 from netem.wire.frame import MAX_TRANSMISSION_B, Outgoing, Transmission, pack
+from netem.wire.post import RefusedError
+from worldsim.run import muster
 from worldsim.run.lines import Lines
-from worldsim.run.muster import shortened
+from worldsim.run.muster import MusterError, assemble, shortened
+from worldsim.run.outside import ByHand, Conducted, Loss
 from worldsim.run.pace import Pacer, Punctuality
 from worldsim.run.roster import Roster, processes
 from worldsim.run.rundir import RunDirectoryError
@@ -144,3 +147,62 @@ def test_long_lists_of_names_are_shortened() -> None:
     names = [f"agent-{agent}" for agent in range(9)]
     assert shortened(names[:5]) == names[:5]
     assert shortened(names) == [*names[:5], "4 more"]
+
+
+class SparseMuster:
+    """A muster to which some never come, or whose medium refuses."""
+
+    def __init__(self, missing: list[str], refusal: str | None = None) -> None:
+        self._missing = missing
+        self._refusal = refusal
+
+    def instruct_medium(self, speed: float) -> bool:
+        if self._refusal is not None:
+            raise RefusedError(self._refusal)
+        return True
+
+    def instruct_agents(self) -> None:
+        """Nobody asks."""
+
+    def missing(self) -> list[str]:
+        return self._missing
+
+
+def test_a_muster_ends_when_all_are_there_or_nobody_wants_it() -> None:
+    outside = ByHand(list)
+    assert assemble(SparseMuster([]), 1.0, lambda: False, outside)
+    assert not assemble(SparseMuster(["agent-1"]), 1.0, lambda: True, outside)
+
+
+def test_a_muster_says_who_did_not_come(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(muster, "MUSTER_WITHIN_S", 0.05)
+    with pytest.raises(MusterError, match=r"not there within 0\.05 s: agent-1"):
+        assemble(SparseMuster(["agent-1"]), 1.0, lambda: False, ByHand(list))
+
+
+def test_a_muster_says_why_the_medium_refuses() -> None:
+    with pytest.raises(MusterError, match="netem refuses: serves another"):
+        assemble(SparseMuster([], "serves another"), 1.0, lambda: False, ByHand(list))
+
+
+def test_by_hand_the_death_of_the_medium_is_nobody_elses() -> None:
+    news = [["agent-2"], ["agent-0", "netem", "agent-1"]]
+    outside = ByHand(lambda: news.pop(0))
+    assert outside.losses() == [Loss(2)]
+    assert outside.stopped is None
+    assert outside.losses() == []
+    assert outside.stopped == "netem is gone"
+
+
+def test_under_a_launcher_losses_come_by_lines_and_its_end_is_the_end() -> None:
+    near, far = Lines.pair()
+    outside = Conducted(far)
+    near.send(lost=[3, 9, None])
+    outside.wait(5.0)
+    assert outside.losses() == [Loss(3, signal=9)]
+    assert outside.stopped is None
+    near.close()
+    outside.wait(5.0)
+    assert outside.losses() == []
+    assert outside.stopped == "the launcher is gone"
+    far.close()

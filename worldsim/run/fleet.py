@@ -8,6 +8,7 @@ import json
 import os
 import signal
 import socket
+import time
 from typing import Any
 
 from rich.console import Console
@@ -31,6 +32,7 @@ __all__ = ["ProcessRow", "processes", "run"]
 
 NOT_STARTED, UNKNOWN, INTERRUPTED = 2, 3, 130
 LOOK_EVERY_S = 1.0
+PATIENCE_S = 5.0
 LANDING_WITHIN_S = 15.0
 END_WITHIN_S = 3.0
 TAIL_LINES = 5
@@ -82,6 +84,7 @@ class Launch:
         self._world, self._world_end = Lines.pair()
         self._agents: dict[int, int] = {}
         self._missing: list[str] | None = None
+        self._say_missing_at_s = time.monotonic() + PATIENCE_S
         self._landing = False
         self._broken = False
         self._time_s = 0.0
@@ -98,6 +101,7 @@ class Launch:
         self._start()
         while "world" in self._kin.pids and not self._broken:
             self._kin.turn(LOOK_EVERY_S)
+            self._say_who_is_missing()
         self._end_world()
 
     def interrupt(self) -> None:
@@ -214,6 +218,11 @@ class Launch:
             raise self._not_started(name, end)
         self.terminal.say(f"{name} {end} about {self._time_s:.1f} s into the run, which ends here")
         self._broken = True
+
+    def _say_who_is_missing(self) -> None:
+        if self._missing and time.monotonic() > self._say_missing_at_s:
+            self._say_missing_at_s = time.monotonic() + PATIENCE_S
+            self.terminal.say(f"still waiting for {', '.join(self._missing)}")
 
     @property
     def _flying(self) -> bool:

@@ -75,9 +75,10 @@ class Flight:
 
     @property
     def rejected(self) -> int:
-        """Messages refused so far: by the agents, and by the world."""
-        latest = self.loop.world.latest
-        return self._unreadable + sum(last.telemetry.rejected for last in latest if last)
+        """Messages refused so far: by the agents, by the medium, and by the world."""
+        by_agents = sum(last.telemetry.rejected for last in self.loop.world.latest if last)
+        by_medium = sum(self.verdicts.rejected.values()) if self.verdicts is not None else 0
+        return by_agents + by_medium + self._unreadable
 
     def fly(self, unwanted: Callable[[], bool]) -> bool:
         """Fly the scenario's slots until the end, or until unwanted; return whether all of them."""
