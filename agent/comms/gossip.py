@@ -9,8 +9,10 @@ from agent.codec import encode
 from agent.controller import Peer
 from agent.messages import Beacon, Gossip, Place, Record
 
-RELAYED_SILENCE_ROUNDS = 14
-"""2 D + 10 rounds at a hop diameter D of 2, as for the suspicion of the dead."""
+RELAYED_SILENCE_ROUNDS = 12
+"""T_d = (2 D + 10) / (1 - loss) rounds: what of it is the same at any distance. The rest, for D
+hops at that loss, is twice the age at which a subject's records are measured to come."""
+LAG_SMOOTHING = 0.25
 LEAST_RELAYED_SILENCE_S = 2.5
 MAX_FRAME_B = 1200
 FRAME_HEAD_B = 16
@@ -30,6 +32,7 @@ class Table:
         self._own_id = own_id
         self._newest: dict[int, Beacon | Record] = {}
         self._last: dict[int, tuple[int, int]] = {}
+        self._lag_s: dict[int, float] = {}
         period_s = 1.0 / multihop_hz if multihop_hz > 0.0 else 0.0
         self._relayed_silence_s = max(LEAST_RELAYED_SILENCE_S, RELAYED_SILENCE_ROUNDS * period_s)
 
@@ -41,28 +44,34 @@ class Table:
     def adopt(self, gossip: Gossip, now_s: float, slack_s: float) -> None:
         """Take what is news in a frame of the multihop channel.
 
-        Stamps of the future are not, nor are those that would be dropped for their age at once.
+        Stamps of the future are not, nor are those so old that one first heard of by them would
+        be dropped at once.
         """
-        earliest_s, latest_s = now_s - self._relayed_silence_s, now_s + slack_s
+        latest_s = now_s + slack_s
+        earliest_s = now_s - self._relayed_silence_s / (1.0 - 2.0 * LAG_SMOOTHING)
         for record in gossip.records:
             plausible = record.id != self._own_id and earliest_s <= record.stamp_s <= latest_s
             if plausible and self._is_news(record.id, record.incarnation, record.version):
                 self._newest[record.id] = record
+                lag_s = self._lag_s.get(record.id, 0.0)
+                age_s = max(0.0, now_s - record.stamp_s)
+                self._lag_s[record.id] = lag_s + LAG_SMOOTHING * (age_s - lag_s)
 
     def forget_silent(self, now_s: float, silence_s: dict[int, float]) -> None:
         """Drop the records of those who are gone.
 
-        silence_s: for each direct neighbour how long it may be silent [s]. One that was heard
-        directly and no more may be silent for as long as the shortest relay takes.
+        silence_s: for each direct neighbour how long it may be silent [s]. One whose last word
+        was passed on may be silent for as long as relays take.
         """
         gone = []
         for who, newest in self._newest.items():
             direct = isinstance(newest, Beacon)
-            limit = silence_s.get(who, 0.0) if direct else self._relayed_silence_s
+            limit = silence_s.get(who, 0.0) if direct else self._may_be_silent_s(who)
             if now_s - newest.stamp_s > limit:
                 gone.append(who)
         for who in gone:
             del self._newest[who]
+            self._lag_s.pop(who, None)
 
     def team(self, own: Peer) -> tuple[Peer, ...]:
         """Return all who are known, oneself included, sorted by id."""
@@ -81,6 +90,9 @@ class Table:
             encode(Gossip(self._own_id, own.stamp_s, tuple(records[at : at + per_frame])))
             for at in range(0, len(records), per_frame)
         ]
+
+    def _may_be_silent_s(self, who: int) -> float:
+        return self._relayed_silence_s + 2.0 * self._lag_s.get(who, 0.0)
 
     def _is_news(self, who: int, incarnation: int, version: int) -> bool:
         """Whether this is newer than all ever adopted of its subject; if so, remember it."""
