@@ -29,7 +29,8 @@ def stage_of(scenario: Scenario, slots: NDArray[np.float64]) -> Stage:
     """Return the ball around a scenario's start and its formation's slots (N, 3) [m; world]."""
     points = np.vstack([_start_corners(scenario), slots])
     low, high = points.min(axis=0), points.max(axis=0)
-    return Stage(((low + high) / 2.0 + slots.mean(axis=0)) / 2.0, max(float(np.linalg.norm(high - low)) / 2.0, 1.0))
+    centre = ((low + high) / 2.0 + slots.mean(axis=0)) / 2.0
+    return Stage(centre, max(float(np.linalg.norm(high - low)) / 2.0, 1.0))
 
 
 def blueprint_of(stage: Stage) -> rrb.Blueprint:

@@ -1,7 +1,8 @@
 """The frames of a recording file: how far a file that was cut off can be read.
 
 After 12 bytes of header every message is a frame: its kind and its length, each 8 bytes, and its
-payload. Rerun refuses a file whose last frame is not whole; a killed process leaves such a file.
+payload; the last one, and 32 bytes after it, are an index. Rerun refuses a file whose last frame
+is not whole; a killed process leaves such a file.
 """
 
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
 HEADER_B = 12
+FOOTER_B = 32
 _FRAME = Layout("<QQ")
 _END = 0
 _STEP_B = 1024 * 1024
@@ -45,9 +47,10 @@ def whole_b(file: BinaryIO, size: int) -> int:
         if len(head) < _FRAME.size:
             return at
         kind, length = _FRAME.unpack(head)
+        end = at + _FRAME.size + length
         if kind == _END:
-            return size
-        if at + _FRAME.size + length > size:
+            return size if end + FOOTER_B == size else at
+        if end > size:
             return at
-        at += _FRAME.size + length
+        at = end
     return size

@@ -167,6 +167,6 @@ def _at(told: Any, path: str) -> Any:
     for key in path.split("."):
         try:
             told = told[int(key)] if isinstance(told, list) else told[key]
-        except (KeyError, IndexError, TypeError):
+        except (KeyError, IndexError, TypeError, ValueError):
             return None
     return told
