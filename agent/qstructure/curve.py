@@ -17,6 +17,8 @@ LEAST_STEP = 1e-10
 GREATEST_STEP = 0.5
 STANDSTILL_STEPS = 2000
 STANDSTILL_M = 1e-6
+SAMPLES = 1000
+JUMP_M = 0.02
 
 
 class CurveError(ValueError):
@@ -61,6 +63,33 @@ class Walk:
         share = (s - low) / (high - low) if high > low else 0.0
         before, after = self._parameters[upper - 1], self._parameters[upper]
         return before + share * (after - before)
+
+    def check(self, s: float) -> None:
+        """Raise CurveError if the curve jumps somewhere on the way to arc length s [m].
+
+        A walk never gets past a pole, since the way there has no end; so the parameters up to s
+        are looked at too, for that is how far the writer of a curve in metres thinks.
+        """
+        last = min(max(self.parameter(s), s), self._ends)
+        here = self._at(0.0)
+        for k in range(SAMPLES):
+            start, end = last * k / SAMPLES, last * (k + 1) / SAMPLES
+            there = self._at(end)
+            if dist(here, there) > JUMP_M:
+                self._check_jump(start, end)
+            here = there
+
+    def _check_jump(self, start: float, end: float) -> None:
+        """Halve an interval towards its longer half: on a curve it shrinks, at a jump it stays."""
+        for _ in range(50):
+            middle = 0.5 * (start + end)
+            first = dist(self._at(start), self._at(middle))
+            if first >= dist(self._at(middle), self._at(end)):
+                end = middle
+            else:
+                start = middle
+        if dist(self._at(start), self._at(end)) > JUMP_M:
+            raise CurveError(f"it jumps near {start:.6g}: a pole?")
 
     def point(self, s: float) -> Vector:
         """Return the point at arc length s [m]."""

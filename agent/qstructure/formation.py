@@ -98,6 +98,7 @@ class Formation:
         self.vertex_places = {name: places[0] for name, places in holders.items()}
         self.common = tuple(places[0] for places in holders.values() if len(places) > 1)
         self._own = self._own_vertices(holders)
+        self._owned = sum(len(own) for own in self._own)
         self.layout = cache(self._layout)
 
     def slot(self, place: Place, agents: int) -> Slot | None:
@@ -117,19 +118,25 @@ class Formation:
     def divide(self, agents: int) -> tuple[int, ...]:
         """Return how many agents each queue gets besides the common ones of shared vertices.
 
-        Largest remainder over the capacities, ties to the queue named first (E16). What a closed
-        queue cannot hold goes to those that can.
+        Vertices first, then largest remainder over the capacities, ties to the queue named first
+        (E16). What a closed queue cannot hold goes to those that can.
+        """
+        return self._divide(agents, [self._most(j) for j in range(len(self.queues))])
+
+    def _divide(self, agents: int, most: list[float]) -> tuple[int, ...]:
+        """Divide with at most so many in each queue.
+
+        One agent after the other goes where most are wanting: the method of largest remainders,
+        with bounds.
         """
         left = max(0, agents - len(self.common))
-        counts = [0] * len(self.queues)
-        while left:
-            free = [j for j in range(len(counts)) if counts[j] < self._most(j)]
+        counts = [len(own) for own in self._own] if left >= self._owned else [0] * len(most)
+        for _ in range(left - sum(counts)):
+            free = [j for j in range(len(counts)) if counts[j] < most[j]]
             if not free:
                 break
-            for j, share in zip(free, self._shares(free, left), strict=True):
-                taken = int(min(share, self._most(j) - counts[j]))
-                counts[j] += taken
-                left -= taken
+            wanting = {j: round(self.capacities[j] * left - counts[j], 9) for j in free}
+            counts[max(free, key=lambda j: (wanting[j], -j))] += 1
         return tuple(counts)
 
     def check(self, agents: int, least_m: float) -> None:
@@ -141,15 +148,26 @@ class Formation:
                 f"all queues are closed and full: {layout.unplaced} of {agents} agents find no "
                 "place; allowed is one open queue, or fewer agents",
             )
-        for j, wanted in enumerate(
-            self._shares(range(len(self.queues)), agents - len(self.common))
-        ):
-            if wanted > self._most(j):
+        wanted = self._divide(agents, [inf] * len(self.queues))
+        for j, queue in enumerate(self.queues):
+            if wanted[j] > self._most(j):
                 raise FormationError(
-                    f"queue {self.queues[j].name!r}",
-                    f"its capacity asks for {wanted} members, {self._most(j):g} fit",
+                    f"queue {queue.name!r}",
+                    f"its capacity asks for {wanted[j]} members, {self._most(j):g} fit",
                 )
+            self._check_shape(queue, layout)
         _check_apart(layout, self.queues, least_m)
+
+    def _check_shape(self, queue: Queue, layout: Layout) -> None:
+        used = [
+            slot.arc_length
+            for place, slot in layout.slots.items()
+            if self.queues[place.queue] is queue
+        ]
+        try:
+            queue.check(max(used, default=0.0))
+        except (CurveError, ExpressionError) as error:
+            raise FormationError(f"queue {queue.name!r}, shape", str(error)) from error
 
     def _checked_layout(self, agents: int) -> Layout:
         try:
@@ -208,16 +226,6 @@ class Formation:
         """Return how many agents a queue can hold besides the common ones."""
         room = self.queues[queue].room
         return inf if room is None else len(self._own[queue]) + room
-
-    def _shares(self, among: list[int] | range, agents: int) -> list[int]:
-        """Return the largest-remainder division of agents among some of the queues."""
-        total = sum(self.capacities[j] for j in among)
-        quotas = [self.capacities[j] / total * agents for j in among]
-        counts = [int(quota + 1e-9) for quota in quotas]
-        order = sorted(range(len(quotas)), key=lambda i: (-round(quotas[i] - counts[i], 9), i))
-        for i in order[: agents - sum(counts)]:
-            counts[i] += 1
-        return counts
 
 
 def _queue(table: QueueSpec, vertices: dict[str, Vector], spacing: float) -> Queue:

@@ -70,6 +70,10 @@ class Queue:
         """Return the attitude wanted at arc length s [m]; raises OrientationError."""
         return self._orientation.at(s) if self._orientation is not None else FREE
 
+    def check(self, s: float) -> None:
+        """Raise CurveError if the shape cannot be followed up to arc length s [m]."""
+        self._shape.check(s)
+
     def members(self, count: int) -> list[float]:
         """Return the arc lengths at which ``count`` members stand besides the vertices [m]."""
         return self._between(count) if self.closed else self._behind(count)

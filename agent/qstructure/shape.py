@@ -98,6 +98,10 @@ class Shape:
             x, y, z = x + beyond * u, y + beyond * v, z + beyond * w
         return (x - self._origin[0], y - self._origin[1], z - self._origin[2])
 
+    def check(self, s: float) -> None:
+        """Raise CurveError if the curve has a pole or a jump on the way to arc length s [m]."""
+        self._walk.check(min(s, self.end))
+
     def _last_direction(self) -> Vector:
         here, before = self._walk.point(self.end), self._walk.point(self.end - AHEAD_M)
         return _unit(before, here)
@@ -126,6 +130,9 @@ class Straight:
             corner[1] - origin[1] + along * unit[1],
             corner[2] - origin[2] + along * unit[2],
         )
+
+    def check(self, s: float) -> None:
+        """Straight pieces can always be followed."""
 
 
 def shape_of(spec: ShapeSpec) -> Shape | Straight:
