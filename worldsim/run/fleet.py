@@ -209,6 +209,8 @@ class Launch:
             f"agent-{agent} (pid {line['pid']}) {end} about {self._time_s:.1f} s into the run;"
             " its vehicle hovers"
         )
+        if end.status is not None:
+            self.terminal.say(self._last_words(f"agent-{agent}"))
 
     def _child_ended(self, name: str, end: Exit) -> None:
         self._hear_world()
