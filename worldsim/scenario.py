@@ -14,7 +14,7 @@ import tomli_w
 
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from worldsim.decoding import decode
-from worldsim.rules import check
+from worldsim.rules import TARGET_FLOOR_M, check
 from worldsim.tables import SLOTS_PER_TICK, BoxStart, ListStart, Scenario
 from worldsim.toml import Data, ScenarioError, override, read, tables
 
@@ -51,8 +51,8 @@ def parse(
         override(data, overrides, name)
         whose = _place_formation(data, Path(name))
         scenario = decode(data, Scenario, name)
-        _check_formation(scenario.formation, *whose)
         check(scenario, name)
+        _check_formation(scenario, *whose)
     except ScenarioError as error:
         raise _told_as_override(error, overrides) from error
     return scenario
@@ -85,9 +85,11 @@ def _place_formation(data: Data, file: Path) -> tuple[Path, str]:
     return path, ""
 
 
-def _check_formation(spec: FormationSpec, file: Path, prefix: str) -> None:
+def _check_formation(scenario: Scenario, file: Path, prefix: str) -> None:
+    control = scenario.control
     try:
-        Formation(spec, 1.0)
+        formation = Formation(scenario.formation, control.spacing_m)
+        formation.check(scenario.fleet.agents, control.separation_m + TARGET_FLOOR_M)
     except FormationError as error:
         raise ScenarioError(file, prefix + error.key, error.detail) from error
 

@@ -76,7 +76,7 @@ FORMATIONS = [
     (
         "vertices = { V1 = [0, 0, 0] }",
         QUEUE.replace("[0, 0, 1]", "[0, 0, 0]"),
-        "queue[0].shape.direction",
+        "queue 'Q', shape.direction",
         "zero length",
     ),
     (
@@ -154,6 +154,13 @@ def test_an_override_is_told_as_one() -> None:
     with pytest.raises(ScenarioError) as caught:
         parse("[fleet]\nagents = 0\n[formation]\n", "mine.toml", {"seed": "2"})
     assert "command line" not in str(caught.value)
+
+
+def test_slots_too_near_to_one_another_are_refused() -> None:
+    second = QUEUE.replace("'Q'", "'R'").replace("'V1'", "'V2'")
+    near = f"{{ name = 'f', vertices = {{ V1 = [0, 0, 0], V2 = [0.4, 0, 0] }}, queue = [{QUEUE},"
+    with pytest.raises(ScenarioError, match=r"formation\.queue 'Q' and 'R': .* at least 0\.5 m"):
+        load(WEDGE, {"formation": f"{near} {second}] }}"})
 
 
 def test_fewer_agents_than_vertices() -> None:

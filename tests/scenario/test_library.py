@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agent.messages import Place
+from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
 from worldsim.rules import cautions
@@ -20,9 +20,14 @@ EDGE = 1.0 / sqrt(3.0)
 
 
 def formation(name: str) -> Formation:
-    return Formation(
-        msgspec.toml.decode((LIBRARY / f"{name}.toml").read_bytes(), type=FormationSpec)
-    )
+    spec = msgspec.toml.decode((LIBRARY / f"{name}.toml").read_bytes(), type=FormationSpec)
+    return Formation(spec, spacing=1.0)
+
+
+def slot(team: Formation, queue: int, rank: int) -> Vector:
+    found = team.slot(Place(queue, rank), agents=20)
+    assert found is not None
+    return found.point
 
 
 @pytest.mark.parametrize("file", SCENARIOS, ids=lambda file: file.stem)
@@ -45,11 +50,11 @@ def test_wedge_9_is_what_its_figures_say() -> None:
 
 def test_the_wedge_runs_back_from_its_apex_along_four_edges() -> None:
     wedge = formation("pyramidal-wedge")
-    ends = {wedge.slot(Place(queue, 1), 1.0) for queue in range(4)}
+    ends = {slot(wedge, queue, 1) for queue in range(4)}
     wanted = [(-EDGE, y * EDGE, z * EDGE) for y in (-1, 1) for z in (-1, 1)]
     assert len(ends) == 4
     assert all(min(dist(end, corner) for end in ends) < 1e-12 for corner in wanted)
-    assert wedge.places(9)[0] == wedge.vertex_places["V1"]
+    assert wedge.layout(9).places[0] == wedge.vertex_places["V1"]
 
 
 @pytest.mark.parametrize(
@@ -59,8 +64,8 @@ def test_the_wedge_runs_back_from_its_apex_along_four_edges() -> None:
 def test_the_lines_are_parallel_and_1_5_m_apart(name: str, step: tuple[int, int, int]) -> None:
     lines = formation(name)
     for queue, y in enumerate((-1.5, 0.0, 1.5)):
-        assert lines.slot(Place(queue, 0), 1.0) == (0.0, y, 0.0)
-        assert lines.slot(Place(queue, 2), 1.0) == (2.0 * step[0], y, 2.0 * step[2])
+        assert slot(lines, queue, 0) == (0.0, y, 0.0)
+        assert slot(lines, queue, 2) == (2.0 * step[0], y, 2.0 * step[2])
 
 
 @pytest.mark.parametrize(
@@ -86,7 +91,7 @@ def divided(draw: st.DrawFn) -> tuple[Formation, int]:
         QueueSpec(f"Q{j}", ("V0" if shared else f"V{j}",), Ray((1.0, 0.0, 0.0)), w / sum(weights))
         for j, w in enumerate(weights)
     )
-    return Formation(FormationSpec("f", vertices, queues)), draw(st.integers(0, 200))
+    return Formation(FormationSpec("f", vertices, queues), 1.0), draw(st.integers(0, 200))
 
 
 @given(divided())
@@ -94,17 +99,18 @@ def test_nobody_is_left_over_and_nobody_counted_twice(case: tuple[Formation, int
     team, agents = case
     common = min(agents, len(team.common))
     assert sum(team.divide(agents)) + common == agents
-    places = team.places(agents)
-    assert len(set(places)) == len(places) == agents
-    assert all(team.holds(place) for place in places)
+    layout = team.layout(agents)
+    assert len(set(layout.places)) == len(layout.places) == agents
+    assert set(layout.places) == layout.slots.keys()
+    assert layout.unplaced == 0
 
 
 @given(divided())
 def test_each_queue_gets_its_share_rounded_down_or_up(case: tuple[Formation, int]) -> None:
     team, agents = case
     free = max(0, agents - len(team.common))
-    for queue, count in zip(team.queues, team.divide(agents), strict=True):
-        assert abs(count - queue.capacity * free) < 1.0 + 1e-6
+    for capacity, count in zip(team.capacities, team.divide(agents), strict=True):
+        assert abs(count - capacity * free) < 1.0 + 1e-6
 
 
 @given(divided())
@@ -112,8 +118,8 @@ def test_who_is_rounded_up_had_the_larger_remainder(case: tuple[Formation, int])
     team, agents = case
     free = max(0, agents - len(team.common))
     rests = [
-        (queue.capacity * free - count, count >= queue.capacity * free - 1e-6)
-        for queue, count in zip(team.queues, team.divide(agents), strict=True)
+        (capacity * free - count, count >= capacity * free - 1e-6)
+        for capacity, count in zip(team.capacities, team.divide(agents), strict=True)
     ]
     short = [rest for rest, full in rests if not full]
     raised = [rest + 1.0 for rest, full in rests if full and rest < -1e-6]

@@ -11,7 +11,7 @@ from worldsim.scenario import Scenario, dump, parse
 names = st.text(min_size=1, max_size=12)
 metres = st.floats(-1e3, 1e3)
 triples = st.tuples(metres, metres, metres).map(list)
-directions = triples.filter(lambda v: max(map(abs, v)) > 1e-3)
+directions = triples.filter(lambda v: max(map(abs, v[1:])) > 1e-3)
 
 
 def link_keys() -> st.SearchStrategy[dict[str, Any]]:
@@ -28,12 +28,14 @@ def link_keys() -> st.SearchStrategy[dict[str, Any]]:
 
 @st.composite
 def formations(draw: st.DrawFn) -> dict[str, Any]:
-    vertices = draw(st.dictionaries(names, triples, min_size=1, max_size=4))
+    chosen = draw(st.lists(names, min_size=1, max_size=4, unique=True))
+    apart = draw(st.floats(20.5, 100))
+    vertices = {name: [apart * index, 0.0, -apart] for index, name in enumerate(chosen)}
     queues = [
         {
             "name": f"{index} {draw(names)}",
             "vertices": [vertex],
-            "shape": {"kind": "ray", "direction": draw(directions)},
+            "shape": {"kind": "ray", "direction": [0.0, *draw(directions)[1:]]},
         }
         for index, vertex in enumerate(vertices)
     ]
