@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
+from pyarrow.lib import array as arrow_array
 
 from worldsim.judge.tick import Singles, Tick
 from worldsim.judge.verdict import Figures
@@ -96,12 +97,13 @@ class Sheets:
             yield Sheet(entity, (), lasting)
 
     def _hearing(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
-        series = [_bits(tick.links, len(tick.alive)) for tick in ticks]
+        # As bits: 5 kB for 200 agents, where pairs of numbers take 20.
+        series = [np.packbits(_hears(tick)) for tick in ticks]
         rows = self._heard.changes(series)
         if rows and len(series[0]):
             bits = np.concatenate([series[row] for row in rows])
-            columns = rr.AnyValues.columns(hears=bits)
-            yield Sheet(layout.HEARD, rows, columns.partition([len(series[0])] * len(rows)))
+            counts = [len(series[0])] * len(rows)
+            yield Sheet(layout.HEARD, rows, [_column(layout.HEARS, bits, counts)])
 
     def _lines(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
         rows, strips = [], []
@@ -136,8 +138,8 @@ def lines(tick: Tick) -> NDArray[np.float32]:
 
     Each pair once; of too many, the shortest.
     """
-    hearer, heard = _known(tick.links, len(tick.alive)).T
-    pairs = np.unique(np.sort(np.stack([hearer, heard], axis=1), axis=1), axis=0)
+    hears = _hears(tick)
+    pairs = np.argwhere(np.triu(hears | hears.T, k=1))
     ends: Singles = tick.position[pairs]
     ends = ends[~np.isnan(ends).any(axis=(1, 2))]
     if len(ends) > LINES_MAX:
@@ -174,30 +176,34 @@ def _metrics(ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Shee
 def _state(ticks: Sequence[Tick]) -> Sheet:
     """Return what the judge or a reader needs and no view shows."""
     agents = len(ticks[0].alive)
-    place = rr.AnyValues.columns(place=np.concatenate([tick.place.ravel() for tick in ticks]))
-    others = rr.AnyValues.columns(
-        alive=np.concatenate([tick.alive for tick in ticks]).astype(np.uint8),
-        yaw=np.concatenate([tick.yaw for tick in ticks]),
-    )
+    place = np.concatenate([tick.place.ravel() for tick in ticks])
+    alive = np.concatenate([tick.alive for tick in ticks]).astype(np.uint8)
+    yaw = np.concatenate([tick.yaw for tick in ticks])
+    counts = [agents] * len(ticks)
     columns = [
-        *place.partition([2 * agents] * len(ticks)),
-        *others.partition([agents] * len(ticks)),
+        _column(layout.PLACE, place, [2 * agents] * len(ticks)),
+        _column(layout.ALIVE, alive, counts),
+        _column(layout.YAW, yaw, counts),
     ]
     return Sheet(layout.STATE, range(len(ticks)), columns)
+
+
+def _column(name: str, values: NDArray[Any], counts: list[int]) -> rr.ComponentColumn:
+    """Return numbers of our own kind as a column, ``counts`` of them to a row.
+
+    Given as an Arrow array: rerun looks at anything else number by number.
+    """
+    return rr.ComponentColumn(name, rr.AnyBatchValue(name, arrow_array(values)), lengths=counts)
 
 
 def _finite(error: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(np.isfinite(error), error, np.nan)
 
 
-def _known(links: NDArray[np.int32], agents: int) -> NDArray[np.int32]:
-    """Return the links between agents that exist: what an agent tells may be anything."""
-    return links[np.all((links >= 0) & (links < agents), axis=1)]
-
-
-def _bits(links: NDArray[np.int32], agents: int) -> NDArray[np.uint8]:
-    """Return who hears whom as a matrix of bits, row by row: 5 kB for 200 agents, not 20."""
+def _hears(tick: Tick) -> NDArray[np.bool_]:
+    """Return who hears whom (N, N), of agents that exist: what an agent tells may be anything."""
+    agents = len(tick.alive)
+    links = tick.links[np.all((tick.links >= 0) & (tick.links < agents), axis=1)]
     hears = np.zeros((agents, agents), dtype=np.bool_)
-    hearer, heard = _known(links, agents).T
-    hears[hearer, heard] = True
-    return np.packbits(hears)
+    hears[links[:, 0], links[:, 1]] = True
+    return hears
