@@ -84,20 +84,28 @@ def _filled(claims: list[int | None], squares: list[list[float]]) -> list[int]:
 
 
 def _exchange(chosen: list[int], squares: list[list[float]]) -> None:
-    """Exchange the columns of two rows wherever that saves something, until nothing does."""
+    """Exchange the columns of two rows wherever that saves something, until nothing does.
+
+    In the order of the columns, not of the rows: who is called what decides nothing.
+    """
     count = len(chosen)
+    holders = sorted(range(count), key=chosen.__getitem__)
     improved = True
     while improved:
         improved = False
-        for a in range(count):
+        for i in range(count):
+            a = holders[i]
             row_a = squares[a]
-            for b in range(a + 1, count):
-                at_a, at_b = chosen[a], chosen[b]
+            for j in range(i + 1, count):
+                b = holders[j]
                 row_b = squares[b]
-                saved = row_a[at_a] + row_b[at_b] - row_a[at_b] - row_b[at_a]
-                if saved > GAIN_M2 and saved > ROUNDING * (row_a[at_a] + row_b[at_b]):
-                    chosen[a], chosen[b] = at_b, at_a
+                saved = row_a[i] + row_b[j] - row_a[j] - row_b[i]
+                if saved > GAIN_M2 and saved > ROUNDING * (row_a[i] + row_b[j]):
+                    holders[i], holders[j] = b, a
+                    a, row_a = b, row_b
                     improved = True
+    for column, row in enumerate(holders):
+        chosen[row] = column
 
 
 def _square(a: Vector, b: Vector) -> float:
