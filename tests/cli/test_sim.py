@@ -1,12 +1,14 @@
 """sim: one run or many, each in its folder, a verdict that is the exit status."""
 
 import json
+import signal
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.cli.conftest import Command
+from tests.processes.harness import QSWARM, Started, eventually
 from worldsim.scenario import load
 
 
@@ -96,3 +98,26 @@ def test_one_failed_seed_fails_all(small: Path, qswarm: Command) -> None:
     assert "hard: 0 of 1 passed" in told.out
     assert "small: 1 of 1 passed" in told.out
     assert [row["run"] for row in summary("both")["rows"]] == ["hard-seed1", "small-seed1"]
+
+
+def is_running(pid: str) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state not in "ZX"
+
+
+def test_ctrl_c_ends_a_sweep_with_its_workers(small: Path) -> None:
+    sweep = [*QSWARM, "sim", "small.toml", "--no-recording", "--duration", "1000"]
+    started = Started(
+        [*sweep, "--seeds", "0:4", "--jobs", "2", "--out", "cut"], Path("said"), small.parent
+    )
+    pid = started.process.pid
+    eventually(lambda: len(list(Path("cut").glob("*/events.jsonl"))) == 2, 20.0)
+    workers = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    assert len(workers) >= 2
+    started.process.send_signal(signal.SIGINT)
+    assert started.status(within_s=20.0) == 130
+    assert started.text.endswith("interrupted; what was flown to its end is kept\n")
+    eventually(lambda: not any(map(is_running, workers)), 10.0)
