@@ -8,12 +8,18 @@ and vehicle.
 
 from collections.abc import Callable
 from importlib import import_module
+from importlib.metadata import entry_points
 from typing import NamedTuple, Protocol
 
 from agent.messages import Place, Vector
 from agent.setup import AgentSetup
 
-BUILT_IN = {"q_structure": "agent.guidance.q_structure:QStructure"}
+BUILT_IN = {
+    "q_structure": "agent.guidance.q_structure:QStructure",
+    "flocking": "agent.guidance.flocking:Flocking",
+}
+ENTRY_POINTS = "qswarm.controllers"
+"""The entry-point group under which another package names its controllers."""
 
 
 class ControllerError(ValueError):
@@ -55,6 +61,7 @@ class Senses(NamedTuple):
 
     now_s: float
     position: Vector
+    velocity: Vector
     yaw: float
     vehicles: tuple[Vector, ...]
     neighbours: tuple[Heard, ...]
@@ -89,14 +96,14 @@ class Controller(Protocol):
 
 
 def load(name: str) -> type[Controller]:
-    """Return the controller class of a built-in name or ``package.module:Class``.
+    """Return the controller class of a built-in name, an entry point or ``package.module:Class``.
 
     Raises :class:`ControllerError` where there is none.
     """
-    module_name, _, class_name = BUILT_IN.get(name, name).partition(":")
+    module_name, _, class_name = _where(name).partition(":")
     if not module_name or not class_name:
-        known = ", ".join(BUILT_IN)
-        raise ControllerError(f"{name!r} is neither built in ({known}) nor 'package.module:Class'")
+        known = ", ".join([*BUILT_IN, *(each.name for each in entry_points(group=ENTRY_POINTS))])
+        raise ControllerError(f"{name!r} is neither known ({known}) nor 'package.module:Class'")
     try:
         found = getattr(import_module(module_name), class_name)
     except (ImportError, AttributeError, ValueError) as error:
@@ -104,3 +111,10 @@ def load(name: str) -> type[Controller]:
     if not callable(getattr(found, "decide", None)):
         raise ControllerError(f"{name!r} has no method 'decide'")
     return found  # type: ignore[no-any-return]
+
+
+def _where(name: str) -> str:
+    """Return ``package.module:Class`` of a controller's name; a name that is not known stays."""
+    if name in BUILT_IN:
+        return BUILT_IN[name]
+    return next((each.value for each in entry_points(group=ENTRY_POINTS, name=name)), name)

@@ -106,6 +106,7 @@ class Agent:
         return Senses(
             now_s,
             observation.position,
+            observation.velocity,
             observation.yaw,
             observation.vehicles,
             self._neighbours.heard(now_s),
