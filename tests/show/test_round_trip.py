@@ -57,7 +57,7 @@ def test_the_judge_meets_the_same_numbers_in_the_recording(ticks: list[Tick]) ->
     scenario = wedge(AGENTS)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "run.rrd"
-        judged = record(RunRecorder(path, scenario, "wild"), scenario, ticks)
+        judged = record(RunRecorder(path, scenario, "wild", mode="virtual"), scenario, ticks)
         readback = read_run(path)
     again = Judge(readback.scenario)
     for before, after in zip(ticks, readback.ticks, strict=True):
@@ -79,7 +79,7 @@ def _assert_equal(before: Tick, after: Tick) -> None:
 
 def test_scenario_and_events_come_back(tmp_path: Path) -> None:
     scenario = wedge(9, duration_s=1.0)
-    recorder = RunRecorder(tmp_path / "run.rrd", scenario, "events")
+    recorder = RunRecorder(tmp_path / "run.rrd", scenario, "events", mode="virtual")
     events = [
         {"t_s": 0.0125, "kind": "slot", "agent": 3, "place": [1, 2], "before": None},
         {"t_s": 0.5, "kind": "kill", "agent": 4},
@@ -104,7 +104,7 @@ def test_ticks_come_back_at_a_rate_that_is_no_round_number_of_nanoseconds(tmp_pa
     thirty = type(scenario)(
         fleet=type(scenario.fleet)(agents=4, tick_hz=30.0), formation=scenario.formation
     )
-    record(RunRecorder(tmp_path / "run.rrd", thirty, "thirty"), thirty, ticks)
+    record(RunRecorder(tmp_path / "run.rrd", thirty, "thirty", mode="virtual"), thirty, ticks)
     assert [tick.time_s for tick in read_run(tmp_path / "run.rrd").ticks] == [
         tick.time_s for tick in ticks
     ]

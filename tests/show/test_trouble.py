@@ -22,7 +22,8 @@ from worldsim.judge.verdict import Judge
 from worldsim.show.recorder import RunRecorder
 
 scenario = wedge(9, duration_s=4.0)
-recorder, judge = RunRecorder(Path(sys.argv[1]), scenario, "killed"), Judge(scenario)
+recorder = RunRecorder(Path(sys.argv[1]), scenario, "killed", mode="virtual")
+judge = Judge(scenario)
 for tick in straight_flight(scenario):
     recorder.tick(tick, judge.see(tick))
     if tick.index == 70:
@@ -37,7 +38,7 @@ from worldsim.show.recorder import RunRecorder
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
 scenario = wedge(30, duration_s=8.0)
-recorder = RunRecorder(Path(sys.argv[1]), scenario, "full")
+recorder = RunRecorder(Path(sys.argv[1]), scenario, "full", mode="virtual")
 judge = record(recorder, scenario, list(straight_flight(scenario)))
 print(judge.ticks)
 """
@@ -75,7 +76,7 @@ def test_a_file_cut_anywhere_is_read_as_far_as_it_goes(tmp_path: Path, kept: flo
     path = tmp_path / "run.rrd"
     scenario = wedge(9, duration_s=6.0)
     ticks = list(straight_flight(scenario))
-    record(RunRecorder(path, scenario, "cut"), scenario, ticks)
+    record(RunRecorder(path, scenario, "cut", mode="virtual"), scenario, ticks)
     os.truncate(path, int(path.stat().st_size * kept) - 1)
     readback = read_run(path)
     assert 20 <= len(readback.ticks) <= len(ticks)
@@ -86,7 +87,9 @@ def test_a_file_cut_anywhere_is_read_as_far_as_it_goes(tmp_path: Path, kept: flo
 def test_a_recording_that_cannot_be_created_does_not_end_the_run(tmp_path: Path) -> None:
     complaints: list[str] = []
     scenario = wedge(4, duration_s=3.0)
-    recorder = RunRecorder(tmp_path / "no" / "run.rrd", scenario, "none", say=complaints.append)
+    recorder = RunRecorder(
+        tmp_path / "no" / "run.rrd", scenario, "none", say=complaints.append, mode="virtual"
+    )
     recorder.event({"t_s": 0.0, "kind": "kill", "agent": 0})
     judge = record(recorder, scenario, list(straight_flight(scenario)))
     assert judge.ticks == 61
@@ -98,6 +101,6 @@ def test_an_earlier_recording_is_not_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
     path.write_text("precious")
     complaints: list[str] = []
-    RunRecorder(path, wedge(4), "second", say=complaints.append).close()
+    RunRecorder(path, wedge(4), "second", say=complaints.append, mode="virtual").close()
     assert path.read_text() == "precious"
     assert len(complaints) == 1

@@ -16,7 +16,7 @@ from worldsim.show.verify import Difference, verify
 def judge(tmp_path: Path) -> Judge:
     """A recorded run in ``tmp_path`` that converged, without a summary."""
     scenario = wedge(4)
-    recorder = RunRecorder(tmp_path / "run.rrd", scenario, "verified")
+    recorder = RunRecorder(tmp_path / "run.rrd", scenario, "verified", mode="virtual")
     return record(recorder, scenario, list(straight_flight(scenario)))
 
 
@@ -95,7 +95,7 @@ def test_held_is_exit_0_and_a_missed_expectation_1(tmp_path: Path) -> None:
     short = wedge(1, duration_s=0.5)
     for name, scenario in (("calm", calm), ("short", short)):
         (tmp_path / name).mkdir()
-        recorder = RunRecorder(tmp_path / name / "run.rrd", scenario, name)
+        recorder = RunRecorder(tmp_path / name / "run.rrd", scenario, name, mode="virtual")
         record(recorder, scenario, list(straight_flight(scenario)))
     assert verify(tmp_path / "calm").exit_status == 0
     assert verify(tmp_path / "short").exit_status == 1

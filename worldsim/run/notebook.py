@@ -40,11 +40,13 @@ class Notebook:
             self._recorder.close()
 
 
-def notebook(directory: RunDirectory, scenario: Scenario, run: str, recording: bool) -> Notebook:
+def notebook(
+    directory: RunDirectory, scenario: Scenario, run: str, mode: str, recording: bool
+) -> Notebook:
     """Open a run's notebook, with a recording or without."""
     if not recording:
         return Notebook(directory, None)
     # rerun costs a second and 90 MB: only the process that records pays for it.
     from worldsim.show.recorder import RunRecorder  # noqa: PLC0415
 
-    return Notebook(directory, RunRecorder(directory.recording, scenario, run))
+    return Notebook(directory, RunRecorder(directory.recording, scenario, run, mode=mode))

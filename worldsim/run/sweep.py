@@ -36,7 +36,7 @@ def simulate(job: Job, on_progress: Callable[[SlotLoop], None] | None = None) ->
     """
     scenario = job.scenario
     directory = RunDirectory.create(job.folder, scenario)
-    notes = notebook(directory, scenario, directory.path.name, job.recording)
+    notes = notebook(directory, scenario, directory.path.name, "virtual", job.recording)
     try:
         flight = fly(scenario, notes, on_progress=on_progress)
     finally:

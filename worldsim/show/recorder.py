@@ -46,7 +46,7 @@ class RunRecorder:
         scenario: Scenario,
         run_id: str,
         *,
-        mode: str = "processes",
+        mode: str,
         say: Callable[[str], None] = complain,
     ) -> None:
         self._say = say

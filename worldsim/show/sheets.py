@@ -82,15 +82,12 @@ class Sheets:
             for tick in ticks
         ]
         rows = self._colours.changes(series)
+        yield _trail(ticks, np.concatenate(series))
         if not rows:
             return
         colours = np.concatenate([series[row] for row in rows])
         counts = [len(series[0])] * len(rows)
-        for entity, archetype in (
-            (layout.AGENTS, rr.Points3D),
-            (layout.VEHICLES, rr.Boxes3D),
-            (layout.TARGETS, rr.Points3D),
-        ):
+        for entity, archetype in ((layout.VEHICLES, rr.Boxes3D), (layout.TARGETS, rr.Points3D)):
             yield Sheet(entity, rows, archetype.columns(colors=colours).partition(counts))
         lasting = rr.SeriesLines.columns(colors=series[rows[-1]]).partition(counts[:1])
         for entity in layout.PER_AGENT:
@@ -148,6 +145,14 @@ def lines(tick: Tick) -> NDArray[np.float32]:
     return ends
 
 
+def _trail(ticks: Sequence[Tick], colours: palette.Colours) -> Sheet:
+    """Return positions with their colours: of a range of time, a viewer shows each as it was."""
+    position = np.concatenate([tick.position for tick in ticks])
+    columns = rr.Points3D.columns(positions=position, colors=colours)
+    counts = [len(ticks[0].alive)] * len(ticks)
+    return Sheet(layout.AGENTS, range(len(ticks)), columns.partition(counts))
+
+
 def _poses(ticks: Sequence[Tick]) -> Iterator[Sheet]:
     rows, counts = range(len(ticks)), [len(ticks[0].alive)] * len(ticks)
     position = np.concatenate([tick.position for tick in ticks])
@@ -156,7 +161,6 @@ def _poses(ticks: Sequence[Tick]) -> Iterator[Sheet]:
     attitude = np.stack([zero, zero, np.sin(half), np.cos(half)], axis=1)
     target = np.concatenate([tick.target for tick in ticks])
     boxes = rr.Boxes3D.columns(centers=position, quaternions=attitude)
-    yield Sheet(layout.AGENTS, rows, rr.Points3D.columns(positions=position).partition(counts))
     yield Sheet(layout.VEHICLES, rows, boxes.partition(counts))
     yield Sheet(layout.TARGETS, rows, rr.Points3D.columns(positions=target).partition(counts))
 
