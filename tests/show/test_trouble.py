@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -104,3 +105,15 @@ def test_an_earlier_recording_is_not_overwritten(tmp_path: Path) -> None:
     RunRecorder(path, wedge(4), "second", say=complaints.append, mode="virtual").close()
     assert path.read_text() == "precious"
     assert len(complaints) == 1
+
+
+def test_rows_that_do_not_fit_end_the_recording_not_the_run(tmp_path: Path) -> None:
+    complaints: list[str] = []
+    scenario = wedge(4, duration_s=3.0)
+    ticks = list(straight_flight(scenario))
+    ticks[30] = replace(ticks[30], target=ticks[30].target[:2])
+    path = tmp_path / "run.rrd"
+    recorder = RunRecorder(path, scenario, "odd", mode="virtual", say=complaints.append)
+    assert record(recorder, scenario, ticks).ticks == 61
+    assert len(complaints) == 1
+    assert [tick.index for tick in read_run(path).ticks] == list(range(20))

@@ -14,7 +14,7 @@ TRAIL_S = 4.0
 BACKGROUND = (13, 17, 24)
 GRID = (38, 46, 60)
 EYE_FROM = np.array([-0.8, -1.0, 0.5])
-EYE_DISTANCE = 1.1
+EYE_DISTANCE = 1.2
 
 
 @dataclass(frozen=True, slots=True)
