@@ -74,7 +74,8 @@ class Intent(NamedTuple):
     wanted [m/s; world frame]: the velocity it would like, whatever its heading; velocity: what it
     asks for now, given that a vehicle may have to turn first; yaw [rad]: the heading it asks for;
     force: |u_i| of (28) before saturation; heading_for: its immediate target q_tg [m];
-    target: its target-on-queue [m] and ``place`` its place in the formation, if it has any.
+    target: its target-on-queue [m] and ``place`` its place in the formation, if it has any; tilt:
+    pitch and roll it asks for [rad].
     """
 
     wanted: Vector
@@ -84,6 +85,7 @@ class Intent(NamedTuple):
     heading_for: Vector
     target: Vector | None = None
     place: Place | None = None
+    tilt: tuple[float, float] = (0.0, 0.0)
 
 
 class Controller(Protocol):

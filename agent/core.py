@@ -6,7 +6,7 @@ the virtual clock) only carry bytes.
 
 from collections import Counter
 from collections.abc import Callable
-from math import inf, radians
+from math import inf
 from typing import NamedTuple
 
 from agent.codec import RejectedError, decode_beacon, decode_gossip
@@ -14,6 +14,7 @@ from agent.comms.broadcast import LOCAL, Broadcast, OwnState
 from agent.comms.gossip import Table
 from agent.comms.neighbours import Neighbours
 from agent.controller import Intent, Peer, Senses, load
+from agent.guidance.cone import cone_of
 from agent.guidance.safety import PromiseFilter, RangingFilter, Told, limited, shortened
 from agent.messages import Beacon, Command, Gossip, Observation, Place, Telemetry, Vector
 from agent.setup import AgentSetup
@@ -50,7 +51,7 @@ class Agent:
         self._decoders = decoders
         self._slack_s = 2.0 * tick_s
         self._command_slots = setup.command_ticks * setup.slots_per_tick
-        self._theta = radians(limits.max_turn_deg)
+        self._cone = cone_of(limits)
         self._controller = load(setup.control.controller)(setup)
         self._neighbours = Neighbours(setup.id, comms.local_hz, self._slack_s)
         self._table = Table(setup.id, comms.multihop_hz)
@@ -117,11 +118,11 @@ class Agent:
         """Return the velocity that is safe to fly [m/s]: the filter has the last word."""
         if self._ranging is not None:
             bounds = self._ranging.bounds(senses.vehicles)
-            return limited(intent.velocity, bounds, senses.yaw, self._theta)
+            return limited(intent.velocity, bounds, senses.yaw, self._cone)
         told = self._told(senses)
         self._promises.promise(senses.now_s, told)
         self._speed_cap = self._promises.speed_cap
-        velocity = limited(intent.velocity, self._promises.bounds(told), senses.yaw, self._theta)
+        velocity = limited(intent.velocity, self._promises.bounds(told), senses.yaw, self._cone)
         return shortened(velocity, self._speed_cap)
 
     def _told(self, senses: Senses) -> list[Told]:
@@ -146,5 +147,11 @@ class Agent:
             self.rejected.total(),
         )
         return Command(
-            slot, self._incarnation, slot + self._command_slots, velocity, intent.yaw, telemetry
+            slot,
+            self._incarnation,
+            slot + self._command_slots,
+            velocity,
+            intent.yaw,
+            intent.tilt,
+            telemetry,
         )

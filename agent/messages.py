@@ -71,13 +71,18 @@ class Telemetry(Message, frozen=True):
 
 
 class Command(Message, frozen=True):
-    """What a vehicle shall do from now until ``expires_slot``; then it stops and hovers."""
+    """What a vehicle shall do from now until ``expires_slot``; then it stops and hovers.
+
+    tilt: pitch and roll to take up [rad], nose up and right side down positive; vehicles that
+    cannot, stay level.
+    """
 
     slot: Count
     incarnation: Count
     expires_slot: Count
     velocity: Velocity
     yaw: Radians
+    tilt: tuple[Radians, Radians]
     telemetry: Telemetry
 
 

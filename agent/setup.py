@@ -16,7 +16,11 @@ class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class Vehicle(Table, frozen=True):
-    """The vehicle's limits and senses; ``max_turn_deg`` is theta, half angle of the cast-zone."""
+    """The vehicle's limits and senses.
+
+    max_turn_deg: theta, half angle of the cast-zone in azimuth; to the left and to the right it may
+    differ. max_tilt_deg: how far it can roll and pitch at its slot; 0: it stays level.
+    """
 
     kind: Literal["kinematic"] = "kinematic"
     radius_m: Annotated[float, Meta(gt=0, le=100)] = 0.1
@@ -24,6 +28,9 @@ class Vehicle(Table, frozen=True):
     max_climb_mps: Annotated[float, Meta(gt=0, le=50)] = 0.5
     max_yaw_rate_dps: Annotated[float, Meta(gt=0, le=10_000)] = 180.0
     max_turn_deg: Annotated[float, Meta(gt=0, le=90)] = 45.0
+    max_turn_left_deg: Annotated[float, Meta(gt=0, le=90)] | None = None
+    max_turn_right_deg: Annotated[float, Meta(gt=0, le=90)] | None = None
+    max_tilt_deg: Annotated[float, Meta(ge=0, le=90)] = 0.0
     sensors: tuple[Literal["proximity"], ...] = ("proximity",)
 
 

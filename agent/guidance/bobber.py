@@ -5,9 +5,10 @@ vanishing weight of the walls has a closed form (E7), which is what stands here:
 target when it lies in the cone, else to a point on the cone's edge on the target's side.
 """
 
-from math import atan2, cos, hypot, pi, sin, sqrt
+from math import cos, hypot, sin, sqrt
 from typing import NamedTuple
 
+from agent.guidance.cone import Cone, azimuth_error
 from agent.messages import Vector
 
 STRAIGHT_AHEAD_M = 0.1
@@ -16,26 +17,21 @@ WITHIN = 0.95
 
 
 class CastZone(NamedTuple):
-    """Where a bobber may be cast: a cone in azimuth only, for vehicles climb freely (E10).
+    """Where a bobber may be cast.
 
-    theta: half angle to each side [rad]; reach: d_c2 [m]; turning_radius: R of E7 [m].
+    reach: d_c2 [m]; turning_radius: R of E7 [m].
     """
 
-    theta: float
+    cone: Cone
     reach: float
     turning_radius: float
 
 
-def cast_zone(theta: float, reach: float, max_speed: float, max_yaw_rate: float) -> CastZone:
-    """Return the cast-zone of a vehicle: angles [rad], lengths [m], speeds [m/s] and [rad/s]."""
+def cast_zone(cone: Cone, reach: float, max_speed: float, max_yaw_rate: float) -> CastZone:
+    """Return the cast-zone of a vehicle: reach [m], speeds [m/s] and [rad/s]."""
+    theta = min(cone)
     radius = max(0.5 * reach / (2.0 * sin(0.5 * theta)), max_speed / max_yaw_rate)
-    return CastZone(theta, reach, radius)
-
-
-def azimuth_error(x: float, y: float, yaw: float) -> float:
-    """Return the angle from a heading to a horizontal direction [rad], in [-pi, pi]."""
-    error = atan2(y, x) - yaw
-    return error - 2.0 * pi * round(error / (2.0 * pi))
+    return CastZone(cone, reach, radius)
 
 
 def bobber(q: Vector, yaw: float, q_toq: Vector, zone: CastZone) -> Vector:
@@ -47,10 +43,10 @@ def bobber(q: Vector, yaw: float, q_toq: Vector, zone: CastZone) -> Vector:
     x, y, z = q_toq[0] - q[0], q_toq[1] - q[1], q_toq[2] - q[2]
     across = hypot(x, y)
     error = azimuth_error(x, y, yaw)
-    if abs(error) <= zone.theta or across < STRAIGHT_AHEAD_M or across < 2.0 * zone.turning_radius:
+    if zone.cone.holds(error) or across < STRAIGHT_AHEAD_M or across < 2.0 * zone.turning_radius:
         scale = min(1.0, zone.reach / max(sqrt(x * x + y * y + z * z), 1e-12))
         return (q[0] + x * scale, q[1] + y * scale, q[2] + z * scale)
     step = 0.5 * zone.reach
-    heading = yaw + WITHIN * (zone.theta if error > 0.0 else -zone.theta)
+    heading = yaw + WITHIN * (zone.cone.left if error > 0.0 else -zone.cone.right)
     climb = min(max(z, -step), step)
     return (q[0] + step * cos(heading), q[1] + step * sin(heading), q[2] + climb)

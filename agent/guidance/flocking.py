@@ -4,9 +4,10 @@ Keep apart, keep together, fly alike. It has no places and no formation; the age
 it safe and carries its words, as it does for any controller.
 """
 
-from math import hypot, pi, radians
+from math import hypot, pi
 
 from agent.controller import Heard, Intent, Senses
+from agent.guidance.cone import cone_of
 from agent.guidance.movement import saturated, steer
 from agent.messages import Vector
 from agent.setup import AgentSetup
@@ -21,14 +22,14 @@ class Flocking:
     def __init__(self, setup: AgentSetup) -> None:
         self._vehicle = setup.vehicle
         self._spacing = setup.control.spacing_m
-        self._theta = radians(setup.vehicle.max_turn_deg)
+        self._cone = cone_of(setup.vehicle)
 
     def decide(self, senses: Senses) -> Intent:
         """Return what to do now."""
         pull = self._pull(senses.position, senses.neighbours)
         limits = (self._vehicle.max_speed_mps, self._vehicle.max_climb_mps)
         wanted = saturated(pull, *limits)
-        velocity, yaw = steer(wanted, senses.yaw, self._theta)
+        velocity, yaw = steer(wanted, senses.yaw, self._cone)
         x, y, z = senses.position
         ahead = (x + wanted[0], y + wanted[1], z + wanted[2])
         return Intent(wanted, velocity, yaw % (2.0 * pi), hypot(*pull), ahead)

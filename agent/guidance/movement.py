@@ -2,23 +2,23 @@
 
 from math import atan2, hypot
 
-from agent.guidance.bobber import azimuth_error
+from agent.guidance.cone import Cone, azimuth_error
 from agent.messages import Vector
 
 DEAD_BAND_MPS = 0.02
 """Below this horizontal speed a motion has no azimuth: the vehicle hovers or climbs (E10)."""
 
 
-def steer(wanted: Vector, yaw: float, theta: float) -> tuple[Vector, float]:
+def steer(wanted: Vector, yaw: float, cone: Cone) -> tuple[Vector, float]:
     """Return the velocity to fly now [m/s] and the heading to turn to [rad].
 
-    wanted: velocity [m/s; world frame]; yaw: present heading [rad]; theta: half angle of the cone
-    [rad]. Vehicles hover, climb and descend without turning.
+    wanted: velocity [m/s; world frame]; yaw: present heading [rad]. Vehicles hover, climb and
+    descend without turning.
     """
     if hypot(wanted[0], wanted[1]) <= DEAD_BAND_MPS:
         return wanted, yaw
     heading = atan2(wanted[1], wanted[0])
-    if abs(azimuth_error(wanted[0], wanted[1], yaw)) <= theta + 1e-9:
+    if cone.holds(azimuth_error(wanted[0], wanted[1], yaw)):
         return wanted, heading
     return (0.0, 0.0, wanted[2]), heading
 

@@ -8,6 +8,7 @@ from math import dist, pi, radians, sqrt
 
 from agent.controller import Intent, Senses
 from agent.guidance.bobber import bobber, cast_zone
+from agent.guidance.cone import cone_of
 from agent.guidance.movement import saturated, steer
 from agent.guidance.potential import Potential
 from agent.guidance.target_on_queue import TargetOnQueue
@@ -32,9 +33,9 @@ class QStructure:
         vehicle, control = setup.vehicle, setup.control
         self._max_speed = vehicle.max_speed_mps
         self._max_climb = vehicle.max_climb_mps
-        self._theta = radians(vehicle.max_turn_deg)
+        self._cone = cone_of(vehicle)
         self._zone = cast_zone(
-            self._theta,
+            self._cone,
             control.cast_far_m or CAST_FAR_M,
             vehicle.max_speed_mps,
             radians(vehicle.max_yaw_rate_dps),
@@ -57,9 +58,11 @@ class QStructure:
         q_tg = bobber(q, senses.yaw, q_toq, self._zone)
         x, y, z = self._potential.omega(q, q_tg, senses.neighbours)
         wanted = saturated((-GAIN * x, -GAIN * y, -GAIN * z), self._max_speed, self._max_climb)
-        velocity, yaw = steer(wanted, senses.yaw, self._theta)
-        if attitude.yaw is not None and dist(q, q_toq) < AT_SLOT_M and velocity == wanted:
-            yaw = attitude.yaw + self._frame.yaw
+        velocity, yaw = steer(wanted, senses.yaw, self._cone)
+        tilt = (0.0, 0.0)
+        if dist(q, q_toq) < AT_SLOT_M and velocity == wanted:
+            yaw = yaw if attitude.yaw is None else attitude.yaw + self._frame.yaw
+            tilt = (attitude.pitch or 0.0, attitude.roll or 0.0)
         return Intent(
             wanted,
             velocity,
@@ -68,6 +71,7 @@ class QStructure:
             q_tg,
             q_toq if self._mine is not None else None,
             self._mine[0] if self._mine is not None else None,
+            tilt,
         )
 
     def _choose(self, senses: Senses) -> None:

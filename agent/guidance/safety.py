@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from math import hypot, sqrt
 from typing import NamedTuple
 
-from agent.guidance.bobber import azimuth_error
+from agent.guidance.cone import Cone, azimuth_error
 from agent.guidance.movement import DEAD_BAND_MPS
 from agent.messages import Vector
 
@@ -106,11 +106,11 @@ class PromiseFilter:
         return found
 
 
-def limited(velocity: Vector, bounds: Sequence[Bound], yaw: float, theta: float) -> Vector:
+def limited(velocity: Vector, bounds: Sequence[Bound], yaw: float, cone: Cone) -> Vector:
     """Return a velocity that keeps every bound [m/s].
 
-    It first slides along what is in the way; if that leaves the cone of half angle ``theta``
-    [rad] about ``yaw``, or is still too fast somewhere, the velocity is only shortened.
+    It first slides along what is in the way; if that leaves the cone about ``yaw`` [rad], or is
+    still too fast somewhere, the velocity is only shortened.
     """
     if all(_approach(velocity, bound) <= bound.limit for bound in bounds):
         return velocity
@@ -125,7 +125,7 @@ def limited(velocity: Vector, bounds: Sequence[Bound], yaw: float, theta: float)
                     sliding[1] + excess * n[1],
                     sliding[2] + excess * n[2],
                 )
-    if not _in_cone(sliding, yaw, theta):
+    if not _in_cone(sliding, yaw, cone):
         sliding = velocity
     return _kept(sliding, bounds)
 
@@ -153,7 +153,7 @@ def _approach(velocity: Vector, bound: Bound) -> float:
     return -(velocity[0] * n[0] + velocity[1] * n[1] + velocity[2] * n[2])
 
 
-def _in_cone(velocity: Vector, yaw: float, theta: float) -> bool:
+def _in_cone(velocity: Vector, yaw: float, cone: Cone) -> bool:
     if hypot(velocity[0], velocity[1]) <= DEAD_BAND_MPS:
         return True
-    return abs(azimuth_error(velocity[0], velocity[1], yaw)) <= theta + 1e-9
+    return cone.holds(azimuth_error(velocity[0], velocity[1], yaw))

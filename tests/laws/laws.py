@@ -13,6 +13,7 @@ from agent.comms import allocation
 from agent.controller import Peer
 from agent.guidance import bobber as bobber_room
 from agent.guidance import potential as potential_room
+from agent.guidance.cone import Cone
 from agent.guidance.movement import saturated, steer
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
@@ -139,15 +140,15 @@ def bobber_cycles_reach_the_target() -> None:
     A vehicle of perfect obedience: it flies to the bobber, heading there, or turns on the spot.
     """
     random = Random(7)
-    theta, reach, speed, yaw_rate, dt = radians(45), 0.5, 0.5, pi, 0.05
-    zone = bobber_room.cast_zone(theta, reach, speed, yaw_rate)
+    cone, reach, speed, yaw_rate, dt = Cone(radians(45), radians(45)), 0.5, 0.5, pi, 0.05
+    zone = bobber_room.cast_zone(cone, reach, speed, yaw_rate)
     for _ in range(300):
         q, yaw = (0.0, 0.0, 0.0), random.uniform(-pi, pi)
         target = _random_point(random, 3.0)
         for _ in range(800):
             q_ba = bobber_room.bobber(q, yaw, target, zone)
             u = tuple(2.0 * (b - a) for a, b in zip(q, q_ba, strict=True))
-            velocity, heading = steer(saturated(u, speed, speed), yaw, theta)  # type: ignore[arg-type]
+            velocity, heading = steer(saturated(u, speed, speed), yaw, cone)  # type: ignore[arg-type]
             q = tuple(a + dt * v for a, v in zip(q, velocity, strict=True))  # type: ignore[assignment]
             turn = (heading - yaw + pi) % (2 * pi) - pi
             yaw += max(-yaw_rate * dt, min(yaw_rate * dt, turn))

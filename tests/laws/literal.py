@@ -58,12 +58,12 @@ def push_two_sided(self, q, q_tg, q_j, q_tg_j):
 
 def bobber(q, yaw, q_toq, zone):
     """(1)-(3), (10) at unit weight: the least U_tcast + U_obcast in the cast-zone, on a grid."""
-    near, far = 0.05, zone.reach
+    near, far, theta = 0.05, zone.reach, zone.cone.left
     best, least = q, float("inf")
     for ring in range(1, 40):
         r = near + (far - near) * ring / 40
         for ray in range(1, 60):
-            side = -zone.theta + 2.0 * zone.theta * ray / 60
+            side = -theta + 2.0 * theta * ray / 60
             at = (q[0] + r * cos(yaw + side), q[1] + r * sin(yaw + side), q[2])
             onward = [t - a for t, a in zip(q_toq, at, strict=True)]
             out = [a - b for a, b in zip(at, q, strict=True)]
@@ -71,7 +71,7 @@ def bobber(q, yaw, q_toq, zone):
                 r * sqrt(sum(b * b for b in onward))
             )
             walls = 0.5 / (r - near) ** 2 + 0.5 / (r - far) ** 2
-            walls += 1.0 / (r * sin(zone.theta - side)) + 1.0 / (r * sin(zone.theta + side))
+            walls += 1.0 / (r * sin(theta - side)) + 1.0 / (r * sin(theta + side))
             potential = acos(max(-1.0, min(1.0, cosine))) + walls
             if potential < least:
                 best, least = at, potential

@@ -16,6 +16,7 @@ class Trace:
         self._hash.update(slot.to_bytes(8, "little"))
         self._hash.update(fleet.position.tobytes())
         self._hash.update(fleet.yaw.tobytes())
+        self._hash.update(fleet.tilt.tobytes())
 
     def command(self, agent: int, command: bytes) -> None:
         """Take one agent's command, as it was encoded; agents come in order of their ids."""

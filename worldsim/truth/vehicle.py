@@ -20,13 +20,16 @@ def wrapped(angle: Floats) -> Floats:
 class Fleet:
     """Kinematic vehicles: they take up any velocity at once, within speed, climb and yaw rate.
 
-    position (N, 3) [m], velocity (N, 3) [m/s], yaw (N,) [rad]; a row of NaN is not in the world.
+    position (N, 3) [m], velocity (N, 3) [m/s], yaw (N,) [rad], tilt (N, 2): pitch and roll [rad]; a
+    row of NaN is not in the world.
     """
 
     def __init__(self, position: Floats, yaw: Floats, limits: Vehicle) -> None:
         self.position = position.astype(np.float64)
         self.velocity = np.zeros_like(self.position)
         self.yaw = yaw.astype(np.float64)
+        self.tilt = np.zeros((len(yaw), 2))
+        self._max_tilt = np.radians(limits.max_tilt_deg)
         self._max_speed = limits.max_speed_mps
         self._max_climb = limits.max_climb_mps
         self._max_yaw_rate = np.radians(limits.max_yaw_rate_dps)
@@ -34,8 +37,8 @@ class Fleet:
     def __len__(self) -> int:
         return len(self.yaw)
 
-    def integrate(self, velocity: Floats, yaw: Floats, dt: float) -> None:
-        """Fly for ``dt`` [s] at the velocities (N, 3) [m/s] and towards the yaws (N,) [rad] wanted.
+    def integrate(self, velocity: Floats, yaw: Floats, tilt: Floats, dt: float) -> None:
+        """Fly for ``dt`` [s] at velocities (N, 3) [m/s], towards yaws (N,) and tilts (N, 2) [rad].
 
         A velocity beyond a limit is scaled down as a whole, so that its direction holds.
         """
@@ -44,6 +47,8 @@ class Fleet:
         reach = self._max_yaw_rate * dt
         turn = np.minimum(np.maximum(wrapped(yaw - self.yaw), -reach), reach)
         self.yaw = wrapped(self.yaw + turn)
+        tilt = np.minimum(np.maximum(tilt, -self._max_tilt), self._max_tilt)
+        self.tilt = self.tilt + np.minimum(np.maximum(tilt - self.tilt, -reach), reach)
 
     def _limited(self, velocity: Floats) -> Floats:
         x, y, z = velocity[:, 0], velocity[:, 1], velocity[:, 2]

@@ -62,6 +62,7 @@ class World:
         self._expires = np.zeros(len(yaw), dtype=np.int64)
         self._velocity = np.zeros((len(yaw), 3))
         self._yaw = self.fleet.yaw.copy()
+        self._tilt = np.zeros((len(yaw), 2))
 
     @property
     def time_s(self) -> float:
@@ -107,6 +108,7 @@ class World:
         self._expires[agent] = min(command.expires_slot, command.slot + self._longest)
         self._velocity[agent] = command.velocity
         self._yaw[agent] = command.yaw
+        self._tilt[agent] = command.tilt
         return True
 
     def advance(self) -> None:
@@ -114,5 +116,6 @@ class World:
         valid = self._expires > self.slot
         velocity = np.where(valid[:, None], self._velocity, 0.0)
         yaw = np.where(valid, self._yaw, self.fleet.yaw)
-        self.fleet.integrate(velocity, yaw, 1.0 / self.clock.slot_hz)
+        tilt = np.where(valid[:, None], self._tilt, self.fleet.tilt)
+        self.fleet.integrate(velocity, yaw, tilt, 1.0 / self.clock.slot_hz)
         self.slot += 1

@@ -5,6 +5,7 @@ from random import Random
 
 import pytest
 
+from agent.guidance.cone import Cone
 from agent.guidance.safety import (
     PROMISE_S,
     Bound,
@@ -31,7 +32,7 @@ class Vehicle:
         self.phase = random.randrange(SLOTS)
         self.latency_slots = random.randrange(horizon_slots - SLOTS + 1)
         self.yaw = random.uniform(-pi, pi)
-        self.theta = random.choice((0.4, pi / 4, pi))
+        self.cone = random.choice((Cone(0.4, 0.4), Cone(pi / 4, 1.0), Cone(pi, pi)))
         self.filter = RangingFilter(D_OB, max_speed, horizon_slots * dt)
         self.waiting = []
         self.velocity, self.expires = (0.0, 0.0, 0.0), 0
@@ -51,7 +52,7 @@ class Vehicle:
         if slot % SLOTS != self.phase:
             return
         towards = tuple(b - a for a, b in zip(self.position, other, strict=True))
-        safe = limited(self.wants(towards), self.filter.bounds([towards]), self.yaw, self.theta)
+        safe = limited(self.wants(towards), self.filter.bounds([towards]), self.yaw, self.cone)
         self.waiting.append((slot + self.latency_slots, slot + self.horizon_slots, safe))
 
     def fly(self, slot):
@@ -120,7 +121,7 @@ class Speaker:
         self.filter.promise(now, told)
         self.cap = self.filter.speed_cap
         wanted = tuple(0.5 * x / max(hypot(*relative), 1e-9) for x in relative)
-        safe = limited(wanted, self.filter.bounds(told), 0.0, pi)
+        safe = limited(wanted, self.filter.bounds(told), 0.0, Cone(pi, pi))
         self.velocity = shortened(safe, self.cap)
         return (now, self.position, self.cap)
 
@@ -172,7 +173,7 @@ def test_what_leaves_the_cone_is_only_shortened():
         norm = hypot(*away)
         bounds = [Bound(tuple(x / norm for x in away), random.uniform(0, 0.2))]
         yaw = random.uniform(-pi, pi)
-        safe = limited(velocity, bounds, yaw, 0.0)
+        safe = limited(velocity, bounds, yaw, Cone(0.0, 0.0))
         approach = -sum(v * n for v, n in zip(safe, bounds[0].away, strict=True))
         assert approach <= bounds[0].limit + 1e-9
         assert hypot(*safe) <= hypot(*velocity) + 1e-9
