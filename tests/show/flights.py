@@ -49,7 +49,7 @@ def straight_flight(scenario: Scenario) -> Iterator[Tick]:
             index=index,
             time_s=index / tick_hz,
             position=position.astype(np.float32),
-            yaw=np.arctan2(away[:, 1], away[:, 0]).astype(np.float32),
+            attitude=_level(np.arctan2(away[:, 1], away[:, 0])),
             target=slots.astype(np.float32),
             place=np.array(places, dtype=np.int16),
             force=force.astype(np.float32),
@@ -60,6 +60,10 @@ def straight_flight(scenario: Scenario) -> Iterator[Tick]:
         )
         step = np.minimum(1.0, SPEED_MPS / tick_hz / np.maximum(force, 1e-9))
         position = position + step[:, None] * away
+
+
+def _level(yaw: np.ndarray) -> np.ndarray:
+    return np.column_stack((yaw, np.zeros((len(yaw), 2)))).astype(np.float32)
 
 
 def record(recorder: RunRecorder, scenario: Scenario, ticks: list[Tick]) -> Judge:

@@ -40,7 +40,7 @@ def _wild_tick(generator: np.random.Generator, index: int) -> Tick:
         index=index,
         time_s=index / 20.0,
         position=position,
-        yaw=row(),
+        attitude=row(3),
         target=target,
         place=generator.integers(-1, 4, (AGENTS, 2)).astype(np.int16),
         force=force,

@@ -17,17 +17,17 @@ Packets = dict[str, int]
 class Tick:
     """One tick of truth and telemetry; row i = agent i, NaN for no vehicle in the world.
 
-    position (N, 3) [m; world frame]; yaw (N,) [rad]; target (N, 3) [m; world frame], the
-    target-on-queue, NaN for none; place (N, 2): queue and rank, -1 for none; force (N,) |u_i| of
-    (28); turn_deg (N,): azimuth of the wanted velocity against the heading on moving steps, else
-    NaN; alive (N,): whether the agent's process takes part; links (L, 2): (hearer, heard).
-    packets: counters so far, as in summary.json.
+    position (N, 3) [m; world frame]; attitude (N, 3): yaw, pitch, roll [rad]; target (N, 3) [m;
+    world frame], the target-on-queue, NaN for none; place (N, 2): queue and rank, -1 for none;
+    force (N,): |u_i| of (28); turn_deg (N,): azimuth of the wanted velocity against the heading on
+    moving steps, else NaN; alive (N,): whether the agent's process takes part; links (L, 2):
+    (hearer, heard). packets: counters so far, as in summary.json.
     """
 
     index: int
     time_s: float
     position: Singles
-    yaw: Singles
+    attitude: Singles
     target: Singles
     place: NDArray[np.int16]
     force: Singles

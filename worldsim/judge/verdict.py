@@ -6,12 +6,13 @@ agent means to hold, and computes where that place is by itself.
 
 from collections import Counter
 from dataclasses import dataclass
+from math import degrees, remainder, tau
 from typing import Any
 
 import numpy as np
 
-from agent.messages import Place, Vector
-from agent.qstructure.formation import Formation
+from agent.messages import Place
+from agent.qstructure.formation import Formation, Slot
 from agent.qstructure.frame import Frame
 from worldsim.judge.metrics import Floats, swept_separation
 from worldsim.judge.tick import Tick
@@ -54,7 +55,7 @@ class Phase:
         self.residual_m: float | None = None
         self._frame = Frame()
         self._since_s: float | None = None
-        self._slots: dict[tuple[int, int, int], Vector | None] = {}
+        self._slots: dict[tuple[int, int, int], Slot | None] = {}
 
     def slot_error(self, tick: Tick) -> Floats:
         """Return each agent's distance to the slot it claims [m]; infinite without a valid one.
@@ -62,26 +63,44 @@ class Phase:
         Two that claim the same slot have none: neither counts as arrived.
         """
         error = np.full(len(tick.place), np.inf)
-        claims = [(queue, rank) for queue, rank in tick.place.tolist()]
-        holders = Counter(claim for claim, alive in zip(claims, tick.alive, strict=True) if alive)
-        team = int(np.sum(tick.alive))
-        stands = {
-            row: slot
-            for row, claim in enumerate(claims)
-            if holders[claim] <= 1 and (slot := self._slot(*claim, team)) is not None
-        }
-        if stands:
-            rows = list(stands)
-            off = tick.position[rows].astype(np.float64) - np.array(list(stands.values()))
+        slots = self._own_slots(tick)
+        if slots:
+            rows = list(slots)
+            stands = [self._frame.to_world(slot.point) for slot in slots.values()]
+            off = tick.position[rows].astype(np.float64) - np.array(stands)
             error[rows] = np.sqrt(np.sum(off * off, axis=1))
         error[np.isnan(tick.position[:, 0])] = np.nan
         return error
 
-    def _slot(self, queue: int, rank: int, team: int) -> Vector | None:
+    def attitude_error_deg(self, tick: Tick) -> float | None:
+        """Return the largest angle by which an agent misses its slot's orientation [deg].
+
+        Angles that a queue leaves free do not count; None where all are free.
+        """
+        wanted = [
+            (angle + (self._frame.yaw if axis == 0 else 0.0), float(tick.attitude[row, axis]))
+            for row, slot in self._own_slots(tick).items()
+            for axis, angle in enumerate(slot.attitude)
+            if angle is not None and tick.alive[row]
+        ]
+        missed = [abs(remainder(angle - flown, tau)) for angle, flown in wanted]
+        return degrees(max(missed)) if missed else None
+
+    def _own_slots(self, tick: Tick) -> dict[int, Slot]:
+        """Return the slot of each agent that claims a valid one alone, by row."""
+        claims = [(queue, rank) for queue, rank in tick.place.tolist()]
+        holders = Counter(claim for claim, alive in zip(claims, tick.alive, strict=True) if alive)
+        team = int(np.sum(tick.alive))
+        return {
+            row: slot
+            for row, claim in enumerate(claims)
+            if holders[claim] <= 1 and (slot := self._slot(*claim, team)) is not None
+        }
+
+    def _slot(self, queue: int, rank: int, team: int) -> Slot | None:
         key = (queue, rank, team)
         if key not in self._slots:
-            slot = self.formation.slot(Place(queue, rank), team)
-            self._slots[key] = self._frame.to_world(slot.point) if slot is not None else None
+            self._slots[key] = self.formation.slot(Place(queue, rank), team)
         return self._slots[key]
 
     def see(self, time_s: float, error: Floats) -> bool:
@@ -129,6 +148,11 @@ class Judge:
         error = phase.slot_error(tick)
         in_place = phase.see(tick.time_s, np.where(tick.alive, error, np.nan))
         return Figures(separation, error, in_place)
+
+    @property
+    def attitude_error_deg(self) -> float | None:
+        """Largest angle missed at the last tick [deg]; None where every angle is free."""
+        return None if self._before is None else self.phases[-1].attitude_error_deg(self._before)
 
     @property
     def turns_over_limit_fraction(self) -> float | None:

@@ -180,7 +180,7 @@ class SlotLoop:
             index=self.world.slot // self.world.clock.slots_per_tick,
             time_s=self.world.time_s,
             position=fleet.position.astype(np.float32),
-            yaw=fleet.yaw.astype(np.float32),
+            attitude=np.column_stack((fleet.yaw, fleet.tilt)).astype(np.float32),
             target=np.array([row.target for row in told], dtype=np.float32),
             place=np.array([row.place for row in told], dtype=np.int16),
             force=np.array([row.force for row in told], dtype=np.float32),

@@ -57,6 +57,7 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
         "min_separation_m": judge.min_separation_m,
         "min_obstacle_distance_m": None,
         "phases": _phases(judge),
+        "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "packets": _packets(verdicts, rejected),
         "invariants": invariants,

@@ -24,7 +24,7 @@ EVENTS = "/log/events"
 EVENT = "event"
 
 STATE = "/state/agents"
-PLACE, ALIVE, YAW = "place", "alive", "yaw"
+PLACE, ALIVE, ATTITUDE = "place", "alive", "attitude"
 HEARD = "/state/links"
 HEARS = "hears"
 

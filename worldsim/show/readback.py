@@ -96,7 +96,7 @@ class _Columns:
 
 _POSITIONS = "Points3D:positions"
 _SCALARS = "Scalars:scalars"
-_READ = {_POSITIONS, _SCALARS, layout.PLACE, layout.ALIVE, layout.YAW, layout.HEARS}
+_READ = {_POSITIONS, _SCALARS, layout.PLACE, layout.ALIVE, layout.ATTITUDE, layout.HEARS}
 
 
 def _rows(lists: Any) -> list[NDArray[Any]]:
@@ -129,7 +129,7 @@ def _ticks(columns: _Columns, scenario: Scenario) -> list[Tick]:
     """Return the ticks of which every row is there."""
     agents = scenario.fleet.agents
     always = [columns.of(*name) for name in _EVERY_TICK]
-    position, target, force, turn, place, alive, yaw = always
+    position, target, force, turn, place, alive, attitude = always
     whole = sorted(set(position).intersection(*always))
     heard = _latest(columns.of(layout.HEARD, layout.HEARS), whole, _no_bits(agents))
     packets = _packets(columns.counters(), whole)
@@ -138,7 +138,7 @@ def _ticks(columns: _Columns, scenario: Scenario) -> list[Tick]:
             index=index,
             time_s=index * SLOTS_PER_TICK / scenario.slot_hz,
             position=position[index].reshape(-1, 3),
-            yaw=yaw[index],
+            attitude=attitude[index].reshape(-1, 3),
             target=target[index].reshape(-1, 3),
             place=place[index].reshape(-1, 2),
             force=force[index].astype(np.float32),
@@ -158,7 +158,7 @@ _EVERY_TICK = (
     (layout.TURN_DEG, _SCALARS),
     (layout.STATE, layout.PLACE),
     (layout.STATE, layout.ALIVE),
-    (layout.STATE, layout.YAW),
+    (layout.STATE, layout.ATTITUDE),
 )
 
 

@@ -156,13 +156,26 @@ def _trail(ticks: Sequence[Tick], colours: palette.Colours) -> Sheet:
 def _poses(ticks: Sequence[Tick]) -> Iterator[Sheet]:
     rows, counts = range(len(ticks)), [len(ticks[0].alive)] * len(ticks)
     position = np.concatenate([tick.position for tick in ticks])
-    half = np.concatenate([tick.yaw for tick in ticks]) / 2.0
-    zero = np.zeros_like(half)
-    attitude = np.stack([zero, zero, np.sin(half), np.cos(half)], axis=1)
+    attitude = _quaternions(np.concatenate([tick.attitude for tick in ticks]))
     target = np.concatenate([tick.target for tick in ticks])
     boxes = rr.Boxes3D.columns(centers=position, quaternions=attitude)
     yield Sheet(layout.VEHICLES, rows, boxes.partition(counts))
     yield Sheet(layout.TARGETS, rows, rr.Points3D.columns(positions=target).partition(counts))
+
+
+def _quaternions(attitude: Singles) -> Singles:
+    """Return xyzw of yaw, pitch (nose up) and roll (right side down), turned in that order."""
+    (sy, sp, sr), (cy, cp, cr) = np.sin(0.5 * attitude.T), np.cos(0.5 * attitude.T)
+    sp = -sp  # z is up and x ahead, so the nose rises by a negative turn about y, the left
+    return np.stack(
+        [
+            cy * cp * sr - sy * sp * cr,
+            cy * sp * cr + sy * cp * sr,
+            sy * cp * cr - cy * sp * sr,
+            cy * cp * cr + sy * sp * sr,
+        ],
+        axis=1,
+    )
 
 
 def _metrics(ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Sheet]:
@@ -182,12 +195,12 @@ def _state(ticks: Sequence[Tick]) -> Sheet:
     agents = len(ticks[0].alive)
     place = np.concatenate([tick.place.ravel() for tick in ticks])
     alive = np.concatenate([tick.alive for tick in ticks]).astype(np.uint8)
-    yaw = np.concatenate([tick.yaw for tick in ticks])
+    attitude = np.concatenate([tick.attitude.ravel() for tick in ticks])
     counts = [agents] * len(ticks)
     columns = [
         _column(layout.PLACE, place, [2 * agents] * len(ticks)),
         _column(layout.ALIVE, alive, counts),
-        _column(layout.YAW, yaw, counts),
+        _column(layout.ATTITUDE, attitude, [3 * agents] * len(ticks)),
     ]
     return Sheet(layout.STATE, range(len(ticks)), columns)
 
