@@ -68,7 +68,7 @@ def test_the_judge_meets_the_same_numbers_in_the_recording(ticks: list[Tick]) ->
 
 def _assert_equal(before: Tick, after: Tick) -> None:
     assert (after.index, after.time_s) == (before.index, before.time_s)
-    for rows in ("position", "yaw", "target", "place", "force", "turn_deg", "alive"):
+    for rows in ("position", "attitude", "target", "place", "force", "turn_deg", "alive"):
         kept, given_ = getattr(after, rows), getattr(before, rows)
         assert kept.dtype == given_.dtype
         np.testing.assert_array_equal(kept, given_)
