@@ -58,7 +58,7 @@ class Comms(Table, frozen=True):
 class AgentSetup(Table, frozen=True):
     """All that one agent is told.
 
-    command_ticks: for how many ticks a command is valid; H of ERRATA 2 follows from it.
+    command_ticks: for how many ticks a command is valid; H of docs/method.md follows from it.
     """
 
     id: Annotated[int, Meta(ge=0, lt=2**16)]

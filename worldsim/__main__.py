@@ -9,7 +9,8 @@ from worldsim.run.admission import PROCESS_COMMAND_TICKS, admit
 from worldsim.run.outside import ByHand
 from worldsim.run.process import Terms, run
 from worldsim.run.rundir import RunDirectory
-from worldsim.scenario import ScenarioError, load
+from worldsim.scenario.file import load
+from worldsim.scenario.toml import ScenarioError
 
 MAX_SPEED = 1000.0
 

@@ -16,7 +16,7 @@ import typer
 from typer.main import get_command
 
 if TYPE_CHECKING:
-    from worldsim.scenario import Scenario
+    from worldsim.scenario.tables import Scenario
 
 HELD, NOT_HELD, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 MAX_RUNS = 1_000_000
@@ -152,9 +152,9 @@ def check(
     settings: Settings = None,
 ) -> int:
     """Check a scenario and print it resolved; warnings go to stderr. Nothing is started."""
-    from worldsim.rules import cautions, too_fast
     from worldsim.run.admission import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
-    from worldsim.scenario import dump
+    from worldsim.scenario.file import dump
+    from worldsim.scenario.rules import cautions, too_fast
 
     overrides = _overrides(settings, agents, seed, duration)
     admitted = _admitted(scenario, overrides, VIRTUAL_COMMAND_TICKS)
@@ -201,7 +201,7 @@ def main() -> None:
 def command(arguments: list[str]) -> int:
     """Run one command line; return its exit status. Bad input is told in one line."""
     from worldsim.run.rundir import RunDirectoryError, RunWriteError
-    from worldsim.scenario import ScenarioError
+    from worldsim.scenario.toml import ScenarioError
 
     try:
         status = get_command(app)(arguments, prog_name="qswarm", standalone_mode=False)
@@ -219,7 +219,7 @@ def command(arguments: list[str]) -> int:
 
 def _admitted(file: Path, overrides: Mapping[str, str], command_ticks: int) -> "Scenario":
     from worldsim.run.admission import admit
-    from worldsim.scenario import load
+    from worldsim.scenario.file import load
 
     scenario = load(file, overrides)
     admit(scenario, file, command_ticks)

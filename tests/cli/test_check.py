@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from tests.cli.conftest import Command
-from worldsim.scenario import load, parse
+from worldsim.scenario.file import load, parse
 
 
 def test_it_prints_the_resolved_scenario(small: Path, qswarm: Command) -> None:

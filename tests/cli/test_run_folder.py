@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from worldsim.run.rundir import RunDirectory, RunDirectoryError, RunWriteError
-from worldsim.scenario import Scenario, load, parse
+from worldsim.scenario.file import load, parse
+from worldsim.scenario.tables import Scenario
 
 FULL = Path("/dev/full")
 

@@ -9,7 +9,7 @@ import pytest
 
 from tests.cli.conftest import Command
 from tests.processes.harness import QSWARM, Started, eventually
-from worldsim.scenario import load
+from worldsim.scenario.file import load
 
 
 def summary(folder: str | Path) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import pytest
 from netem.link import Cause
 from worldsim.run.summary import EXIT_STATUS, FATES, summarise
 from worldsim.run.virtual import Flight, fly
-from worldsim.scenario import load
+from worldsim.scenario.file import load
 
 KEYS = {
     *("schema", "scenario", "seed", "mode", "agents", "duration_s", "outcome", "expectations"),

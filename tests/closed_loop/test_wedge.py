@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from worldsim.run.virtual import fly
-from worldsim.scenario import load
+from worldsim.scenario.file import load
 
 WEDGE = Path(__file__).parents[2] / "deploy" / "scenarios" / "wedge-9.toml"
 LOSSY = {

@@ -10,8 +10,10 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
-from worldsim.describing import allowed
-from worldsim.scenario import Scenario, ScenarioError, dump, load, parse
+from worldsim.scenario.describing import allowed
+from worldsim.scenario.file import dump, load, parse
+from worldsim.scenario.tables import Scenario
+from worldsim.scenario.toml import ScenarioError
 
 EVERYTHING = load(
     Path("deploy/scenarios/wedge-9.toml"),

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from worldsim.scenario import ScenarioError, load, parse
+from worldsim.scenario.file import load, parse
+from worldsim.scenario.toml import ScenarioError
 
 WEDGE = Path("deploy/scenarios/wedge-9.toml")
 QUEUE = "{ name = 'Q', vertices = ['V1'], shape = { kind = 'ray', direction = [0, 0, 1] } }"

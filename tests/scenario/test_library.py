@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
-from worldsim.rules import cautions
-from worldsim.scenario import load
+from worldsim.scenario.file import load
+from worldsim.scenario.rules import cautions
 
 LIBRARY = Path("deploy/formations")
 SCENARIOS = sorted(Path("deploy/scenarios").glob("*.toml"))

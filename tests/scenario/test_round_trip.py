@@ -6,7 +6,8 @@ import msgspec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from worldsim.scenario import Scenario, dump, parse
+from worldsim.scenario.file import dump, parse
+from worldsim.scenario.tables import Scenario
 
 names = st.text(min_size=1, max_size=12)
 metres = st.floats(-1e3, 1e3)

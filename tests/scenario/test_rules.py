@@ -4,10 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from worldsim.rules import cautions, too_fast
 from worldsim.run.admission import VIRTUAL_COMMAND_TICKS, admit
 from worldsim.run.virtual import COMMAND_TICKS
-from worldsim.scenario import Scenario, ScenarioError, load
+from worldsim.scenario.file import load
+from worldsim.scenario.rules import cautions, too_fast
+from worldsim.scenario.tables import Scenario
+from worldsim.scenario.toml import ScenarioError
 
 WEDGE = Path("deploy/scenarios/wedge-9.toml")
 

@@ -8,9 +8,8 @@ from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Expectation, Figures, Judge
-from worldsim.scenario import Scenario
+from worldsim.scenario.tables import Expectations, Fleet, Scenario
 from worldsim.show.recorder import RunRecorder
-from worldsim.tables import Expectations, Fleet
 
 EDGES = ((-1, -1, -1), (-1, -1, 1), (-1, 1, -1), (-1, 1, 1))
 SPEED_MPS = 0.5

@@ -16,7 +16,7 @@ from agent.qstructure.formation import Formation, Slot
 from agent.qstructure.frame import Frame
 from worldsim.judge.metrics import Floats, swept_separation
 from worldsim.judge.tick import Tick
-from worldsim.scenario import Scenario
+from worldsim.scenario.tables import Scenario
 
 CONVERGED_M = 0.12
 CONVERGED_S = 2.0

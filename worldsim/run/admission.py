@@ -8,13 +8,14 @@ from pathlib import Path
 
 from agent.controller import ControllerError
 from agent.controller import load as load_controller
-from worldsim.rules import Finding, too_fast
-from worldsim.scenario import Scenario, ScenarioError
+from worldsim.scenario.rules import Finding, too_fast
+from worldsim.scenario.tables import Scenario
+from worldsim.scenario.toml import ScenarioError
 from worldsim.truth.start import StartError, starts
 
 VIRTUAL_COMMAND_TICKS = 1
 PROCESS_COMMAND_TICKS = 2
-"""For how many ticks a command lives under each clock: H of ERRATA 2."""
+"""For how many ticks a command lives under each clock: H of docs/method.md."""
 
 
 def admit(scenario: Scenario, file: str | Path, command_ticks: int) -> None:

@@ -25,7 +25,7 @@ from worldsim.run.rundir import RunDirectory
 from worldsim.run.summary import EXIT_STATUS
 from worldsim.run.terminal import Terminal
 from worldsim.run.zygote import Brood, Zygote
-from worldsim.scenario import Scenario
+from worldsim.scenario.tables import Scenario
 from worldsim.show.telling import verdict
 
 __all__ = ["ProcessRow", "processes", "run"]

@@ -6,7 +6,7 @@ from pathlib import Path
 from worldsim.run.rundir import RunDirectoryError, make_folder, write_json
 from worldsim.run.summary import EXIT_STATUS
 from worldsim.run.sweep import Job, Summary, over_all, simulate, sweep
-from worldsim.scenario import Scenario
+from worldsim.scenario.tables import Scenario
 from worldsim.show.telling import ProgressLine, table, verdict
 
 

@@ -11,7 +11,7 @@ from netem.messages import MediumSetup
 from netem.wire.post import Post, RefusedError, Roll, Waiting, drained
 from worldsim.run.admission import PROCESS_COMMAND_TICKS
 from worldsim.run.outside import Outside
-from worldsim.scenario import Scenario
+from worldsim.scenario.tables import Scenario
 
 MUSTER_WITHIN_S = 30.0
 LOOK_EVERY_S = 0.02

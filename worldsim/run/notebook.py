@@ -6,7 +6,7 @@ from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
 from worldsim.run.rundir import RunDirectory
 from worldsim.run.slots import Event, Recorder
-from worldsim.scenario import Scenario
+from worldsim.scenario.tables import Scenario
 
 
 class ClosingRecorder(Recorder, Protocol):

@@ -29,7 +29,7 @@ from worldsim.run.pace import Pacer, Punctuality
 from worldsim.run.rundir import RunDirectory, RunDirectoryError, RunWriteError
 from worldsim.run.slots import Opened, Recorder, SlotLoop, world_of
 from worldsim.run.summary import EXIT_STATUS, summarise
-from worldsim.scenario import Scenario
+from worldsim.scenario.tables import Scenario
 
 SENDER_RING = 4
 SENDER_QUOTA = 2

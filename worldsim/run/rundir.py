@@ -6,7 +6,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from worldsim.scenario import Scenario, dump
+from worldsim.scenario.file import dump
+from worldsim.scenario.tables import Scenario
 
 RUNS = Path("runs")
 

@@ -16,7 +16,7 @@ from agent.messages import Command, Observation, Vector
 from worldsim.judge.tick import Packets, Tick
 from worldsim.judge.verdict import Figures, Judge
 from worldsim.run.trace import Trace
-from worldsim.scenario import SLOTS_PER_TICK, Scenario
+from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 from worldsim.truth.sensor import ProximitySensor
 from worldsim.truth.start import starts
 from worldsim.truth.world import Clock, World

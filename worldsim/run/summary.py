@@ -6,7 +6,7 @@ from typing import Any
 from netem.messages import Verdicts
 from worldsim.judge.verdict import Expectation, Judge
 from worldsim.run.slots import SlotLoop
-from worldsim.scenario import Scenario
+from worldsim.scenario.tables import Scenario
 
 SCHEMA = 1
 FATES = (

@@ -16,7 +16,7 @@ from worldsim.run.rundir import RunDirectory
 from worldsim.run.slots import SlotLoop
 from worldsim.run.summary import summarise
 from worldsim.run.virtual import fly
-from worldsim.scenario import Scenario
+from worldsim.scenario.tables import Scenario
 
 Summary = dict[str, Any]
 

@@ -16,7 +16,7 @@ from netem.messages import Verdicts
 from netem.wire.frame import Batch, Outgoing, Transmission, pack, unpack_batch, unpack_transmission
 from worldsim.judge.tick import Packets
 from worldsim.run.slots import Event, Opened, Recorder, SlotLoop, world_of
-from worldsim.scenario import Scenario
+from worldsim.scenario.tables import Scenario
 
 COMMAND_TICKS = 1
 """A command is valid for one tick: in virtual time none is ever late."""

@@ -19,7 +19,8 @@ from rerun.chunk import Chunk, RrdReader
 from rerun.error_utils import RerunWarning
 
 from worldsim.judge.tick import Packets, Tick
-from worldsim.scenario import SLOTS_PER_TICK, Scenario, parse
+from worldsim.scenario.file import parse
+from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 from worldsim.show import layout
 from worldsim.show.frames import readable
 

@@ -16,7 +16,7 @@ import rerun as rr
 from agent.qstructure.formation import Formation
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
-from worldsim.scenario import Scenario
+from worldsim.scenario.tables import Scenario
 from worldsim.show import layout
 from worldsim.show.blueprint import blueprint_of, stage_of
 from worldsim.show.scenery import Scenery, limits

@@ -12,7 +12,8 @@ from agent.messages import Vector
 from agent.qstructure.formation import Formation
 from agent.qstructure.frame import Frame
 from worldsim.judge.verdict import CONVERGED_M
-from worldsim.scenario import Scenario, dump
+from worldsim.scenario.file import dump
+from worldsim.scenario.tables import Scenario
 from worldsim.show import layout, palette
 
 TRAIL_RADIUS_M = 0.018

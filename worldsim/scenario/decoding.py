@@ -14,8 +14,8 @@ from typing import Annotated, Any, NamedTuple, TypeVar, Union, get_args, get_ori
 
 import msgspec
 
-from worldsim.describing import allowed, got, tags
-from worldsim.toml import ScenarioError
+from worldsim.scenario.describing import allowed, got, tags
+from worldsim.scenario.toml import ScenarioError
 
 T = TypeVar("T")
 

@@ -8,13 +8,13 @@ from math import ceil, dist
 from pathlib import Path
 from typing import NamedTuple
 
-from worldsim.tables import SLOTS_PER_TICK, BoxStart, Scenario
-from worldsim.toml import ScenarioError
+from worldsim.scenario.tables import SLOTS_PER_TICK, BoxStart, Scenario
+from worldsim.scenario.toml import ScenarioError
 
 TARGET_FLOOR_M = 0.25
 """E1: targets nearer than separation_m plus this are no equilibrium of the potential."""
 MAX_STEP_M = 0.1
-"""ERRATA 2: the safety filter holds for v_max H up to this, H a command's longest life."""
+"""docs/method.md: the safety filter holds for v_max H up to this, H a command's longest life."""
 
 
 class Finding(NamedTuple):

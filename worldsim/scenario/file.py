@@ -13,22 +13,10 @@ import msgspec
 import tomli_w
 
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
-from worldsim.decoding import decode
-from worldsim.rules import TARGET_FLOOR_M, check
-from worldsim.tables import SLOTS_PER_TICK, BoxStart, ListStart, Scenario
-from worldsim.toml import Data, ScenarioError, override, read, tables
-
-__all__ = [
-    "SLOTS_PER_TICK",
-    "BoxStart",
-    "ListStart",
-    "Scenario",
-    "ScenarioError",
-    "dump",
-    "load",
-    "parse",
-]
-
+from worldsim.scenario.decoding import decode
+from worldsim.scenario.rules import TARGET_FLOOR_M, check
+from worldsim.scenario.tables import Scenario
+from worldsim.scenario.toml import Data, ScenarioError, override, read, tables
 
 _PLAIN_ARRAY = re.compile(r"\[\n((?: +[^\s\[\]{}][^\n]*,\n)+) *\]")
 

@@ -1,0 +1,1 @@
+"""Scenario files: TOML in, typed and checked tables out, or an error naming file and key."""
