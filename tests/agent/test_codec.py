@@ -25,7 +25,9 @@ MANY = 15_000
 VECTOR = (1.0, -2.5, 0.25)
 GOOD = {
     Observation: Observation(7, 1.5, VECTOR, VECTOR, 0.5, (VECTOR, VECTOR)),
-    Command: Command(7, 1, 9, VECTOR, 0.5, (0.1, 0.2), Telemetry(VECTOR, 1.0, VECTOR, (1, 2), (3, 4), 5)),
+    Command: Command(
+        7, 1, 9, VECTOR, 0.5, (0.1, 0.2), Telemetry(VECTOR, 1.0, VECTOR, (1, 2), (3, 4), 5)
+    ),
     Beacon: Beacon(3, 1, 900, 1.5, VECTOR, VECTOR, VECTOR, 1, 2, 0.5, ((1, 900), (2, 901))),
     Gossip: Gossip(3, 1.5, (Record(4, 0, 77, 1.25, VECTOR, -1, -1),) * 3),
 }
@@ -72,7 +74,9 @@ messages = st.one_of(
         angles,
         st.lists(positions, max_size=9).map(tuple),
     ),
-    st.builds(Command, counts, counts, counts, velocities, angles, telemetries),
+    st.builds(
+        Command, counts, counts, counts, velocities, angles, st.tuples(angles, angles), telemetries
+    ),
     st.builds(
         Beacon,
         ids,

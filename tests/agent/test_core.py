@@ -221,9 +221,10 @@ def test_two_that_hear_each_other_share_out_the_places():
 def test_who_falls_silent_is_forgotten_and_its_place_is_free():
     core = agent()
     for tick in range(40):
-        hear(core, beacon(1, tick, tick * TICK_S, at=ORIGIN), tick * TICK_S)
+        hear(core, beacon(1, tick, tick * TICK_S, at=(0.5, -0.5, -0.5)), tick * TICK_S)
         held = core.step(seen(tick)).command.telemetry
     assert held.heard == (1,)
+    assert held.place != (0, 0)
     for tick in range(40, 40 + 60):
         alone = core.step(seen(tick)).command.telemetry
     assert alone.heard == ()

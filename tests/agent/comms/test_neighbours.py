@@ -143,6 +143,15 @@ def test_a_true_clock_is_never_taken_for_an_offset():
     assert taken > 100
 
 
+@pytest.mark.parametrize(("before_s", "believed_too"), [(0.09, True), (0.11, False)])
+def test_an_echo_is_allowed_the_same_slack_as_a_stamp(before_s, believed_too):
+    known, told = neighbours(), beacon(OTHER, 5, 1.0 - before_s, echoes=[(0, 1)])
+    if believed_too:
+        known.hear(told, 1.2, {1: 1.0})
+    else:
+        assert cause(known, told, 1.2, {1: 1.0}) == "offset"
+
+
 def test_an_echo_of_what_was_never_sent_proves_nothing():
     known = neighbours()
     known.hear(beacon(OTHER, 5, 1.0, echoes=[(0, 77)]), 1.0, {1: 0.9})
