@@ -25,6 +25,7 @@ from netem.wire.frame import (
 
 _FATE = Layout("<5qBd").pack
 DELIVERED = Cause.DELIVERED
+FATES = tuple(cause.name.lower() for cause in Cause)
 _InFlight = tuple[float, int, int, int, int, Frame]
 
 
@@ -98,7 +99,7 @@ class Medium:
 
     def verdicts(self, slot: int) -> Verdicts:
         """Return the counters as they stand."""
-        fates = {cause.name.lower(): self._fates[cause] for cause in Cause}
+        fates = dict(zip(FATES, self._fates, strict=True))
         return Verdicts(slot, self.sent, self.addressed, fates, self.in_flight, {}, self.digest())
 
     def _spread(self, frame: Frame, sent_s: float) -> None:

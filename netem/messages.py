@@ -74,3 +74,8 @@ class Verdicts(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_un
     rejected: dict[str, Count]
     digest: bytes = b""
     late_s: tuple[float, float] | None = None
+
+    def packets(self) -> dict[str, int]:
+        """Return the counters under their names in summary.json, fates between the others."""
+        counted = {"sent": self.sent, "addressed": self.addressed}
+        return {**counted, **self.fates, "in_flight": self.in_flight}

@@ -10,7 +10,7 @@ import pytest
 
 from netem.link import Cause
 from worldsim.run.summary import EXIT_STATUS, FATES, summarise
-from worldsim.run.virtual import Flight, fly
+from worldsim.run.virtual import Flight, VirtualFleet, fly
 from worldsim.scenario.file import load
 
 KEYS = {
@@ -60,17 +60,38 @@ def test_every_fate_that_the_radio_knows_is_counted() -> None:
 def test_packets_balance(small: Path, flight: Flight) -> None:
     packets = summary(small, flight)["packets"]
     assert packets["dropped_loss"] > 0
-    assert packets["sent"] == packets["in_flight"] + sum(packets[fate] for fate in FATES)
+    assert packets["sent"] == flight.verdicts.sent > 0
+    assert packets["addressed"] == packets["sent"] * 1
+    assert packets["addressed"] == packets["in_flight"] + sum(packets[fate] for fate in FATES)
 
 
-def test_a_packet_that_is_nowhere_violates_i8(small: Path, flight: Flight) -> None:
-    lost = msgspec.structs.replace(flight.verdicts, in_flight=flight.verdicts.in_flight + 1)
-    told = summary(small, flight, verdicts=lost)
-    assert told["invariants"]["I8"] == {"ticks": 1, "violations": 1}
+def test_i8_is_evaluated_at_every_tick(small: Path, flight: Flight) -> None:
+    ticks = summary(small, flight)["invariants"]["I8"]
+    assert ticks == {"ticks": 5 * 20 + 1, "violations": 0}
+
+
+def test_a_packet_that_is_nowhere_violates_i8(small: Path) -> None:
+    fleet = VirtualFleet(load(small, {"netem.delay_ms": "20"}))
+    while not fleet.verdicts.in_flight:
+        fleet.slot()
+    fleet._medium.in_flight -= 1
+    ticks = fleet.loop.judge.ticks
+    for _ in range(12):
+        fleet.slot()
+    assert fleet.loop.judge.invariants()["I8"]["violations"] == fleet.loop.judge.ticks - ticks
+    told = summary(small, Flight(fleet.loop, fleet.verdicts, 0, 1.0, 1.0))
     assert (told["outcome"], told["reason"]) == ("fail", "violated: I8")
 
 
+def test_how_late_the_radio_was_is_told_in_ms(small: Path, flight: Flight) -> None:
+    assert summary(small, flight)["delivery_late_ms"] is None
+    late = msgspec.structs.replace(flight.verdicts, late_s=(0.0005, 0.25))
+    told = summary(small, flight, verdicts=late)
+    assert told["delivery_late_ms"] == {"median": 0.5, "worst": 250.0}
+
+
 def test_what_was_not_measured_is_null_and_no_pass(small: Path, flight: Flight) -> None:
+    flight.loop.judge.packet_ticks = 0
     told = summary(
         small, flight, verdicts=None, rejected=None, real_time_factor=float("nan"), mode="processes"
     )

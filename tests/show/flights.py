@@ -55,10 +55,17 @@ def straight_flight(scenario: Scenario) -> Iterator[Tick]:
             turn_deg=generator.uniform(-60, 60, agents).astype(np.float32),
             alive=np.ones(agents, dtype=np.bool_),
             links=np.array(pairs, dtype=np.int32).reshape(-1, 2),
-            packets={"sent": 8 * index, "delivered": 7 * index, "dropped_loss": index // 3},
+            packets=_packets(index),
         )
         step = np.minimum(1.0, SPEED_MPS / tick_hz / np.maximum(force, 1e-9))
         position = position + step[:, None] * away
+
+
+def _packets(index: int) -> dict[str, int]:
+    """A tick sends a frame to eight others; of what does not arrive a part is lost by then."""
+    delivered, lost = 7 * index, index // 3
+    fates = {"delivered": delivered, "dropped_loss": lost, "in_flight": index - lost}
+    return {"sent": index, "addressed": 8 * index, **fates}
 
 
 def _level(yaw: np.ndarray) -> np.ndarray:

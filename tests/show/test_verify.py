@@ -68,7 +68,7 @@ def test_a_tampered_summary_is_found_out(
 ) -> None:
     (tmp_path / "summary.json").write_text(json.dumps({**summary_of(judge), key: tampered}))
     verification = verify(tmp_path)
-    assert [difference.key.split(".")[0] for difference in verification.differences] == [key]
+    assert {difference.key.split(".")[0] for difference in verification.differences} == {key}
     assert verification.exit_status == 1
 
 
@@ -99,6 +99,17 @@ def test_held_is_exit_0_and_a_missed_expectation_1(tmp_path: Path) -> None:
         record(recorder, scenario, list(straight_flight(scenario)))
     assert verify(tmp_path / "calm").exit_status == 0
     assert verify(tmp_path / "short").exit_status == 1
+
+
+def test_packets_that_went_missing_are_found_in_the_recording(tmp_path: Path) -> None:
+    scenario = wedge(4)
+    *ticks, last = straight_flight(scenario)
+    last.packets["in_flight"] -= 1
+    recorder = RunRecorder(tmp_path / "run.rrd", scenario, "leaky", mode="virtual")
+    record(recorder, scenario, [*ticks, last])
+    verification = verify(tmp_path)
+    assert verification.invariants["I8"] == {"ticks": len(ticks) + 1, "violations": 1}
+    assert verification.exit_status == 1
 
 
 def test_nothing_to_judge_is_exit_2(tmp_path: Path) -> None:

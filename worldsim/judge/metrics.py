@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from worldsim.judge.tick import Singles
+from worldsim.judge.tick import Packets, Singles
 
 Floats = NDArray[np.float64]
 
@@ -24,6 +24,13 @@ def swept_separation(before: Singles, after: Singles) -> Floats:
     np.fill_diagonal(distance, np.inf)
     least = np.where(np.isnan(distance), np.inf, distance).min(axis=1)
     return np.where(np.isfinite(least), least, np.nan)
+
+
+def conserved(packets: Packets) -> bool:
+    """Whether every packet addressed was delivered, or dropped, or is in flight (I8)."""
+    whereabouts = ("delivered", "dropped_", "in_flight")
+    known = sum(count for name, count in packets.items() if name.startswith(whereabouts))
+    return known == packets["addressed"]
 
 
 def _between_rows(position: Singles) -> list[Floats]:

@@ -21,7 +21,8 @@ class Tick:
     world frame], the target-on-queue, NaN for none; place (N, 2): queue and rank, -1 for none;
     force (N,): |u_i| of (28); turn_deg (N,): azimuth of the wanted velocity against the heading on
     moving steps, else NaN; alive (N,): whether the agent's process takes part; links (L, 2):
-    (hearer, heard). packets: counters so far, as in summary.json.
+    (hearer, heard). packets: the newest counters of the medium, as in summary.json; empty before
+    there are any.
     """
 
     index: int

@@ -149,9 +149,7 @@ class Flight:
                 self.loop.lost(loss.agent, **_known(loss), planned=False)
 
     def _packets(self) -> Packets:
-        if self.verdicts is None:
-            return {}
-        return {"sent": self.verdicts.addressed, **self.verdicts.fates}
+        return self.verdicts.packets() if self.verdicts is not None else {}
 
     def _say_progress(self) -> None:
         if self._pacer.elapsed_s >= self._progress_at_s:

@@ -64,7 +64,7 @@ def world_of(scenario: Scenario, command_ticks: int) -> World:
     position, yaw = starts(scenario.fleet.start, scenario.fleet.agents, scenario.seed)
     return World(
         clock=Clock(scenario.fleet.tick_hz, SLOTS_PER_TICK),
-        limits=scenario.vehicle,
+        limits=scenario.vehicles,
         position=position,
         yaw=yaw,
         sensor=ProximitySensor(scenario.seed, scenario.sensor.proximity.noise_m),
@@ -187,7 +187,7 @@ class SlotLoop:
             turn_deg=np.array([row.turn_deg for row in told], dtype=np.float32),
             alive=self._alive.copy(),
             links=self._links(told) if self._recorder is not None else NO_LINKS,
-            packets=self._packets() if self._recorder is not None else {},
+            packets=self._packets(),
         )
 
     @staticmethod

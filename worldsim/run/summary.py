@@ -41,7 +41,7 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
     """
     judge = loop.judge
     expectations = judge.expectations()
-    invariants = {**judge.invariants(), "I8": _conservation(verdicts)}
+    invariants = judge.invariants()
     doubt = _doubt(interrupted, host_too_slow, duration_s, late_tick_fraction)
     outcome, reason = _outcome(expectations, invariants, doubt)
     summary = {
@@ -61,6 +61,7 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "packets": _packets(verdicts, rejected),
         "invariants": invariants,
+        "delivery_late_ms": _delivery_late_ms(verdicts),
         "late_tick_fraction": late_tick_fraction,
         "real_time_factor": real_time_factor,
         "trace_sha256": None if mode == "processes" else loop.trace.sha256,
@@ -100,24 +101,21 @@ def _doubt(
     return None
 
 
-def _conservation(verdicts: Verdicts | None) -> dict[str, int]:
-    """I8: what was addressed has met a fate or is in flight; looked at once, over the whole run."""
-    if verdicts is None:
-        return {"ticks": 0, "violations": 0}
-    kept = sum(verdicts.fates.values()) + verdicts.in_flight == verdicts.addressed
-    return {"ticks": 1, "violations": 0 if kept else 1}
-
-
 def _packets(verdicts: Verdicts | None, rejected: int | None) -> dict[str, int | None]:
-    """Count packets; sent and each fate count once for each agent a frame was addressed to."""
+    """Count packets: sent as frames, addressed and each fate once for each agent that may hear."""
+    names = ("sent", "addressed", *FATES, "in_flight")
     if verdicts is None:
-        return {"sent": None, **dict.fromkeys(FATES), "in_flight": None, "rejected": rejected}
-    return {
-        "sent": verdicts.addressed,
-        **{fate: verdicts.fates.get(fate, 0) for fate in FATES},
-        "in_flight": verdicts.in_flight,
-        "rejected": rejected,
-    }
+        return {**dict.fromkeys(names), "rejected": rejected}
+    counted = verdicts.packets()
+    return {**{name: counted.get(name, 0) for name in names}, "rejected": rejected}
+
+
+def _delivery_late_ms(verdicts: Verdicts | None) -> dict[str, float] | None:
+    """How much later than due the radio's batches left; None in virtual time, where none can be."""
+    if verdicts is None or verdicts.late_s is None:
+        return None
+    median_s, worst_s = verdicts.late_s
+    return {"median": 1000.0 * median_s, "worst": 1000.0 * worst_s}
 
 
 def _phases(judge: Judge) -> list[dict[str, Any]]:

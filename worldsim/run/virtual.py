@@ -89,8 +89,7 @@ class VirtualFleet:
             self._batches[agent] = pack(Batch(slot, frames))
 
     def _packets(self) -> Packets:
-        verdicts = self._medium.verdicts(0)
-        return {"sent": verdicts.addressed, **verdicts.fates}
+        return self.verdicts.packets()
 
 
 def fly(

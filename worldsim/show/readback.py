@@ -171,10 +171,12 @@ def _latest(column: Column, ticks: Sequence[int], first: NDArray[Any]) -> list[N
 
 
 def _packets(counters: dict[str, Column], ticks: Sequence[int]) -> list[Packets]:
-    none = np.zeros(1)
+    """Return the newest counters at each tick; none before the first were told."""
+    none = np.zeros(0)
     told = {cause: _latest(column, ticks, none) for cause, column in sorted(counters.items())}
     return [
-        {cause: int(values[row][0]) for cause, values in told.items()} for row in range(len(ticks))
+        {cause: int(values[row][0]) for cause, values in told.items() if len(values[row])}
+        for row in range(len(ticks))
     ]
 
 
