@@ -57,7 +57,11 @@ class Agent:
         self._table = Table(setup.id, comms.multihop_hz)
         round_s = 1.0 / comms.multihop_hz if comms.multihop_hz > 0.0 else inf
         self._broadcast = Broadcast(setup.id, setup.incarnation, 1.0 / comms.local_hz, round_s)
-        filtered = (setup.control.separation_m, limits.max_speed_mps, setup.command_ticks * tick_s)
+        filtered = (
+            setup.control.separation_m,
+            setup.fleet_max_speed_mps,
+            setup.command_ticks * tick_s,
+        )
         self._ranging = RangingFilter(*filtered) if "proximity" in limits.sensors else None
         self._promises = PromiseFilter(*filtered)
         self._speed_cap = limits.max_speed_mps

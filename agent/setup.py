@@ -59,6 +59,7 @@ class AgentSetup(Table, frozen=True):
     """All that one agent is told.
 
     command_ticks: for how many ticks a command is valid; H of docs/method.md follows from it.
+    fleet_max_speed_mps: the fastest vehicle's limit, which is what the others must reckon with.
     """
 
     id: Annotated[int, Meta(ge=0, lt=2**16)]
@@ -67,6 +68,7 @@ class AgentSetup(Table, frozen=True):
     slots_per_tick: Annotated[int, Meta(ge=1, le=64)]
     command_ticks: Annotated[int, Meta(ge=1, le=10)]
     vehicle: Vehicle
+    fleet_max_speed_mps: Positive
     control: Control
     comms: Comms
     formation: FormationSpec

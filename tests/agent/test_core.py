@@ -40,6 +40,7 @@ def agent(who=0, sensors=("proximity",), incarnation=0):
             slots_per_tick=4,
             command_ticks=2,
             vehicle=Vehicle(sensors=sensors),
+            fleet_max_speed_mps=0.5,
             control=Control(),
             comms=Comms(),
             formation=WEDGE,

@@ -45,6 +45,8 @@ def _words(info: inspect.Type) -> str:
             return _number(info)
         case inspect.StrType():
             return _text(info)
+        case inspect.BoolType():
+            return "true or false"
         case _:
             return _nested(info)
 

@@ -14,7 +14,7 @@ import tomli_w
 
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from worldsim.scenario.decoding import decode
-from worldsim.scenario.rules import TARGET_FLOOR_M, check
+from worldsim.scenario.rules import TARGET_FLOOR_M, check, tilts_where_asked
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import Data, ScenarioError, override, read, tables
 
@@ -40,7 +40,7 @@ def parse(
         whose = _place_formation(data, Path(name))
         scenario = decode(data, Scenario, name)
         check(scenario, name)
-        _check_formation(scenario, *whose)
+        _check_formation(scenario, Path(name), *whose)
     except ScenarioError as error:
         raise _told_as_override(error, overrides) from error
     return scenario
@@ -73,13 +73,16 @@ def _place_formation(data: Data, file: Path) -> tuple[Path, str]:
     return path, ""
 
 
-def _check_formation(scenario: Scenario, file: Path, prefix: str) -> None:
+def _check_formation(scenario: Scenario, file: Path, whose: Path, prefix: str) -> None:
     control = scenario.control
     try:
         formation = Formation(scenario.formation, control.spacing_m)
         formation.check(scenario.fleet.agents, control.separation_m + TARGET_FLOOR_M)
     except FormationError as error:
-        raise ScenarioError(file, prefix + error.key, error.detail) from error
+        raise ScenarioError(whose, prefix + error.key, error.detail) from error
+    tilted = tilts_where_asked(scenario, formation)
+    if tilted is not None:
+        raise ScenarioError(file, *tilted)
 
 
 def _told_as_override(error: ScenarioError, overrides: Mapping[str, str]) -> ScenarioError:

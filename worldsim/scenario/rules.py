@@ -4,10 +4,11 @@ A rule is a function that returns what is broken, or None; a caution one that re
 allowed but unwise.
 """
 
-from math import ceil, dist
+from math import ceil, degrees, dist
 from pathlib import Path
 from typing import NamedTuple
 
+from agent.qstructure.formation import Formation
 from worldsim.scenario.tables import SLOTS_PER_TICK, BoxStart, Scenario
 from worldsim.scenario.toml import ScenarioError
 
@@ -40,7 +41,7 @@ def cautions(scenario: Scenario) -> list[Finding]:
 
 def too_fast(scenario: Scenario, command_ticks: int) -> Finding | None:
     """Say if vehicles outrun the safety filter where a command lives for ``command_ticks``."""
-    speed = scenario.vehicle.max_speed_mps
+    speed = max(vehicle.max_speed_mps for vehicle in scenario.vehicles)
     step = speed * command_ticks / scenario.fleet.tick_hz
     if step <= MAX_STEP_M + 1e-9:
         return None
@@ -110,6 +111,30 @@ def _start_for_each(scenario: Scenario) -> Finding | None:
             "fleet.start.yaws_deg",
             f"{len(start.yaws_deg)} headings for fleet.agents = {agents}; one for each, or none",
         )
+    return None
+
+
+def _agents_of_the_fleet(scenario: Scenario) -> Finding | None:
+    last = scenario.fleet.agents - 1
+    for index, table in enumerate(scenario.agent):
+        for agent in table.ids:
+            if agent > last:
+                return Finding(f"agent[{index}].ids", f"no agent {agent}; 0 to {last}")
+    return None
+
+
+def tilts_where_asked(scenario: Scenario, formation: Formation) -> Finding | None:
+    """Say which vehicle cannot roll or pitch as far as a queue's orientation asks for."""
+    least, agent = min((each.max_tilt_deg, i) for i, each in enumerate(scenario.vehicles))
+    for place, slot in formation.layout(scenario.fleet.agents).slots.items():
+        asked = max(abs(degrees(angle or 0.0)) for angle in slot.attitude[1:])
+        if asked > least + 1e-9:
+            queue = formation.queues[place.queue].name
+            return Finding(
+                "vehicle.max_tilt_deg",
+                f"agent {agent} tilts up to {least:g}; queue {queue!r} asks for {asked:.3g} at"
+                f" {slot.arc_length:g} m along it",
+            )
     return None
 
 
@@ -191,6 +216,7 @@ RULES = (
     _above_target_floor,
     _start_for_each,
     _start_apart,
+    _agents_of_the_fleet,
     _links_of_the_fleet,
     _cast_zone_open,
     _sent_by_the_tick,

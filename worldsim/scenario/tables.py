@@ -4,11 +4,12 @@ These structures are the format; every number's unit is in its key. What a file 
 value written here. What must hold between keys is said in ``rules``.
 """
 
-from typing import Annotated
+from typing import Annotated, Any, get_type_hints
 
+import msgspec
 from msgspec import Meta
 
-from agent.messages import Metres
+from agent.messages import AgentId, Metres
 from agent.qstructure.formation import FormationSpec
 from agent.setup import AgentSetup, Comms, Control, Hertz, Positive, Table, Vehicle
 from netem.messages import Conditions, MediumSetup
@@ -63,10 +64,36 @@ class Sensors(Table, frozen=True):
     proximity: ProximitySensor = ProximitySensor()
 
 
+def _optional(table: type[Table]) -> list[tuple[str, Any, None]]:
+    """Return the fields of a table, each to be left out."""
+    hints = get_type_hints(table, include_extras=True)
+    return [(name, hints[name] | None, None) for name in table.__struct_fields__]
+
+
+VehicleChange = msgspec.defstruct(
+    "VehicleChange",
+    _optional(Vehicle),
+    bases=(Table,),
+    frozen=True,
+    namespace={"__doc__": "Keys of [vehicle] that differ for some agents."},
+)
+
+
+class AgentTable(Table, frozen=True):
+    """What differs for some agents: ``ids``, and the keys of ``vehicle`` that they have instead."""
+
+    ids: Annotated[tuple[AgentId, ...], Meta(min_length=1, max_length=MAX_AGENTS)]
+    vehicle: VehicleChange  # type: ignore[valid-type]
+
+
 class Expectations(Table, frozen=True):
-    """What a run must show; ``converge_within_s`` counts from each formation's start."""
+    """What a run must show; ``converge_within_s`` counts from each formation's start.
+
+    converge: false where no formation is to be formed, as with a controller that knows none.
+    """
 
     converge_within_s: Positive | None = None
+    converge: bool = True
     min_separation_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
 
 
@@ -80,6 +107,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
     seed: Annotated[int, Meta(ge=0, lt=2**53)] = 1
     duration_s: Annotated[float, Meta(gt=0, le=86_400)] = 20.0
     vehicle: Vehicle = Vehicle()
+    agent: tuple[AgentTable, ...] = ()
     sensor: Sensors = Sensors()
     control: Control = Control()
     comms: Comms = Comms()
@@ -96,6 +124,21 @@ class Scenario(Table, frozen=True, omit_defaults=False):
         """How many slots the run lasts."""
         return round(self.duration_s * self.slot_hz)
 
+    def vehicle_of(self, agent: int) -> Vehicle:
+        """Return one agent's vehicle: [vehicle], with what [[agent]] says differs."""
+        vehicle = self.vehicle
+        for table in self.agent:
+            if agent in table.ids:
+                told = msgspec.structs.asdict(table.vehicle)
+                changes = {key: value for key, value in told.items() if value is not None}
+                vehicle = msgspec.structs.replace(vehicle, **changes)
+        return vehicle
+
+    @property
+    def vehicles(self) -> list[Vehicle]:
+        """Every agent's vehicle, by id."""
+        return [self.vehicle_of(agent) for agent in range(self.fleet.agents)]
+
     def medium_setup(self) -> MediumSetup:
         """Return what the medium is told."""
         return MediumSetup(self.seed, self.fleet.agents, SLOTS_PER_TICK, self.slot_hz, self.netem)
@@ -108,7 +151,8 @@ class Scenario(Table, frozen=True, omit_defaults=False):
             tick_hz=self.fleet.tick_hz,
             slots_per_tick=SLOTS_PER_TICK,
             command_ticks=command_ticks,
-            vehicle=self.vehicle,
+            vehicle=self.vehicle_of(agent),
+            fleet_max_speed_mps=max(vehicle.max_speed_mps for vehicle in self.vehicles),
             control=self.control,
             comms=self.comms,
             formation=self.formation,

@@ -3,6 +3,8 @@
 Only + - * / sqrt and rounding cross rows here, so that a trace is the same in every clock.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,15 +26,15 @@ class Fleet:
     row of NaN is not in the world.
     """
 
-    def __init__(self, position: Floats, yaw: Floats, limits: Vehicle) -> None:
+    def __init__(self, position: Floats, yaw: Floats, limits: Sequence[Vehicle]) -> None:
         self.position = position.astype(np.float64)
         self.velocity = np.zeros_like(self.position)
         self.yaw = yaw.astype(np.float64)
         self.tilt = np.zeros((len(yaw), 2))
-        self._max_tilt = np.radians(limits.max_tilt_deg)
-        self._max_speed = limits.max_speed_mps
-        self._max_climb = limits.max_climb_mps
-        self._max_yaw_rate = np.radians(limits.max_yaw_rate_dps)
+        self._max_tilt = np.radians([[each.max_tilt_deg] for each in limits])
+        self._max_speed = np.array([each.max_speed_mps for each in limits])
+        self._max_climb = np.array([each.max_climb_mps for each in limits])
+        self._max_yaw_rate = np.radians([each.max_yaw_rate_dps for each in limits])
 
     def __len__(self) -> int:
         return len(self.yaw)
@@ -48,6 +50,7 @@ class Fleet:
         turn = np.minimum(np.maximum(wrapped(yaw - self.yaw), -reach), reach)
         self.yaw = wrapped(self.yaw + turn)
         tilt = np.minimum(np.maximum(tilt, -self._max_tilt), self._max_tilt)
+        reach = reach[:, None]
         self.tilt = self.tilt + np.minimum(np.maximum(tilt - self.tilt, -reach), reach)
 
     def _limited(self, velocity: Floats) -> Floats:

@@ -3,6 +3,7 @@
 A pure state machine over slots; ``slot`` counts them, ``time_s`` is slot / slot_hz, never a sum.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,15 +38,14 @@ class Clock:
 class World:
     """Vehicles under commands.
 
-    ``senses``: whether the vehicles carry the proximity sensor. ``command_ticks``: for how many
-    ticks a command may be valid at most.
+    limits: each agent's vehicle. command_ticks: for how many ticks a command may be valid at most.
     """
 
     def __init__(
         self,
         *,
         clock: Clock,
-        limits: Vehicle,
+        limits: Sequence[Vehicle],
         position: Floats,
         yaw: Floats,
         sensor: ProximitySensor,
@@ -56,7 +56,7 @@ class World:
         self.fleet = Fleet(position, yaw, limits)
         self.latest: list[Command | None] = [None] * len(yaw)
         self.discarded = 0
-        self._senses = "proximity" in limits.sensors
+        self._senses = ["proximity" in each.sensors for each in limits]
         self._sensor = sensor
         self._longest = command_ticks * clock.slots_per_tick
         self._expires = np.zeros(len(yaw), dtype=np.int64)
@@ -78,10 +78,10 @@ class World:
 
     def observe(self, looking: list[int]) -> list[Observation]:
         """Return the present slot's observations of these agents, in their order."""
-        if self._senses:
-            sensed = self._sensor.read(self.fleet.position, looking, self.slot)
-        else:
-            sensed = [()] * len(looking)
+        read = self._sensor.read(self.fleet.position, looking, self.slot)
+        sensed = [
+            each if self._senses[agent] else () for agent, each in zip(looking, read, strict=True)
+        ]
         position = self.fleet.position[looking].tolist()
         velocity = self.fleet.velocity[looking].tolist()
         yaw = self.fleet.yaw[looking].tolist()
