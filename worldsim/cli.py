@@ -129,13 +129,9 @@ def sim(
         for file in scenarios
         for each in (_seeds(seeds) if seeds is not None else (seed,))
     ]
-    try:
-        if seeds is None and len(scenarios) == 1:
-            return fly_one(flown[0], out, not no_recording)
-        return fly_many(flown, out, not no_recording, jobs or len(os.sched_getaffinity(0)))
-    except KeyboardInterrupt:
-        _say("interrupted; what was flown to its end is kept")
-        return INTERRUPTED
+    if seeds is None and len(scenarios) == 1:
+        return fly_one(flown[0], out, not no_recording)
+    return fly_many(flown, out, not no_recording, jobs or len(os.sched_getaffinity(0)))
 
 
 @app.command(

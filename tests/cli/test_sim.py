@@ -108,16 +108,41 @@ def is_running(pid: str) -> bool:
     return state not in "ZX"
 
 
-def test_ctrl_c_ends_a_sweep_with_its_workers(small: Path) -> None:
-    sweep = [*QSWARM, "sim", "small.toml", "--no-recording", "--duration", "1000"]
-    started = Started(
-        [*sweep, "--seeds", "0:4", "--jobs", "2", "--out", "cut"], Path("said"), small.parent
-    )
-    pid = started.process.pid
-    eventually(lambda: len(list(Path("cut").glob("*/events.jsonl"))) == 2, 20.0)
+def flying_for_long(jobs: str, *more: str) -> Started:
+    sweep = [*QSWARM, "sim", "small.toml", "--duration", "1000", *more]
+    return Started([*sweep, "--jobs", jobs, "--out", "cut"], Path("said"), Path.cwd())
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_ends_a_run_with_its_summary(small: Path, number: signal.Signals) -> None:
+    started = flying_for_long("1")
+    eventually(lambda: slots_told("cut"), 20.0)
+    started.process.send_signal(number)
+    assert started.status(within_s=20.0) == 130, small
+    told = summary("cut")
+    assert told["outcome"] == "inconclusive"
+    assert told["reason"] == f"interrupted after {told['duration_s']:.1f} s"
+    assert 0.0 < told["duration_s"] < 1000.0
+    assert f"inconclusive ({told['reason']})" in started.text
+    assert Path("cut/run.rrd").stat().st_size > 0
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_ctrl_c_ends_a_sweep_with_its_workers_and_summaries(small: Path, jobs: str) -> None:
+    started = flying_for_long(jobs, "--no-recording", "--seeds", "0:4")
+    pid, wanted = started.process.pid, int(jobs)
+    eventually(lambda: sum(map(slots_told, Path("cut").glob("*"))) >= wanted, 20.0)
     workers = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    assert len(workers) >= 2
     started.process.send_signal(signal.SIGINT)
-    assert started.status(within_s=20.0) == 130
-    assert started.text.endswith("interrupted; what was flown to its end is kept\n")
+    assert started.status(within_s=20.0) == 130, small
+    overall = summary("cut")
+    assert (overall["outcome"], overall["reason"]) == ("inconclusive", "interrupted")
+    assert wanted <= overall["runs"] == len(list(Path("cut").glob("*/summary.json"))) < 4
+    assert started.text.endswith("inconclusive (interrupted)  cut/summary.json\n")
     eventually(lambda: not any(map(is_running, workers)), 10.0)
+
+
+def slots_told(run: str | Path) -> bool:
+    """Whether a run is in the air: somebody has told of a slot."""
+    events = Path(run) / "events.jsonl"
+    return events.exists() and events.stat().st_size > 0

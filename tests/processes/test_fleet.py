@@ -60,7 +60,12 @@ def test_a_fleet_flies_passes_and_leaves_everything_in_its_folder(
     assert summary["packets"]["delivered"] > 0
     assert {event["agent"] for event in events_of(run) if event["kind"] == "slot"} == {0, 1, 2, 3}
     assert "held" in fleet.text
-    assert (run / "run.rrd").stat().st_size > 0
+    from worldsim.show.verify import verify  # noqa: PLC0415 - a second that other tests save
+
+    verification = verify(run)
+    assert (verification.whole, verification.differences) == (True, ()), verification
+    assert summary["invariants"]["I8"]["ticks"] > 6 * 20 / 2
+    assert summary["delivery_late_ms"].keys() == {"median", "worst"}
     assert [row.alive for row in processes(run)] == [False] * 7
     nobody_left(pids(run))
 
@@ -134,6 +139,7 @@ def test_an_agent_that_does_not_come_up_is_said_with_its_last_words(
     assert fleet.status(20.0) == 2, fleet.text
     assert "did not start" in fleet.text
     assert "no battery" in fleet.text
+    assert sorted(each.name for each in run.iterdir()) == ["fleet.json", "logs", "scenario.toml"]
     nobody_left(pids(run))
 
 

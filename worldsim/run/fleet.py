@@ -59,6 +59,8 @@ def run(
         status = launch.conclude()
     except StartError as error:
         launch.terminal.say(str(error))
+        launch.end()
+        directory.nothing_flew()
         status = NOT_STARTED
     except KeyboardInterrupt:
         launch.interrupt()

@@ -3,23 +3,30 @@
 from collections import Counter
 from pathlib import Path
 
+from netem.wire.stop import Stop
+from worldsim.run.interruption import stoppable
 from worldsim.run.rundir import RunDirectoryError, make_folder, write_json
-from worldsim.run.summary import EXIT_STATUS
+from worldsim.run.summary import EXIT_STATUS, INTERRUPTED
 from worldsim.run.sweep import Job, Summary, over_all, simulate, sweep
 from worldsim.scenario.tables import Scenario
 from worldsim.show.telling import ProgressLine, table, verdict
 
 
 def fly_one(scenario: Scenario, out: Path | None, recording: bool) -> int:
-    """Fly one run and print its verdict; return the exit status. Raises RunDirectoryError."""
+    """Fly one run and print its verdict; return the exit status. Raises RunDirectoryError.
+
+    Ctrl-C ends it early; its verdict is told and kept all the same.
+    """
     line = ProgressLine()
-    summary = simulate(
-        Job(scenario, out, recording),
-        lambda loop: line.tell(f"{loop.world.time_s:.1f} of {scenario.duration_s:g} s flown"),
-    )
+    with stoppable() as stop:
+        summary = simulate(
+            Job(scenario, out, recording),
+            stop,
+            lambda loop: line.tell(f"{loop.world.time_s:.1f} of {scenario.duration_s:g} s flown"),
+        )
     line.clear()
     print(verdict(summary, Path(summary["folder"]), recording))
-    return EXIT_STATUS[summary["outcome"]]
+    return INTERRUPTED if stop.asked else EXIT_STATUS[summary["outcome"]]
 
 
 def fly_many(scenarios: list[Scenario], out: Path | None, recording: bool, workers: int) -> int:
@@ -36,16 +43,18 @@ def fly_many(scenarios: list[Scenario], out: Path | None, recording: bool, worke
         Job(scenario, folder / name, recording)
         for scenario, name in zip(scenarios, names, strict=True)
     ]
-    overall = over_all(_flown(jobs, workers))
+    with stoppable() as stop:
+        done = _flown(jobs, workers, stop)
+    overall = over_all(done, stop.asked)
     write_json(folder / "summary.json", overall)
     print(table(overall, folder))
-    return EXIT_STATUS[overall["outcome"]]
+    return INTERRUPTED if stop.asked else EXIT_STATUS[overall["outcome"]]
 
 
-def _flown(jobs: list[Job], workers: int) -> list[Summary]:
+def _flown(jobs: list[Job], workers: int, stop: Stop) -> list[Summary]:
     line = ProgressLine()
     done: list[Summary] = []
-    for summary in sweep(jobs, workers):
+    for summary in sweep(jobs, workers, stop):
         done.append(summary)
         passed = sum(each["outcome"] == "pass" for each in done)
         line.tell(f"{len(done)} of {len(jobs)} runs flown, {passed} passed")

@@ -64,7 +64,7 @@ class Flight:
         self._scenario = scenario
         self._outside = outside
         self._lost: set[int] = set()
-        self._begun = self._landed = False
+        self.begun = self._landed = False
         self._unreadable = 0
         self._pacer = Pacer(1.0 / (scenario.slot_hz * speed))
         self._progress_at_s = 0.0
@@ -83,7 +83,7 @@ class Flight:
     def fly(self, unwanted: Callable[[], bool]) -> bool:
         """Fly the scenario's slots until the end, or until unwanted; return whether all of them."""
         self._pacer.start()
-        self._begun = True
+        self.begun = True
         slots, world = self._scenario.slots, self.loop.world
         while world.slot < slots and not unwanted():
             self._slot(unwanted)
@@ -97,7 +97,7 @@ class Flight:
         if self._landed:
             return
         self._landed = True
-        if self._begun:
+        if self.begun:
             self._outside.landing()
         self._over(b"")
         deadline = time.monotonic() + FINAL_VERDICTS_WITHIN_S
@@ -198,7 +198,8 @@ def conduct(
     """Assemble a fleet, fly it and judge it; return the exit status of the contract.
 
     Raises MusterError when not everybody comes. Whatever ends the flight, SIGTERM or an error of
-    ours, the recording is finished and a summary written of what there was.
+    ours, the recording is finished and a summary written of what there was; a fleet that never
+    took off for want of somebody leaves neither.
     """
     stop = Stop()
     post = Post(session, Keys(terms.run))
@@ -218,7 +219,10 @@ def conduct(
         flight.land()
         notes.close()
         summary = _summary(scenario, flight, interrupted=not whole)
-        directory.write_summary(summary)
+        if flight.begun or stop.asked:
+            directory.write_summary(summary)
+        else:
+            directory.nothing_flew()
     print(f"world: {summary['outcome']}{_lateness(flight.verdicts)}", flush=True)
     return EXIT_STATUS[summary["outcome"]]
 

@@ -65,6 +65,17 @@ class RunDirectory:
                 print(f"{self._events}: {_reason(error)}; events are lost", file=sys.stderr)
             self._events_lost = True
 
+    def nothing_flew(self) -> None:
+        """Take away what looks like a flight; scenario and logs stay, and tell why there is none.
+
+        Raises RunWriteError.
+        """
+        try:
+            for file in (self.recording, self.summary, self._events):
+                file.unlink(missing_ok=True)
+        except OSError as error:
+            raise RunWriteError(self.path, _reason(error)) from error
+
     def write_summary(self, summary: dict[str, Any]) -> None:
         """Write summary.json whole or not at all. Raises RunWriteError, on a full disk say."""
         write_json(self.summary, summary)

@@ -19,6 +19,7 @@ FATES = (
     "duplicated",
     "corrupted",
 )
+INTERRUPTED = 130
 EXIT_STATUS = {"pass": 0, "fail": 1, "inconclusive": 3}
 
 

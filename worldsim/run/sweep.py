@@ -1,4 +1,8 @@
-"""Runs in virtual time, one or many: each into its folder, many with a summary over all."""
+"""Runs in virtual time, one or many: each into its folder, many with a summary over all.
+
+Who is asked to stop ends the runs in flight between slots: each writes a summary of what there was,
+and runs that have not begun leave nothing.
+"""
 
 import multiprocessing
 import os
@@ -6,11 +10,14 @@ import signal
 import statistics
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from netem.wire.stop import Stop
 from worldsim.run.notebook import notebook
 from worldsim.run.rundir import RunDirectory
 from worldsim.run.slots import SlotLoop
@@ -19,6 +26,7 @@ from worldsim.run.virtual import fly
 from worldsim.scenario.tables import Scenario
 
 Summary = dict[str, Any]
+LOOK_EVERY_S = 0.2
 
 
 class Job(NamedTuple):
@@ -29,16 +37,19 @@ class Job(NamedTuple):
     recording: bool
 
 
-def simulate(job: Job, on_progress: Callable[[SlotLoop], None] | None = None) -> Summary:
+def simulate(
+    job: Job, stop: Stop, on_progress: Callable[[SlotLoop], None] | None = None
+) -> Summary:
     """Fly one run into a new folder; return its summary and, under ``folder``, where it is.
 
+    It ends early when ``stop`` is asked for, inconclusive.
     Raises RunDirectoryError when the folder exists or cannot be written.
     """
     scenario = job.scenario
     directory = RunDirectory.create(job.folder, scenario)
     notes = notebook(directory, scenario, directory.path.name, "virtual", job.recording)
     try:
-        flight = fly(scenario, notes, on_progress=on_progress)
+        flight = fly(scenario, notes, on_progress=on_progress, unwanted=lambda: stop.asked)
     finally:
         notes.close()
     flown_s = flight.loop.world.time_s
@@ -51,33 +62,73 @@ def simulate(job: Job, on_progress: Callable[[SlotLoop], None] | None = None) ->
         late_tick_fraction=0.0,
         real_time_factor=flown_s / flight.wall_s,
         duration_s=flown_s,
-        interrupted=False,
+        interrupted=flight.loop.world.slot < scenario.slots,
         host_too_slow=False,
     )
     directory.write_summary(summary)
     return {**summary, "folder": str(directory.path)}
 
 
-def sweep(jobs: list[Job], workers: int) -> Iterator[Summary]:
-    """Fly many runs in up to ``workers`` processes; yield each summary as it is done."""
+def sweep(jobs: list[Job], workers: int, stop: Stop) -> Iterator[Summary]:
+    """Fly many runs in up to ``workers`` processes; yield each summary as it is done.
+
+    When ``stop`` is asked for, the runs in flight are the last.
+    """
     if workers == 1 or len(jobs) == 1:
-        yield from map(simulate, jobs)
+        for job in jobs:
+            if not stop.asked:
+                yield simulate(job, stop)
         return
     with _pool(min(workers, len(jobs))) as pool:
-        for done in as_completed([pool.submit(simulate, job) for job in jobs]):
-            yield done.result()
+        yield from _done([pool.submit(_in_worker, job) for job in jobs], stop)
 
 
-def over_all(summaries: Iterable[Summary]) -> Summary:
+def _done(pending: list[Future[Summary | None]], stop: Stop) -> Iterator[Summary]:
+    interrupted = False
+    while pending:
+        done, _ = wait(pending, LOOK_EVERY_S, FIRST_COMPLETED)
+        finished = [future for future in pending if future in done]
+        pending = [future for future in pending if future not in done]
+        for future in finished:
+            summary = _result(future, stop)
+            if summary is not None:
+                yield summary
+        if stop.asked and not interrupted:
+            interrupted = True
+            _interrupt(pending)
+
+
+def _interrupt(pending: list[Future[Summary | None]]) -> None:
+    for future in pending:
+        future.cancel()
+    for worker in multiprocessing.active_children():
+        worker.terminate()
+
+
+def _result(future: Future[Summary | None], stop: Stop) -> Summary | None:
+    """Return what a worker brought; None for a run that an interruption kept from beginning."""
+    if future.cancelled():
+        return None
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        # A worker that is told to end before it can hear of it just ends.
+        if stop.asked:
+            return None
+        raise
+
+
+def over_all(summaries: Iterable[Summary], interrupted: bool = False) -> Summary:
     """Return the summary over many runs, by scenario, with a row for each run."""
     rows = sorted(summaries, key=lambda summary: (summary["scenario"], summary["seed"]))
     names = sorted({row["scenario"] for row in rows})
-    outcomes = [row["outcome"] for row in rows]
+    outcomes = [row["outcome"] for row in rows] + ["inconclusive"] * interrupted
     return {
         "schema": 1,
         "mode": "virtual",
         "runs": len(rows),
         "outcome": next((bad for bad in ("fail", "inconclusive") if bad in outcomes), "pass"),
+        "reason": "interrupted" if interrupted else None,
         "scenarios": [_of_scenario(name, rows) for name in names],
         "rows": [_row(row) for row in rows],
     }
@@ -148,9 +199,20 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     pool.shutdown()
 
 
+@cache
+def _stop_of_worker() -> Stop:
+    return Stop()
+
+
+def _in_worker(job: Job) -> Summary | None:
+    stop = _stop_of_worker()
+    return None if stop.asked else simulate(job, stop)
+
+
 def _begin_worker() -> None:
-    """Leave Ctrl-C to the parent, and go when the parent is gone."""
+    """Leave Ctrl-C to the parent, who asks by SIGTERM, and go when the parent is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _stop_of_worker()
     threading.Thread(target=_leave_with_parent, daemon=True).start()
 
 

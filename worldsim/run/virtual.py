@@ -97,12 +97,13 @@ def fly(
     recorder: Recorder | None = None,
     on_event: Callable[[Event], None] | None = None,
     on_progress: Callable[[SlotLoop], None] | None = None,
+    unwanted: Callable[[], bool] = lambda: False,
 ) -> Flight:
-    """Fly a scenario in virtual time to its end."""
+    """Fly a scenario in virtual time to its end, or until unwanted."""
     fleet = VirtualFleet(scenario, recorder)
     wall, cpu = perf_counter(), process_time()
     told, progress_at = 0, wall + PROGRESS_EVERY_S
-    for _ in range(scenario.slots):
+    while fleet.loop.world.slot < scenario.slots and not unwanted():
         fleet.slot()
         while on_event is not None and told < len(fleet.loop.events):
             on_event(fleet.loop.events[told])

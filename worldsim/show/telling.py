@@ -56,12 +56,13 @@ def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
 
 def table(overall: Summary, folder: Path) -> str:
     """Return the table over many runs: a line for each, least, median and most of each scenario."""
-    width = max(len(row["run"]) for row in overall["rows"])
+    width = max((len(row["run"]) for row in overall["rows"]), default=3)
     head = f"{'run':{width}}  separation   converge   residual  turns  outcome"
     lines = [head, *(_run(row, width) for row in overall["rows"]), ""]
     for scenario in overall["scenarios"]:
         lines += _scenario(scenario)
-    return "\n".join([*lines, f"{overall['outcome']}  {folder}/summary.json"])
+    reason = f" ({overall['reason']})" if overall["reason"] else ""
+    return "\n".join([*lines, f"{overall['outcome']}{reason}  {folder}/summary.json"])
 
 
 def verified(verification: "Verification") -> str:
