@@ -1,7 +1,7 @@
 """Expressions in one variable, as formation files write them: ``"2*cos(s)"``, ``"5*d"``.
 
-Parsed by simpleeval, which walks the syntax tree and cannot run code; of its operators only
-arithmetic is left.
+Parsed by simpleeval, which walks the syntax tree and cannot run code. Only arithmetic is left of
+what it knows: a comparison, a text or an attribute is refused before it is evaluated.
 """
 
 import ast
@@ -9,18 +9,26 @@ import math
 import operator
 from typing import Any
 
-from simpleeval import InvalidExpression, SimpleEval, safe_power
+from simpleeval import InvalidExpression, SimpleEval
 
 MAX_LENGTH = 300
+
+
+def _power(base: float, exponent: float) -> float:
+    """Powers in floating point: those of integers can fill memory."""
+    return float(base) ** float(exponent)  # type: ignore[no-any-return]
+
+
 OPERATORS: dict[type[ast.AST], Any] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
-    ast.Pow: safe_power,
+    ast.Pow: _power,
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
 }
+NODES = (ast.Expr, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, *OPERATORS)
 FUNCTIONS = {
     name: getattr(math, name)
     for name in (
@@ -48,31 +56,37 @@ class Expression:
             raise ExpressionError(f"longer than {MAX_LENGTH} characters")
         try:
             self._tree = self._evaluator.parse(text.strip())
-        except (SyntaxError, InvalidExpression, ValueError) as error:
+        except (SyntaxError, InvalidExpression, ValueError, RecursionError) as error:
             raise ExpressionError(f"{text!r} is no expression in {variable}") from error
-        self._check_names()
+        self._check_nodes()
 
     def __call__(self, value: float) -> float:
         """Return the value there, or raise ExpressionError where there is no finite one."""
         self._evaluator.names[self.variable] = value
         try:
             result = self._evaluator.eval(self.text, previously_parsed=self._tree)
-        except (ArithmeticError, ValueError, TypeError) as error:
+            number = math.nan if isinstance(result, complex) else float(result)
+        except (ArithmeticError, ValueError, TypeError, RecursionError) as error:
             raise ExpressionError(f"{self._at(value)}: {error}") from error
         except InvalidExpression as error:
             raise ExpressionError(f"{self.text!r}: {error}") from error
-        if isinstance(result, bool | complex) or not isinstance(result, int | float):
+        if isinstance(result, complex):
             raise ExpressionError(f"{self._at(value)} is no real number")
-        if not math.isfinite(result):
+        if not math.isfinite(number):
             raise ExpressionError(f"{self._at(value)} is not finite")
-        return float(result)
+        return number
 
     def _at(self, value: float) -> str:
         return f"{self.text!r} at {self.variable} = {value:g}"
 
-    def _check_names(self) -> None:
+    def _check_nodes(self) -> None:
         known = {*CONSTANTS, *FUNCTIONS, self.variable}
         for node in ast.walk(self._tree):
+            number = not isinstance(node, ast.Constant) or type(node.value) in {int, float}
+            if not isinstance(node, NODES) or not number:
+                raise ExpressionError(
+                    f"{self.text!r} is not only numbers, {self.variable}, + - * / ** and functions"
+                )
             if isinstance(node, ast.Name) and node.id not in known:
                 raise ExpressionError(
                     f"{self.text!r}: {node.id!r} is unknown; there are {self.variable}, "
