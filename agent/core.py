@@ -13,10 +13,11 @@ from agent.codec import RejectedError, decode_beacon, decode_gossip
 from agent.comms.broadcast import LOCAL, Broadcast, OwnState
 from agent.comms.gossip import Table
 from agent.comms.neighbours import Neighbours
-from agent.controller import Intent, Peer, Senses, load
+from agent.controller import Intent, Peer, Senses
 from agent.guidance.cone import cone_of
 from agent.guidance.safety import PromiseFilter, RangingFilter, Told, limited, shortened
 from agent.messages import Beacon, Command, Gossip, Observation, Place, Telemetry, Vector
+from agent.pilot import Pilot
 from agent.setup import AgentSetup
 
 TIDY_S = 0.2
@@ -52,7 +53,7 @@ class Agent:
         self._slack_s = 2.0 * tick_s
         self._command_slots = setup.command_ticks * setup.slots_per_tick
         self._cone = cone_of(limits)
-        self._controller = load(setup.control.controller)(setup)
+        self._controller = Pilot(setup)
         self._neighbours = Neighbours(setup.id, comms.local_hz, self._slack_s)
         self._table = Table(setup.id, comms.multihop_hz)
         round_s = 1.0 / comms.multihop_hz if comms.multihop_hz > 0.0 else inf

@@ -7,6 +7,7 @@ status 2; what a command needs is imported inside it, so that --help and check s
 import os
 import re
 import sys
+import traceback
 from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
@@ -196,6 +197,7 @@ def main() -> None:
 
 def command(arguments: list[str]) -> int:
     """Run one command line; return its exit status. Bad input is told in one line."""
+    from agent.pilot import FaultyControllerError
     from worldsim.run.rundir import RunDirectoryError, RunWriteError
     from worldsim.scenario.toml import ScenarioError
 
@@ -207,6 +209,10 @@ def command(arguments: list[str]) -> int:
     except typer.TyperException as error:
         _say(f"qswarm: {' '.join(error.format_message().split())} (see qswarm --help)")
         return BAD_INPUT
+    except FaultyControllerError as error:
+        traceback.print_exception(error.__cause__)
+        _say(f"qswarm: {error}")
+        return NOT_HELD
     except (typer.Abort, KeyboardInterrupt):
         _say("qswarm: interrupted")
         return INTERRUPTED
