@@ -1,11 +1,10 @@
-"""The command line: qswarm run | sim | check | verify | ps.
+"""The command line: qswarm run | sim | new | check | verify | view | ps.
 
 Commands check everything before they start anything. Bad input is one line on stderr and exit
 status 2; what a command needs is imported inside it, so that --help and check stay quick.
 """
 
 import os
-import re
 import sys
 import traceback
 from collections.abc import Mapping
@@ -16,31 +15,26 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer.main import get_command
 
+from worldsim.options import (
+    Agents,
+    Duration,
+    Gallery,
+    NoRecording,
+    Out,
+    RunFolder,
+    ScenarioFile,
+    ScenarioFiles,
+    Schema,
+    Seed,
+    Settings,
+    overrides_of,
+    seeds_of,
+)
+
 if TYPE_CHECKING:
     from worldsim.scenario.tables import Scenario
 
 HELD, NOT_HELD, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-MAX_RUNS = 1_000_000
-
-ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO", help="A scenario file (TOML).")]
-ScenarioFiles = Annotated[
-    list[Path], typer.Argument(metavar="SCENARIO", help="One or more scenario files (TOML).")
-]
-RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="The folder of a run.")]
-Agents = Annotated[int | None, typer.Option(metavar="N", help="Fly this many agents instead.")]
-Seed = Annotated[int | None, typer.Option(metavar="S", help="Another seed: starts and radio.")]
-Duration = Annotated[
-    float | None, typer.Option(metavar="T", help="Simulated seconds to fly instead.")
-]
-Settings = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Set any key; may be given again."),
-]
-Out = Annotated[
-    Path | None,
-    typer.Option(metavar="DIR", help="Where to; must not exist. [runs/SCENARIO-TIME]"),
-]
-NoRecording = Annotated[bool, typer.Option("--no-recording", help="Write no run.rrd.")]
 
 
 def _examples(*lines: str) -> str:
@@ -69,6 +63,7 @@ app = typer.Typer(
         "qswarm run deploy/scenarios/wedge-9.toml",
         "qswarm run deploy/scenarios/wedge-9.toml --seed 7 --set netem.loss_percent=50",
         "qswarm run deploy/scenarios/wedge-9.toml --agents 20 --duration 40 --speed 2",
+        "qswarm run --list",
     )
 )
 def run(
@@ -82,6 +77,7 @@ def run(
     settings: Settings = None,
     out: Out = None,
     no_recording: NoRecording = False,
+    gallery: Gallery = False,
 ) -> int:
     """Fly a fleet of real processes: netem, world and one for each agent, over Zenoh."""
     from worldsim.run.admission import PROCESS_COMMAND_TICKS
@@ -90,7 +86,7 @@ def run(
 
     if not isfinite(speed):
         raise typer.BadParameter(f"{speed}; a number from 0.01", param_hint="--speed")
-    overrides = _overrides(settings, agents, seed, duration)
+    overrides = overrides_of(settings, agents, seed, duration)
     admitted = _admitted(scenario, overrides, PROCESS_COMMAND_TICKS)
     directory = RunDirectory.create(out, admitted)
     return fly_processes(admitted, directory, speed=speed, recording=not no_recording)
@@ -118,6 +114,7 @@ def sim(
     settings: Settings = None,
     out: Out = None,
     no_recording: NoRecording = False,
+    gallery: Gallery = False,
 ) -> int:
     """Fly the same fleet in virtual time, in one process, as fast as the host allows."""
     from worldsim.run.admission import VIRTUAL_COMMAND_TICKS
@@ -126,19 +123,32 @@ def sim(
     if seed is not None and seeds is not None:
         raise typer.BadParameter("not beside --seed; one or the other", param_hint="--seeds")
     flown = [
-        _admitted(file, _overrides(settings, agents, each, duration), VIRTUAL_COMMAND_TICKS)
+        _admitted(file, overrides_of(settings, agents, each, duration), VIRTUAL_COMMAND_TICKS)
         for file in scenarios
-        for each in (_seeds(seeds) if seeds is not None else (seed,))
+        for each in (seeds_of(seeds) if seeds is not None else (seed,))
     ]
     if seeds is None and len(scenarios) == 1:
         return fly_one(flown[0], out, not no_recording)
     return fly_many(flown, out, not no_recording, jobs or len(os.sched_getaffinity(0)))
 
 
+@app.command(epilog=_examples("qswarm new my-wedge", "qswarm sim my-wedge.toml"))
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The scenario's name.")],
+) -> int:
+    """Write NAME.toml, a scenario to start from: every key, with what is allowed there."""
+    from worldsim.scenario.template import write
+
+    file = write(name)
+    print(f"{file}: written; to fly it: qswarm sim {file}")
+    return HELD
+
+
 @app.command(
     epilog=_examples(
         "qswarm check deploy/scenarios/wedge-9.toml",
         "qswarm check my.toml --agents 50 --set fleet.tick_hz=40 > resolved.toml",
+        "qswarm check --schema > scenario.schema.json",
     )
 )
 def check(
@@ -147,13 +157,14 @@ def check(
     seed: Seed = None,
     duration: Duration = None,
     settings: Settings = None,
+    schema: Schema = False,
 ) -> int:
     """Check a scenario and print it resolved; warnings go to stderr. Nothing is started."""
     from worldsim.run.admission import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
     from worldsim.scenario.file import dump
     from worldsim.scenario.rules import cautions, too_fast
 
-    overrides = _overrides(settings, agents, seed, duration)
+    overrides = overrides_of(settings, agents, seed, duration)
     admitted = _admitted(scenario, overrides, VIRTUAL_COMMAND_TICKS)
     for caution in cautions(admitted):
         _say(f"{scenario}: {caution.key}: warning: {caution.detail}")
@@ -178,6 +189,25 @@ def verify(run: RunFolder) -> int:
     return verification.exit_status
 
 
+@app.command(
+    epilog=_examples("qswarm view runs/wedge-9-20260102T030405Z", "qswarm view runs/twenty --web")
+)
+def view(
+    runs: Annotated[
+        list[Path],
+        typer.Argument(metavar="RUN", help="Folders of runs, of many runs, or recordings."),
+    ],
+    web: Annotated[
+        bool, typer.Option("--web", help="Serve a browser on this machine, instead of a window.")
+    ] = False,
+) -> int:
+    """Open recordings in the rerun viewer, several together."""
+    from worldsim.show.viewer import recordings
+    from worldsim.show.viewer import view as show
+
+    return HELD if show(recordings(runs), web) == 0 else NOT_HELD
+
+
 @app.command(epilog=_examples("qswarm ps runs/wedge-9-20260102T030405Z"))
 def ps(run: RunFolder) -> int:
     """List the processes of a fleet: name, pid, and whether it is alive."""
@@ -200,10 +230,11 @@ def command(arguments: list[str]) -> int:
     from agent.pilot import FaultyControllerError
     from worldsim.run.rundir import RunDirectoryError, RunWriteError
     from worldsim.scenario.toml import ScenarioError
+    from worldsim.show.viewer import ViewerError
 
     try:
         status = get_command(app)(arguments, prog_name="qswarm", standalone_mode=False)
-    except (ScenarioError, RunDirectoryError) as error:
+    except (ScenarioError, RunDirectoryError, ViewerError) as error:
         _say(str(error))
         return NOT_HELD if isinstance(error, RunWriteError) else BAD_INPUT
     except typer.TyperException as error:
@@ -226,33 +257,6 @@ def _admitted(file: Path, overrides: Mapping[str, str], command_ticks: int) -> "
     scenario = load(file, overrides)
     admit(scenario, file, command_ticks)
     return scenario
-
-
-def _overrides(
-    settings: list[str] | None, agents: int | None, seed: int | None, duration: float | None
-) -> dict[str, str]:
-    """Return the keys to override; an option of its own wins over --set."""
-    overrides = {}
-    for setting in settings or []:
-        key, equals, value = setting.partition("=")
-        if not equals or not key.strip():
-            raise typer.BadParameter(
-                f"{setting!r}; write it as netem.loss_percent=50", param_hint="--set"
-            )
-        overrides[key.strip()] = value.strip()
-    options = {"fleet.agents": agents, "seed": seed, "duration_s": duration}
-    return overrides | {key: str(value) for key, value in options.items() if value is not None}
-
-
-def _seeds(text: str) -> range:
-    parts = re.fullmatch(r"(\d{1,15}):(\d{1,15})", text)
-    seeds = range(int(parts[1]), int(parts[2])) if parts else range(0)
-    if not seeds or len(seeds) > MAX_RUNS:
-        raise typer.BadParameter(
-            f"{text!r}; write first:end, as 0:20 for 0 to 19, at most {MAX_RUNS} seeds",
-            param_hint="--seeds",
-        )
-    return seeds
 
 
 def _say(line: str) -> None:

@@ -22,6 +22,9 @@ sys.exit(status)
         ["--help"],
         ["sim", "--help"],
         ["check", "small.toml"],
+        ["check", "--schema"],
+        ["run", "--list"],
+        ["new", "mine"],
         ["sim", "small.toml", "--no-recording"],
         ["sim", "small.toml", "--no-recording", "--seeds", "0:2", "--jobs", "1"],
     ],
@@ -39,7 +42,7 @@ def test_nothing_heavy_is_imported(small: Path, arguments: list[str]) -> None:
     assert (done.returncode, done.stderr) == (0, "[] False\n")
 
 
-@pytest.mark.parametrize("name", ["run", "sim", "check", "verify", "ps"])
+@pytest.mark.parametrize("name", ["run", "sim", "new", "check", "verify", "view", "ps"])
 def test_every_command_teaches_by_example(name: str) -> None:
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, name, "--help"],

@@ -206,7 +206,7 @@ def conduct(
     post.show_life("world")
     muster = Muster(post, scenario)
     outside = outside_of(muster)
-    notes = notebook(directory, scenario, terms.run, "processes", terms.recording)
+    notes = notebook(directory, scenario, directory.path.name, "processes", terms.recording)
     flight = Flight(scenario, post, notes, outside, terms.speed)
     whole = False
 

@@ -10,7 +10,7 @@ MAX_SHOWN = 60
 
 def allowed(kind: Any) -> str:
     """Return in words what a type allows."""
-    return _words(inspect.type_info(kind))
+    return allowed_by(inspect.type_info(kind))
 
 
 def tags(kind: Any) -> str:
@@ -33,7 +33,8 @@ def got(value: Any) -> str:
     return f"got {_short(str(value))}"
 
 
-def _words(info: inspect.Type) -> str:
+def allowed_by(info: inspect.Type) -> str:
+    """Return in words what a type allows, as msgspec describes it."""
     match info:
         case inspect.Metadata(extra_json_schema={"description": str(words)}):
             return words
@@ -45,23 +46,22 @@ def _words(info: inspect.Type) -> str:
             return _number(info)
         case inspect.StrType():
             return _text(info)
-        case inspect.BoolType():
-            return "true or false"
         case _:
             return _nested(info)
 
 
 def _nested(info: inspect.Type) -> str:
     match info:
+        case inspect.BoolType():
+            return "true or false"
         case inspect.TupleType():
-            return f"a list of {len(info.item_types)}, each {_words(info.item_types[0])}"
+            return f"a list of {len(info.item_types)}, each {allowed_by(info.item_types[0])}"
         case inspect.VarTupleType():
-            return (
-                f"a list{_count(info.min_length, info.max_length)}, each {_words(info.item_type)}"
-            )
+            count = _count(info.min_length, info.max_length)
+            return f"a list{count}, each {allowed_by(info.item_type)}"
         case inspect.DictType():
             count = _count(info.min_length, info.max_length)
-            return f"a table{count}, each {_words(info.value_type)}"
+            return f"a table{count}, each {allowed_by(info.value_type)}"
         case inspect.StructType():
             return f"a table of {', '.join(field.encode_name for field in info.fields)}"
     raise LookupError(f"no words for {info}")
@@ -72,7 +72,7 @@ def _union(info: inspect.UnionType) -> str:
     if kinds:
         return f"a table with kind = {' or '.join(kinds)}"
     options = [option for option in info.types if not isinstance(option, inspect.NoneType)]
-    return " or ".join(_words(option) for option in options)
+    return " or ".join(allowed_by(option) for option in options)
 
 
 def _number(info: inspect.IntType | inspect.FloatType) -> str:

@@ -92,9 +92,9 @@ class RunRecorder:
         rr.set_strict_mode(True)
         self._spool = Spool(path, self._say)
         scenery = Scenery(self._scenario, self._formation)
+        # Without an id of our own: a viewer takes two recordings of one id for one.
         self._stream = rr.RecordingStream(
             "qswarm",
-            recording_id=run_id,
             batcher_config=rr.ChunkBatcherConfig(flush_tick=1.0),
         )
         self._stream.set_sinks(

@@ -1,0 +1,52 @@
+"""The JSON Schema of a scenario file takes what check takes, and refuses what no key may hold."""
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator, ValidationError
+
+from worldsim.cli import command
+from worldsim.scenario.file import dump, parse
+from worldsim.scenario.gallery import FOLDER
+from worldsim.scenario.schema import schema
+from worldsim.scenario.template import template
+
+VALIDATOR = Draft202012Validator(schema())
+
+
+def test_it_is_a_schema_and_check_prints_it(capsys: pytest.CaptureFixture[str]) -> None:
+    Draft202012Validator.check_schema(schema())
+    assert command(["check", "--schema"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(schema()))
+
+
+@pytest.mark.parametrize("file", sorted(FOLDER.rglob("*.toml")), ids=lambda file: file.stem)
+def test_it_takes_the_library(file: Path) -> None:
+    VALIDATOR.validate(tomllib.loads(file.read_text()))
+
+
+def test_it_takes_a_formation_in_place_and_a_resolved_scenario() -> None:
+    VALIDATOR.validate(tomllib.loads(template("placed")))
+    VALIDATOR.validate(tomllib.loads(dump(parse(template("placed")))))
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("name", "a b"),
+        ("seed", -1),
+        ("duration_s", "long"),
+        ("bogus", 1),
+        ("formation", {"file": "a.toml", "name": "b"}),
+        ("formation", {"file": 3}),
+        ("fleet", {}),
+        ("fleet", {"agents": 2, "start": {"kind": "heap"}}),
+        ("netem", {"los_percent": 50}),
+    ],
+)
+def test_it_refuses_what_no_key_may_hold(key: str, value: Any) -> None:
+    with pytest.raises(ValidationError):
+        VALIDATOR.validate({**tomllib.loads(template("bad")), key: value})

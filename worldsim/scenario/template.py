@@ -1,0 +1,211 @@
+"""A scenario to start from: every table and key, with what is allowed, written from the types.
+
+What the example sets stands plainly; every other key stands behind a ``#``, with its default or,
+where it has none, an example. Prose begins with ``# ``, so that a key is taken in by taking the
+``#`` away.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from inspect import cleandoc
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+from msgspec import NODEFAULT, inspect
+
+from worldsim.scenario.decoding import decode
+from worldsim.scenario.describing import allowed_by
+from worldsim.scenario.tables import RunName, Scenario
+from worldsim.scenario.toml import ScenarioError
+
+COLUMN = 34
+Given = Mapping[str, Any]
+
+EXAMPLE: Given = {
+    "schema": 1,
+    "seed": 1,
+    "duration_s": 20.0,
+    "fleet": {
+        "agents": 5,
+        "start": {"kind": "box", "size_m": [4.0, 4.0, 2.0], "spacing_m": 0.6},
+    },
+    "formation": {
+        "name": "arrow",
+        "vertices": {"V1": [0.0, 0.0, 0.0]},
+        "queue": [
+            {"name": "left", "vertices": ["V1"], "shape": {"kind": "ray", "direction": [-1, 1, 0]}},
+            {
+                "name": "right",
+                "vertices": ["V1"],
+                "shape": {"kind": "ray", "direction": [-1, -1, 0]},
+            },
+        ],
+    },
+    "netem": {"range_m": 6.0},
+    "expect": {"converge_within_s": 12.0},
+}
+EXAMPLES: Given = {
+    "agent.ids": [0],
+    "agent.vehicle.max_speed_mps": 0.3,
+    "control.cast_far_m": 0.5,
+    "expect.min_separation_m": 0.25,
+    "formation.queue.capacity": 0.5,
+    "formation.queue.orientation.yaw_deg": "10*d",
+    "netem.delay_ms": 20.0,
+    "netem.jitter_ms": 5.0,
+    "netem.loss_percent": 10.0,
+    "netem.local.loss_percent": 10.0,
+    "netem.multihop.loss_percent": 20.0,
+    "netem.link.from": 0,
+    "netem.link.to": 1,
+    "netem.link.loss_percent": 90.0,
+    "vehicle.max_turn_left_deg": 45.0,
+    "vehicle.max_turn_right_deg": 45.0,
+}
+BRIEF: Mapping[str, tuple[str, ...]] = {
+    "agent.vehicle": ("max_speed_mps",),
+    "formation.queue.orientation": ("yaw_deg",),
+    "netem.local": ("loss_percent",),
+    "netem.multihop": ("loss_percent",),
+    "netem.link": ("from", "to", "loss_percent"),
+}
+"""Tables that are told elsewhere: of these only some keys, for an example."""
+
+HEAD = """\
+# {name}: what this scenario is for, in one line.
+#
+#     qswarm check {name}.toml     what is wrong with it, or all of it with its defaults
+#     qswarm sim {name}.toml       fly it in virtual time
+#     qswarm run {name}.toml       fly it with real processes
+#
+# Every number's unit is in its key. What is behind a '#' is not set: there stands its default, or
+# an example of what has none."""
+
+
+class Place(NamedTuple):
+    """A table's dotted name, what the example sets in it (None: nothing), and how it begins."""
+
+    name: str
+    given: Given | None
+    brackets: str = "[{}]"
+
+    @property
+    def hidden(self) -> str:
+        """What stands before the lines of a table that the example does not have."""
+        return "#" if self.given is None else ""
+
+    def key(self, name: str) -> str:
+        """Return the dotted name of one of its keys."""
+        return f"{self.name}.{name}" if self.name else name
+
+
+def write(name: str) -> Path:
+    """Write a scenario of that name, NAME.toml, where there is no such file; return it.
+
+    Raises ScenarioError for a name that a scenario cannot have, a file that exists, a full disk.
+    """
+    file = Path(f"{name}.toml")
+    decode(name, RunName, file)
+    try:
+        with file.open("x", encoding="utf-8") as out:
+            out.write(template(name))
+    except FileExistsError:
+        raise ScenarioError(file, "", "exists; nothing is overwritten") from None
+    except OSError as error:
+        raise ScenarioError(file, "", f"cannot be written: {error.strerror}") from error
+    return file
+
+
+def template(name: str) -> str:
+    """Return the text of a scenario file of that name: it loads, flies, and passes."""
+    info = inspect.type_info(Scenario)
+    assert isinstance(info, inspect.StructType)
+    lines = _keys(info, Place("", {**EXAMPLE, "name": name}))
+    return "\n".join([HEAD.format(name=name), *lines, ""])
+
+
+def _keys(info: inspect.StructType, place: Place) -> Iterator[str]:
+    """Return a table's keys, and after them the tables within it, as TOML wants it."""
+    shown = BRIEF.get(place.name)
+    fields = [field for field in info.fields if shown is None or field.encode_name in shown]
+    for field in fields:
+        if _table_of(field.type) is None:
+            yield _key(field, place)
+    for field in fields:
+        if (table := _table_of(field.type)) is not None:
+            yield from _tables(field, table, place)
+
+
+def _key(field: inspect.Field, place: Place) -> str:
+    name = field.encode_name
+    if place.given is not None and name in place.given:
+        setting = f"{name} = {_toml(place.given[name])}"
+    else:
+        setting = f"#{name} = {_toml(_example(field, place.key(name)))}"
+    return f"{setting:{COLUMN}} # {allowed_by(field.type)}"
+
+
+def _tables(field: inspect.Field, table: inspect.StructType, place: Place) -> Iterator[str]:
+    """Return a table in full; of several, the first, and of the others what the example sets."""
+    name = place.key(field.encode_name)
+    given = place.given.get(field.encode_name) if place.given is not None else None
+    if not _is_list(field.type):
+        yield from _whole(table, Place(name, given))
+        return
+    first, *others = given or [None]
+    yield from _whole(table, Place(name, first, "[[{}]]"))
+    for other in others:
+        yield f"\n[[{name}]]"
+        yield from (f"{key} = {_toml(value)}" for key, value in other.items())
+
+
+def _whole(table: inspect.StructType, place: Place) -> Iterator[str]:
+    yield ""
+    yield from (f"# {line}".rstrip() for line in _told(table))
+    yield f"{place.hidden}{place.brackets.format(place.name)}"
+    yield from _keys(table, place)
+
+
+def _told(table: inspect.StructType) -> list[str]:
+    return cleandoc(table.cls.__doc__ or "").replace("``", "").splitlines()
+
+
+def _example(field: inspect.Field, name: str) -> Any:
+    """Return a key's default, or where it has none an example."""
+    if name in EXAMPLES:
+        return EXAMPLES[name]
+    if field.default is not NODEFAULT and field.default is not None:
+        return msgspec.to_builtins(field.default)
+    raise LookupError(f"{name} has no default: the template needs an example")
+
+
+def _table_of(info: inspect.Type) -> inspect.StructType | None:
+    """Return the table that a type is, alone, optional or in a list; None for a plain value."""
+    match info:
+        case inspect.Metadata():
+            return _table_of(info.type)
+        case inspect.VarTupleType():
+            return _table_of(info.item_type)
+        case inspect.UnionType(types=types):
+            within = [option for option in types if not isinstance(option, inspect.NoneType)]
+            return _table_of(within[0]) if len(within) == 1 else None
+        case inspect.StructType(tag=None):
+            return info
+    return None
+
+
+def _is_list(info: inspect.Type) -> bool:
+    return isinstance(
+        info.type if isinstance(info, inspect.Metadata) else info, inspect.VarTupleType
+    )
+
+
+def _toml(value: Any) -> str:
+    """Return a plain value in TOML's inline form."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_toml(inner)}" for key, inner in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    whole = isinstance(value, float) and value.is_integer()
+    return json.dumps(int(value) if whole else value)
