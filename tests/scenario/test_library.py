@@ -83,9 +83,9 @@ def test_the_numbers_of_e16(name: str, agents: int, counts: tuple[int, ...]) -> 
 
 
 @st.composite
-def divided(draw: st.DrawFn) -> tuple[Formation, int]:
+def divided(draw: st.DrawFn, sharing: tuple[bool, ...] = (False, True)) -> tuple[Formation, int]:
     weights = draw(st.lists(st.integers(1, 50), min_size=1, max_size=8))
-    shared = draw(st.booleans())
+    shared = draw(st.sampled_from(sharing))
     vertices = {f"V{j}": (0.0, float(j), 0.0) for j in range(1 if shared else len(weights))}
     queues = tuple(
         QueueSpec(f"Q{j}", ("V0" if shared else f"V{j}",), Ray((1.0, 0.0, 0.0)), w / sum(weights))
@@ -105,7 +105,7 @@ def test_nobody_is_left_over_and_nobody_counted_twice(case: tuple[Formation, int
     assert layout.unplaced == 0
 
 
-@given(divided())
+@given(divided(sharing=(True,)))
 def test_each_queue_gets_its_share_rounded_down_or_up(case: tuple[Formation, int]) -> None:
     team, agents = case
     free = max(0, agents - len(team.common))
@@ -113,7 +113,16 @@ def test_each_queue_gets_its_share_rounded_down_or_up(case: tuple[Formation, int
         assert abs(count - capacity * free) < 1.0 + 1e-6
 
 
-@given(divided())
+@given(divided(sharing=(False,)))
+def test_every_vertex_is_manned_before_anybody_stands_behind_one(
+    case: tuple[Formation, int],
+) -> None:
+    team, agents = case
+    counts = team.divide(agents)
+    assert agents < len(counts) or min(counts) >= 1
+
+
+@given(divided(sharing=(True,)))
 def test_who_is_rounded_up_had_the_larger_remainder(case: tuple[Formation, int]) -> None:
     team, agents = case
     free = max(0, agents - len(team.common))
