@@ -2,7 +2,9 @@
 
 Two forms. With a ranging sensor the approach speed towards each body sensed is limited by the gap
 that is left; both vehicles of a pair keep to half of the duty, so the gap never closes, whatever
-their phases and with a command's whole life as latency. Without one, the limit follows from what
+their phases and with a command's whole life as latency. A margin covers that the direction between
+two turns while a command is flown; within it the speed across is limited too, or two that circle
+each other could eat it up little by little. Without a ranging sensor, the limit follows from what
 neighbours last told and from the speed they promised not to exceed.
 
 H is the longest time from a measurement to the expiry of the command made from it [s].
@@ -10,7 +12,7 @@ H is the longest time from a measurement to the expiry of the command made from 
 
 from collections import deque
 from collections.abc import Sequence
-from math import hypot, sqrt
+from math import hypot, inf, sqrt
 from typing import NamedTuple
 
 from agent.guidance.cone import Cone, azimuth_error
@@ -22,13 +24,19 @@ SHARE = 0.18
 PROMISE_S = 3.0
 LEAST_CAP_MPS = 0.05
 PASSES = 3
+ROUNDING_MPS = 1e-12
+"""What slides along a limit of zero exceeds it by rounding; that is no reason to stand still."""
 
 
 class Bound(NamedTuple):
-    """One body's limit: the speed towards it, along the unit vector away from it [m/s]."""
+    """One body's limits: the speed towards it and the speed across [m/s].
+
+    away: the unit vector away from the body.
+    """
 
     away: Vector
     limit: float
+    aside: float = inf
 
 
 class RangingFilter:
@@ -39,7 +47,9 @@ class RangingFilter:
 
     def __init__(self, d_ob: float, max_speed: float, horizon_s: float) -> None:
         reach = max_speed * horizon_s
+        self._d_ob = d_ob
         self._stop_m = d_ob + reach * reach / d_ob
+        self._turning_hz = max_speed / (self._stop_m - d_ob)
         self._rate = SHARE / horizon_s
         self._ignore_m = self._stop_m + max_speed / self._rate
 
@@ -51,7 +61,8 @@ class RangingFilter:
             if r >= self._ignore_m or r == 0.0:
                 continue
             limit = self._rate * max(0.0, r - self._stop_m)
-            found.append(Bound((-x / r, -y / r, -z / r), limit))
+            aside = self._turning_hz * max(0.0, r - self._d_ob) if r < self._stop_m else inf
+            found.append(Bound((-x / r, -y / r, -z / r), limit, aside))
         return found
 
 
@@ -112,19 +123,13 @@ def limited(velocity: Vector, bounds: Sequence[Bound], yaw: float, cone: Cone) -
     It first slides along what is in the way; if that leaves the cone about ``yaw`` [rad], or is
     still too fast somewhere, the velocity is only shortened.
     """
-    if all(_approach(velocity, bound) <= bound.limit for bound in bounds):
+    if all(_keeps(velocity, bound) for bound in bounds):
         return velocity
     sliding = velocity
     for _ in range(PASSES):
         for bound in bounds:
-            excess = _approach(sliding, bound) - bound.limit
-            if excess > 0.0:
-                n = bound.away
-                sliding = (
-                    sliding[0] + excess * n[0],
-                    sliding[1] + excess * n[1],
-                    sliding[2] + excess * n[2],
-                )
+            if not _keeps(sliding, bound):
+                sliding = _slid(sliding, bound)
     if not _in_cone(sliding, yaw, cone):
         sliding = velocity
     return _kept(sliding, bounds)
@@ -139,13 +144,43 @@ def shortened(velocity: Vector, max_speed: float) -> Vector:
     return (velocity[0] * scale, velocity[1] * scale, velocity[2] * scale)
 
 
+def _keeps(velocity: Vector, bound: Bound) -> bool:
+    if bound.aside < inf and _across(velocity, bound) > bound.aside + ROUNDING_MPS:
+        return False
+    return _approach(velocity, bound) <= bound.limit + ROUNDING_MPS
+
+
+def _slid(velocity: Vector, bound: Bound) -> Vector:
+    """Return a velocity with the parts towards the body and across cut to its limits [m/s]."""
+    n, approach = bound.away, _approach(velocity, bound)
+    kept, share = -min(approach, bound.limit), 1.0
+    if bound.aside < inf:
+        share = min(1.0, bound.aside / max(_across(velocity, bound), 1e-12))
+    return (
+        share * (velocity[0] + approach * n[0]) + kept * n[0],
+        share * (velocity[1] + approach * n[1]) + kept * n[1],
+        share * (velocity[2] + approach * n[2]) + kept * n[2],
+    )
+
+
 def _kept(velocity: Vector, bounds: Sequence[Bound]) -> Vector:
     scale = 1.0
     for bound in bounds:
         approach = _approach(velocity, bound)
-        if approach * scale > bound.limit:
+        if approach * scale > bound.limit + ROUNDING_MPS:
             scale = bound.limit / approach
+        across = _across(velocity, bound) if bound.aside < inf else 0.0
+        if across * scale > bound.aside + ROUNDING_MPS:
+            scale = bound.aside / across
     return (velocity[0] * scale, velocity[1] * scale, velocity[2] * scale)
+
+
+def _across(velocity: Vector, bound: Bound) -> float:
+    """Return the speed across the line to the body [m/s]."""
+    n, approach = bound.away, _approach(velocity, bound)
+    return hypot(
+        velocity[0] + approach * n[0], velocity[1] + approach * n[1], velocity[2] + approach * n[2]
+    )
 
 
 def _approach(velocity: Vector, bound: Bound) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 
 from agent.guidance.cone import SLACK
 from agent.guidance.movement import DEAD_BAND_MPS
-from agent.guidance.safety import PASSES, SHARE
+from agent.guidance.safety import PASSES, ROUNDING_MPS, SHARE
 
 D_OB = 0.25
 TICK_S = 0.05
@@ -23,8 +23,13 @@ SLOTS = 4
 DT = TICK_S / SLOTS
 TICKS = 60
 ROUNDING_M = 1e-9
+CLOSE_BY_M = 0.05
 CHUNK = 10_000
-KINDS = ("head-on", "orbiting", "random", "stop-and-go", "lying still", "passing close")
+KINDS = ("head-on", "orbiting", "random", "stop-and-go", "lying still", "passing close", "circling")
+CIRCLING = KINDS.index("circling")
+IN_CONCERT = 0.3
+"""So many pairs circle each other in one sense, the one faster than the other: whoever sees the
+other later than it is seen comes nearer all the time, by the turning of the line between them."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +72,7 @@ class Law:
     horizon_s: float
     share: float = SHARE
     margin: bool = True
+    turning: bool = True
 
     def __call__(self, wanted, towards, yaw, cone):
         """wanted [m/s] and towards [m]: (P, 3); yaw (P,) and cone (P, 2): left, right [rad]."""
@@ -75,17 +81,37 @@ class Law:
         r = norm(towards)
         away = -towards / np.maximum(r, 1e-300)[:, None]
         limit = rate * np.maximum(0.0, r - stop)
+        turning = self.max_speed / max(stop - D_OB, 1e-300) * np.maximum(0.0, r - D_OB)
+        aside = np.where((r < stop) & self.turning, turning, np.inf)
         seen = (r < stop + self.max_speed / rate) & (r > 0.0)
-        held = ~seen | (-dot(wanted, away) <= limit)
+        held = ~seen | self._keeps(wanted, away, limit, aside)
         sliding = wanted
         for _ in range(PASSES):
-            excess = np.maximum(0.0, -dot(sliding, away) - limit)
-            sliding = sliding + excess[:, None] * away
+            approach, across = _parts(sliding, away)
+            share = np.minimum(1.0, aside / np.maximum(norm(across), 1e-12))
+            slid = share[:, None] * across - np.minimum(approach, limit)[:, None] * away
+            keeps = self._keeps(sliding, away, limit, aside)
+            sliding = np.where(keeps[:, None], sliding, slid)
         sliding = np.where(_in_cone(sliding, yaw, cone)[:, None], sliding, wanted)
-        approach = -dot(sliding, away)
-        over = approach > limit
-        scale = np.where(over, limit / np.where(over, approach, 1.0), 1.0)
+        approach, across = _parts(sliding, away)
+        scale = np.minimum(_ratio(limit, approach), _ratio(aside, norm(across)))
         return np.where(held[:, None], wanted, scale[:, None] * sliding)
+
+    @staticmethod
+    def _keeps(velocity, away, limit, aside):
+        approach, across = _parts(velocity, away)
+        return (approach <= limit + ROUNDING_MPS) & (norm(across) <= aside + ROUNDING_MPS)
+
+
+def _parts(velocity, away):
+    """Return the speed towards the other, and the velocity across [m/s]."""
+    approach = -dot(velocity, away)
+    return approach, velocity + approach[:, None] * away
+
+
+def _ratio(limit, value):
+    over = value > limit + ROUNDING_MPS
+    return np.where(over, limit / np.where(over, value, 1.0), 1.0)
 
 
 def _in_cone(velocity, yaw, cone):
@@ -106,6 +132,8 @@ class Vehicles:
     kind: np.ndarray
     cone: np.ndarray
     side: np.ndarray
+    pace: np.ndarray
+    latency: np.ndarray
     velocity: np.ndarray = field(init=False)
     expires: np.ndarray = field(init=False)
     coming: np.ndarray = field(init=False)
@@ -129,7 +157,7 @@ class Vehicles:
 
 
 def vehicles(random, position, speed):
-    """Return one vehicle for each pair, of random kind, phase and cone."""
+    """Return one vehicle for each pair, of random kind, phase, cone and latency."""
     pairs = len(position)
     return Vehicles(
         position,
@@ -138,7 +166,20 @@ def vehicles(random, position, speed):
         random.integers(len(KINDS), size=pairs),
         random.choice((0.2, pi / 4, 1.0, pi), (pairs, 2)),
         directions(random, pairs),
+        random.uniform(0.2, 1.0, pairs),
+        random.integers(-SLOTS, SLOTS + 1, size=pairs),
     )
+
+
+def joined(random, one, two):
+    """Let some pairs circle in concert: close by, in one sense, each as late as it always is."""
+    rows = random.random(len(one.kind)) < IN_CONCERT
+    for me in (one, two):
+        me.kind[rows], me.cone[rows] = CIRCLING, pi
+        me.latency[rows] = np.abs(me.latency[rows])
+    two.side[rows] = -one.side[rows]
+    near = random.uniform(D_OB, D_OB + CLOSE_BY_M, len(rows))[:, None]
+    two.position[rows] *= (near / norm(two.position)[:, None])[rows]
 
 
 def directions(random, count):
@@ -154,7 +195,8 @@ def wants(random, me, rows, towards, slot):
     anywhere = directions(random, len(rows))
     going = ((slot // SLOTS + 7 * rows) // (2 + rows % 9) % 2)[:, None] * ahead
     near = 0.95 * across + 0.3 * ahead
-    choices = np.stack((ahead, across + 0.1 * ahead, anywhere, going, 0.0 * ahead, near))
+    circling = me.pace[rows][:, None] * (across + 0.1 * ahead)
+    choices = np.stack((ahead, across + 0.1 * ahead, anywhere, going, 0.0 * ahead, near, circling))
     wanted = choices[me.kind[rows], np.arange(len(rows))]
     return me.speed * wanted / np.maximum(1.0, norm(wanted))[:, None]
 
@@ -166,7 +208,8 @@ def think(random, law, me, other, slot, ticks_valid):
     yaw = random.uniform(-pi, pi, len(rows))
     wanted = wants(random, me, rows, towards, slot)
     me.coming[rows] = law(wanted, towards, yaw, me.cone[rows])
-    me.arrives[rows] = slot + random.integers(SLOTS + 1, size=len(rows))
+    any_time = random.integers(SLOTS + 1, size=len(rows))
+    me.arrives[rows] = slot + np.where(me.latency[rows] < 0, any_time, me.latency[rows])
     me.ends[rows] = slot + ticks_valid * SLOTS
 
 
@@ -183,7 +226,8 @@ def least_distance(random, fleet, pairs, **law):
     start = directions(random, pairs) * random.uniform(D_OB, 1.0, pairs)[:, None]
     one = vehicles(random, np.zeros((pairs, 3)), fleet.speeds[0])
     two = vehicles(random, start, fleet.speeds[1])
-    began = least = norm(start)
+    joined(random, one, two)
+    began = least = norm(two.position)
     for slot in range(TICKS * SLOTS):
         for me, other in ((one, two), (two, one)):
             me.take(slot)
