@@ -10,9 +10,12 @@ import msgpack
 import msgspec
 
 from agent.messages import Beacon, Command, Gossip, Observation
+from agent.qstructure.formation import FormationSpec
 
 MAX_RADIO_B = 1200
 MAX_MESSAGE_B = 4096
+MAX_FORMATION_B = 16 * 900
+MAX_EXPRESSION = 300
 
 _T = TypeVar("_T", bound=msgspec.Struct)
 _encode = msgspec.msgpack.Encoder().encode
@@ -31,7 +34,7 @@ def encode(message: msgspec.Struct) -> bytes:
     return _encode(message)
 
 
-def decode(data: bytes, kind: type[_T], max_bytes: int = MAX_MESSAGE_B) -> _T:
+def decode(data: bytes, kind: type[_T], max_bytes: int = MAX_MESSAGE_B, max_text: int = 64) -> _T:
     """Decode and check one message, or raise :class:`RejectedError`.
 
     The limits are those of a hostile radio: no extension types, short arrays and strings, every
@@ -47,14 +50,14 @@ def decode(data: bytes, kind: type[_T], max_bytes: int = MAX_MESSAGE_B) -> _T:
             use_list=False,
             max_array_len=256,
             max_map_len=64,
-            max_str_len=64,
+            max_str_len=max_text,
             max_bin_len=4096,
             max_ext_len=0,
         )
     except (ValueError, TypeError, RecursionError, msgpack.exceptions.UnpackException) as error:
         raise RejectedError("garbage", str(error)) from error
     try:
-        return msgspec.convert(plain, kind)
+        return msgspec.convert(plain, kind, builtin_types=(bytes,))
     except (msgspec.ValidationError, RecursionError) as error:
         raise RejectedError("invalid", f"{kind.__name__}: {error}") from error
 
@@ -67,6 +70,16 @@ def decode_beacon(payload: bytes) -> Beacon:
 def decode_gossip(payload: bytes) -> Gossip:
     """Decode a frame of the multihop channel, or raise :class:`RejectedError`."""
     return decode(payload, Gossip, MAX_RADIO_B)
+
+
+def encode_formation(formation: FormationSpec) -> bytes:
+    """Encode a formation's tables as msgpack."""
+    return _encode(formation)
+
+
+def decode_formation(data: bytes) -> FormationSpec:
+    """Decode a formation that came over the radio, or raise :class:`RejectedError`."""
+    return decode(data, FormationSpec, MAX_FORMATION_B, max_text=MAX_EXPRESSION)
 
 
 def decode_observation(data: bytes) -> Observation:

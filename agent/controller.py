@@ -12,6 +12,8 @@ from importlib.metadata import entry_points
 from typing import NamedTuple, Protocol
 
 from agent.messages import Place, Vector
+from agent.qstructure.formation import Formation
+from agent.qstructure.frame import Frame
 from agent.setup import AgentSetup
 
 BUILT_IN = {
@@ -52,11 +54,21 @@ class Peer(NamedTuple):
     place: Place | None
 
 
+class Flown(NamedTuple):
+    """The mission an agent flies: its key, the formation, and the target's frame."""
+
+    key: int
+    formation: Formation
+    frame: Frame
+
+
 class Senses(NamedTuple):
     """What a controller decides on: own pose, what is heard, who is known, what is near.
 
     vehicles: bodies within the proximity sensor, relative to the own centre [m; world axes].
-    team(): all members known, sorted by id; gathered when it is asked for.
+    team(): all members known, sorted by id; gathered when it is asked for. mission: what the team
+    shall form. silent: where bodies stand from which nothing is heard [m; world frame]; blocked:
+    places that others see taken by such a body (E18).
     """
 
     now_s: float
@@ -66,6 +78,9 @@ class Senses(NamedTuple):
     vehicles: tuple[Vector, ...]
     neighbours: tuple[Heard, ...]
     team: Callable[[], tuple[Peer, ...]]
+    mission: Flown
+    silent: tuple[Vector, ...] = ()
+    blocked: frozenset[Place] = frozenset()
 
 
 class Intent(NamedTuple):
@@ -75,7 +90,8 @@ class Intent(NamedTuple):
     asks for now, given that a vehicle may have to turn first; yaw [rad]: the heading it asks for;
     force: |u_i| of (28) before saturation; heading_for: its immediate target q_tg [m];
     target: its target-on-queue [m] and ``place`` its place in the formation, if it has any; tilt:
-    pitch and roll it asks for [rad].
+    pitch and roll it asks for [rad]; vertex: whether it is a queue-vertex agent there; blocked: the
+    places that it sees taken by a silent body.
     """
 
     wanted: Vector
@@ -86,6 +102,8 @@ class Intent(NamedTuple):
     target: Vector | None = None
     place: Place | None = None
     tilt: tuple[float, float] = (0.0, 0.0)
+    vertex: bool = False
+    blocked: tuple[Place, ...] = ()
 
 
 class Controller(Protocol):

@@ -12,11 +12,23 @@ from typing import NamedTuple
 from agent.codec import RejectedError, decode_beacon, decode_gossip
 from agent.comms.broadcast import LOCAL, Broadcast, OwnState
 from agent.comms.gossip import Table
+from agent.comms.hierarchy import ALONE, Hierarchy
+from agent.comms.mission import Missions
 from agent.comms.neighbours import Neighbours
+from agent.comms.silent import SilentBodies
 from agent.controller import Intent, Peer, Senses
 from agent.guidance.cone import cone_of
 from agent.guidance.safety import PromiseFilter, RangingFilter, Told, limited, shortened
-from agent.messages import Beacon, Command, Gossip, Observation, Place, Telemetry, Vector
+from agent.messages import (
+    Beacon,
+    Command,
+    Gossip,
+    Mission,
+    Observation,
+    Place,
+    Telemetry,
+    Vector,
+)
 from agent.pilot import Pilot
 from agent.setup import AgentSetup
 
@@ -66,7 +78,14 @@ class Agent:
         self._ranging = RangingFilter(*filtered) if "proximity" in limits.sensors else None
         self._promises = PromiseFilter(*filtered)
         self._speed_cap = limits.max_speed_mps
-        self._place: Place | None = None
+        self._missions = Missions(setup.id, setup.formation, setup.control.spacing_m)
+        self._hierarchy = Hierarchy(setup.id)
+        self._standing = ALONE
+        self._bodies = SilentBodies()
+        self._silent: tuple[Vector, ...] = ()
+        self._blocked: frozenset[Place] = frozenset()
+        self._intent: Intent | None = None
+        self._lagging = False
         self._tidy_at_s = 0.0
 
     def receive(self, source: int, channel: int, payload: bytes, now_s: float) -> None:
@@ -81,14 +100,38 @@ class Agent:
 
     def step(self, observation: Observation) -> Outbox:
         """Decide one tick from what is sensed now and was heard so far."""
+        for mission in observation.orders:
+            self._obey(mission)
         senses = self._senses(observation)
-        intent = self._controller.decide(senses)
-        self._place = intent.place
+        intent = self._intent = self._controller.decide(senses)
         velocity = self._safe(intent, senses)
         command = self._command(observation.slot, senses, intent, velocity)
-        own = OwnState(senses.position, velocity, intent.heading_for, intent.place, self._speed_cap)
-        frames = self._broadcast.frames(senses.now_s, own, self._neighbours.echoes(), self._table)
+        own = self._own_state(senses.position, velocity, intent)
+        pieces = self._missions.pieces() if self._lagging else ()
+        echoes = self._neighbours.echoes()
+        frames = self._broadcast.frames(senses.now_s, own, echoes, self._table, pieces)
         return Outbox(command, frames)
+
+    def _own_state(self, position: Vector, velocity: Vector, intent: Intent) -> OwnState:
+        missions = self._missions
+        return OwnState(
+            position,
+            velocity,
+            intent.heading_for,
+            intent.place,
+            self._speed_cap,
+            missions.flown.key,
+            missions.frame_key,
+            missions.pose,
+            self._standing,
+            intent.blocked,
+        )
+
+    def _obey(self, mission: Mission) -> None:
+        try:
+            self._missions.order(mission)
+        except RejectedError as error:
+            self.rejected[error.cause] += 1
 
     def _hear_beacon(self, source: int, payload: bytes, now_s: float) -> None:
         beacon = self._decoders.beacon(payload)
@@ -96,28 +139,63 @@ class Agent:
             raise RejectedError("spoofed", f"{source} says it is {beacon.id}")
         self._neighbours.hear(beacon, now_s, self._broadcast.sent_s)
         self._table.adopt_beacon(beacon)
+        self._missions.glimpse(beacon)
 
     def _hear_gossip(self, source: int, payload: bytes, now_s: float) -> None:
         gossip = self._decoders.gossip(payload)
         if gossip.id != source:
             raise RejectedError("spoofed", f"{source} says it is {gossip.id}")
         self._table.adopt(gossip, now_s, self._slack_s)
+        if gossip.piece is not None:
+            self._missions.hear(gossip.piece)
 
     def _senses(self, observation: Observation) -> Senses:
         now_s = observation.time_s
+        mission = self._missions.flown
         if now_s >= self._tidy_at_s:
             self._tidy_at_s = now_s + TIDY_S
-            self._neighbours.forget_silent(now_s)
-            self._table.forget_silent(now_s, self._neighbours.silences_s())
+            self._tidy(observation)
+        place = self._intent.place if self._intent is not None else None
+        own = Peer(self.id, observation.position, place)
         return Senses(
             now_s,
             observation.position,
             observation.velocity,
             observation.yaw,
             observation.vehicles,
-            self._neighbours.heard(now_s),
-            lambda: self._table.team(Peer(self.id, observation.position, self._place)),
+            self._neighbours.heard(now_s, mission.key),
+            lambda: self._table.team(own, mission.key),
+            mission,
+            self._silent,
+            self._blocked,
         )
+
+    def _tidy(self, observation: Observation) -> None:
+        """Look after what need not be looked at every tick: who is gone, and one's standing."""
+        now_s = observation.time_s
+        self._neighbours.forget_silent(now_s)
+        self._table.forget_silent(now_s, self._neighbours.silences_s())
+        heard = self._neighbours.heard(now_s)
+        self._silent = self._bodies.look(now_s, observation.position, observation.vehicles, heard)
+        self._lagging = self._neighbours.behind(self._missions.flown.key)
+        self._blocked = self._table.blocked(self._missions.flown.key)
+        vertex = self._intent is not None and self._intent.vertex
+        queue = self._on_my_queue()
+        self._standing = self._hierarchy.stand(now_s, self._broadcast.sequence, vertex, queue)
+
+    def _on_my_queue(self) -> list[Beacon]:
+        """Return the last beacons of those heard on the own queue, its vertex agents included."""
+        mission = self._missions.flown
+        if self._intent is None or self._intent.place is None:
+            return []
+        mine = mission.formation.queues_of(self._intent.place)
+        return [
+            beacon
+            for beacon in self._neighbours.beacons()
+            if beacon.queue >= 0
+            and beacon.mission == mission.key
+            and not mine.isdisjoint(mission.formation.queues_of(Place(beacon.queue, beacon.rank)))
+        ]
 
     def _safe(self, intent: Intent, senses: Senses) -> Vector:
         """Return the velocity that is safe to fly [m/s]: the filter has the last word."""
@@ -150,6 +228,10 @@ class Agent:
             intent.place,
             tuple(other.id for other in senses.neighbours[:MAX_TOLD]),
             self.rejected.total(),
+            self._missions.flown.key,
+            self._standing.tier,
+            self._standing.parent,
+            self._standing.role,
         )
         return Command(
             slot,

@@ -21,7 +21,12 @@ AgentId = Annotated[int, Meta(ge=0, lt=2**16)]
 Index = Annotated[int, Meta(ge=-1, lt=2**15)]
 
 Position = tuple[Metres, Metres, Metres]
+Places = Annotated[tuple[tuple[Index, Index], ...], Meta(max_length=8)]
 Velocity = tuple[Speed, Speed, Speed]
+
+
+ROLES = ("member", "sub-vertex", "vertex", "distress")
+"""An agent's role in its queue; a sub-vertex is a member whom another follows."""
 
 
 class Place(NamedTuple):
@@ -38,12 +43,37 @@ class Message(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unk
     """A message: immutable, encoded as an array, refused when it has a field too many."""
 
 
+class Pose(NamedTuple):
+    """Where the target's frame stands [m; world frame], and its yaw [rad]."""
+
+    x: Metres
+    y: Metres
+    z: Metres
+    yaw: Radians
+
+
+HOME = Pose(0.0, 0.0, 0.0, 0.0)
+
+
+class Mission(Message, frozen=True):
+    """What the team shall form, and where; the highest ``key`` wins everywhere.
+
+    key: 0 in an order means: whatever comes next. formation: a FormationSpec as msgpack; empty
+    where the formation stays as it is and only the frame moves.
+    """
+
+    key: Count
+    frame: Pose
+    formation: Annotated[bytes, Meta(max_length=3000)]
+
+
 class Observation(Message, frozen=True):
     """What one vehicle senses at the start of one of its slots; never the truth about others.
 
     position [m], velocity [m/s], yaw [rad] are the vehicle's own.
     vehicles: other vehicles within the proximity sensor's 2 m, as positions relative to this
     vehicle's centre [m; axes of the world frame]. A body has no name.
+    orders: missions that an operator gives to this agent, for the whole team.
     """
 
     slot: Count
@@ -52,6 +82,7 @@ class Observation(Message, frozen=True):
     velocity: Velocity
     yaw: Radians
     vehicles: tuple[Position, ...]
+    orders: Annotated[tuple[Mission, ...], Meta(max_length=4)]
 
 
 class Telemetry(Message, frozen=True):
@@ -59,7 +90,8 @@ class Telemetry(Message, frozen=True):
 
     wanted: velocity before the safety filter [m/s]; force: |u_i| of (28) before saturation;
     target: its target-on-queue [m]; place: where in the formation it means to be; heard: ids
-    heard directly of late; rejected: messages refused so far.
+    heard directly of late; rejected: messages refused so far; mission: the key of the mission it
+    flies; tier, parent: its standing in its queue (see Beacon), -1 for none; role: index of ROLES.
     """
 
     wanted: Velocity
@@ -68,6 +100,10 @@ class Telemetry(Message, frozen=True):
     place: tuple[Index, Index] | None
     heard: tuple[AgentId, ...]
     rejected: Count
+    mission: Count
+    tier: Index
+    parent: Annotated[int, Meta(ge=-1, lt=2**16)]
+    role: Annotated[int, Meta(ge=0, lt=4)]
 
 
 class Command(Message, frozen=True):
@@ -93,6 +129,10 @@ class Beacon(Message, frozen=True):
     paper, which the potential of (22) needs. queue, rank: the place it claims, -1 for none.
     speed_cap: it promises to stay below this speed for the next 3 s [m/s].
     echoes: for each neighbour the last sequence heard of it.
+    mission: the key of the one it flies; frame: where the target's frame stands, by the mission of
+    ``frame_key``, which may be a newer one that is still on its way. tier: 0 for a
+    queue-vertex agent, else its parent's + 1, -1 in distress. parent: whom it follows, -1 for none;
+    root: the vertex agent's sequence as it came down the tiers (E15).
     """
 
     id: AgentId
@@ -106,13 +146,21 @@ class Beacon(Message, frozen=True):
     rank: Index
     speed_cap: Annotated[float, Meta(ge=0, le=100)]
     echoes: Annotated[tuple[tuple[AgentId, Count], ...], Meta(max_length=128)]
+    mission: Count
+    frame_key: Count
+    frame: Pose
+    tier: Index
+    parent: Annotated[int, Meta(ge=-1, lt=2**16)]
+    root: Count
+    blocked: Places
 
 
 class Record(Message, frozen=True):
     """What one agent last said of itself, passed on over the multihop channel (E24).
 
     Only its subject writes it; ``version`` grows with each writing. stamp_s is the subject's
-    Observation time at the writing. queue, rank: the place it claims, -1 for none.
+    Observation time at the writing. queue, rank: the place it claims, -1 for none; mission: the
+    mission in which that is a place. blocked: places that it sees taken by a silent body (E18).
     """
 
     id: AgentId
@@ -122,6 +170,18 @@ class Record(Message, frozen=True):
     position: Position
     queue: Index
     rank: Index
+    mission: Count
+    blocked: Places
+
+
+class Piece(Message, frozen=True):
+    """A part of a mission under way: the ``index``-th of ``count``."""
+
+    key: Count
+    frame: Pose
+    index: Annotated[int, Meta(ge=0, lt=16)]
+    count: Annotated[int, Meta(ge=1, le=16)]
+    data: Annotated[bytes, Meta(max_length=1000)]
 
 
 class Gossip(Message, frozen=True):
@@ -130,3 +190,4 @@ class Gossip(Message, frozen=True):
     id: AgentId
     stamp_s: Seconds
     records: Annotated[tuple[Record, ...], Meta(max_length=64)]
+    piece: Piece | None

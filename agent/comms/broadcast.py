@@ -3,19 +3,21 @@
 Fig. 3's two layers: high frequency to whoever hears it, low frequency to be passed on.
 """
 
+from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
 from agent.codec import encode
 from agent.comms.gossip import Table
-from agent.messages import Beacon, Place, Record, Vector
+from agent.comms.hierarchy import ALONE, Standing
+from agent.messages import HOME, Beacon, Piece, Place, Pose, Record, Vector
 
 LOCAL, MULTIHOP = 0, 1
 """Channels of the radio."""
 MEMORY = 200
 """So many of the own beacons are remembered, for the echoes that may come."""
-MAX_ECHOES = 82
-"""So many fit beside the greatest numbers that a Beacon may hold: 133 B and 13 B for each echo."""
+MAX_ECHOES = 72
+"""So many fit beside the greatest numbers that a Beacon may hold: 260 B and 13 B for each echo."""
 
 
 class OwnState(NamedTuple):
@@ -26,6 +28,11 @@ class OwnState(NamedTuple):
     heading_for: Vector
     place: Place | None
     speed_cap: float
+    mission: int = 0
+    frame_key: int = 0
+    frame: Pose = HOME
+    standing: Standing = ALONE
+    blocked: tuple[Place, ...] = ()
 
     @property
     def claim(self) -> tuple[int, int]:
@@ -48,23 +55,30 @@ class Broadcast:
         self._round_period_s = round_period_s
         self._next_beacon_s = 0.0
         self._next_round_s = 0.0 if round_period_s < inf else inf
-        self._sequence = 0
+        self.sequence = 0
         self.sent_s: dict[int, float] = {}
 
     def frames(
-        self, now_s: float, own: OwnState, echoes: tuple[tuple[int, int], ...], table: Table
+        self,
+        now_s: float,
+        own: OwnState,
+        echoes: tuple[tuple[int, int], ...],
+        table: Table,
+        pieces: Sequence[Piece] = (),
     ) -> tuple[tuple[int, bytes], ...]:
-        """Return what is due now, as (channel, payload)."""
+        """Return what is due now, as (channel, payload).
+
+        pieces: of the mission, where somebody who is heard lacks it; they go with the next round.
+        """
         frames: list[tuple[int, bytes]] = []
         if now_s >= self._next_beacon_s:
             self._next_beacon_s = now_s + self._beacon_period_s - 1e-9
             frames.append((LOCAL, encode(self._beacon(now_s, own, echoes))))
         if now_s >= self._next_round_s:
             self._next_round_s = now_s + self._round_period_s - 1e-9
-            record = Record(
-                self._id, self._incarnation, self._sequence, now_s, own.position, *own.claim
+            frames.extend(
+                (MULTIHOP, frame) for frame in table.frames(self._record(now_s, own), pieces)
             )
-            frames.extend((MULTIHOP, frame) for frame in table.frames(record))
         return tuple(frames)
 
     def _beacon(self, now_s: float, own: OwnState, echoes: tuple[tuple[int, int], ...]) -> Beacon:
@@ -80,13 +94,32 @@ class Broadcast:
             *own.claim,
             own.speed_cap,
             _in_turns(echoes, sequence),
+            own.mission,
+            own.frame_key,
+            own.frame,
+            own.standing.tier,
+            own.standing.parent,
+            own.standing.root,
+            own.blocked,
+        )
+
+    def _record(self, now_s: float, own: OwnState) -> Record:
+        return Record(
+            self._id,
+            self._incarnation,
+            self.sequence,
+            now_s,
+            own.position,
+            *own.claim,
+            own.mission,
+            own.blocked,
         )
 
     def _numbered(self, now_s: float) -> int:
-        self._sequence += 1
-        self.sent_s[self._sequence] = now_s
-        self.sent_s.pop(self._sequence - MEMORY, None)
-        return self._sequence
+        self.sequence += 1
+        self.sent_s[self.sequence] = now_s
+        self.sent_s.pop(self.sequence - MEMORY, None)
+        return self.sequence
 
 
 def _in_turns(echoes: tuple[tuple[int, int], ...], turn: int) -> tuple[tuple[int, int], ...]:

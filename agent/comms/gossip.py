@@ -5,9 +5,11 @@ subject, and that number outlives the record; otherwise the departed would circu
 version of a record is its subject's beacon sequence, so a beacon heard directly is a record too.
 """
 
+from collections.abc import Iterator, Sequence
+
 from agent.codec import encode
 from agent.controller import Peer
-from agent.messages import Beacon, Gossip, Place, Record
+from agent.messages import Beacon, Gossip, Piece, Place, Record
 
 RELAYED_SILENCE_ROUNDS = 12
 """T_d = (2 D + 10) / (1 - loss) rounds: what of it is the same at any distance. The rest, for D
@@ -15,9 +17,8 @@ hops at that loss, is twice the age at which a subject's records are measured to
 LAG_SMOOTHING = 0.25
 LEAST_RELAYED_SILENCE_S = 2.5
 MAX_FRAME_B = 1200
-FRAME_HEAD_B = 16
-RECORD_B = 65
-"""Sizes as msgpack writes the greatest numbers that a Gossip and a Record may hold."""
+FRAME_HEAD_B = 17
+"""What a Gossip takes besides its records, with the greatest numbers it may hold."""
 MAX_KNOWN = 1024
 """So many subjects at most: what is passed on in one round must fit one transmission."""
 
@@ -73,23 +74,38 @@ class Table:
             del self._newest[who]
             self._lag_s.pop(who, None)
 
-    def team(self, own: Peer) -> tuple[Peer, ...]:
-        """Return all who are known, oneself included, sorted by id."""
+    def team(self, own: Peer, mission: int = 0) -> tuple[Peer, ...]:
+        """Return all who are known, oneself included, sorted by id.
+
+        A place claimed in another mission than ``mission`` is none.
+        """
         peers = [own]
         for who, newest in self._newest.items():
-            place = Place(newest.queue, newest.rank) if newest.queue >= 0 else None
+            placed = newest.queue >= 0 and newest.mission == mission
+            place = Place(newest.queue, newest.rank) if placed else None
             peers.append(Peer(who, newest.position, place))
         peers.sort()
         return tuple(peers)
 
-    def frames(self, own: Record) -> list[bytes]:
-        """Return the whole table, the own record first, in frames of at most 1200 B."""
+    def blocked(self, mission: int) -> frozenset[Place]:
+        """Return the places that others see taken by a silent body (E18)."""
+        return frozenset(
+            Place(*place)
+            for newest in self._newest.values()
+            if newest.mission == mission
+            for place in newest.blocked
+        )
+
+    def frames(self, own: Record, pieces: Sequence[Piece] = ()) -> list[bytes]:
+        """Return the whole table, the own record first, in frames of at most 1200 B.
+
+        pieces: of a mission that somebody lacks; each travels in a frame of its own.
+        """
         records = [own, *(_record(self._newest[who]) for who in sorted(self._newest))]
-        per_frame = (MAX_FRAME_B - FRAME_HEAD_B) // RECORD_B
-        return [
-            encode(Gossip(self._own_id, own.stamp_s, tuple(records[at : at + per_frame])))
-            for at in range(0, len(records), per_frame)
+        frames = [
+            encode(Gossip(self._own_id, own.stamp_s, chunk, None)) for chunk in _chunks(records)
         ]
+        return frames + [encode(Gossip(self._own_id, own.stamp_s, (), piece)) for piece in pieces]
 
     def _may_be_silent_s(self, who: int) -> float:
         return self._relayed_silence_s + 2.0 * self._lag_s.get(who, 0.0)
@@ -116,4 +132,19 @@ def _record(newest: Beacon | Record) -> Record:
         newest.position,
         newest.queue,
         newest.rank,
+        newest.mission,
+        newest.blocked,
     )
+
+
+def _chunks(records: Sequence[Record]) -> Iterator[tuple[Record, ...]]:
+    """Divide records over frames, as many to each as fit."""
+    chunk, size = list[Record](), FRAME_HEAD_B
+    for record in records:
+        length = len(encode(record))
+        if chunk and size + length > MAX_FRAME_B:
+            yield tuple(chunk)
+            chunk, size = [], FRAME_HEAD_B
+        chunk.append(record)
+        size += length
+    yield tuple(chunk)

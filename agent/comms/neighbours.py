@@ -103,9 +103,18 @@ class Neighbours:
         """Return for each neighbour how long it may be silent [s]."""
         return {who: known.silence_s(self._beacon_hz) for who, known in self._known.items()}
 
-    def heard(self, now_s: float) -> tuple[Heard, ...]:
-        """Return all neighbours, brought forward to now, sorted by id."""
-        return tuple(_forward(self._known[who].beacon, now_s) for who in sorted(self._known))
+    def heard(self, now_s: float, mission: int = 0) -> tuple[Heard, ...]:
+        """Return all neighbours, brought forward to now, sorted by id.
+
+        A place claimed in another mission than ``mission`` is none.
+        """
+        return tuple(
+            _forward(self._known[who].beacon, now_s, mission) for who in sorted(self._known)
+        )
+
+    def behind(self, mission: int) -> bool:
+        """Whether somebody who is heard flies an older mission."""
+        return any(known.beacon.mission < mission for known in self._known.values())
 
     def beacons(self) -> list[Beacon]:
         """Return each neighbour's last beacon, sorted by id."""
@@ -122,10 +131,11 @@ class Neighbours:
         return None
 
 
-def _forward(beacon: Beacon, now_s: float) -> Heard:
+def _forward(beacon: Beacon, now_s: float, mission: int) -> Heard:
     age_s = max(0.0, now_s - beacon.stamp_s)
     along = min(age_s, FORWARD_S)
     p, v = beacon.position, beacon.velocity
     position: Vector = (p[0] + along * v[0], p[1] + along * v[1], p[2] + along * v[2])
-    place = Place(beacon.queue, beacon.rank) if beacon.queue >= 0 else None
+    placed = beacon.queue >= 0 and beacon.mission == mission
+    place = Place(beacon.queue, beacon.rank) if placed else None
     return Heard(beacon.id, age_s, position, v, beacon.target, place)

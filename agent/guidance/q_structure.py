@@ -11,11 +11,8 @@ from agent.guidance.bobber import bobber, cast_zone
 from agent.guidance.cone import cone_of
 from agent.guidance.movement import saturated, steer
 from agent.guidance.potential import Potential
-from agent.guidance.target_on_queue import TargetOnQueue
+from agent.guidance.target_on_queue import OwnTarget, TargetOnQueue
 from agent.messages import Place
-from agent.qstructure.formation import Formation, Slot
-from agent.qstructure.frame import Frame
-from agent.qstructure.orientation import FREE
 from agent.setup import AgentSetup
 
 GAIN = 2.0
@@ -41,27 +38,25 @@ class QStructure:
             radians(vehicle.max_yaw_rate_dps),
         )
         self._potential = Potential(control.separation_m)
-        formation = Formation(setup.formation, control.spacing_m)
-        self._targets = TargetOnQueue(setup.id, formation)
-        self._frame = Frame()
-        self._mine: tuple[Place, Slot] | None = None
+        self._targets = TargetOnQueue(setup.id, control.spacing_m)
+        self._mine: OwnTarget | None = None
+        self._blocked: tuple[Place, ...] = ()
+        self._chosen_for = -1
         self._choose_at_s = -1.0
 
     def decide(self, senses: Senses) -> Intent:
         """Return what to do now; without a place, stay and give way."""
         self._choose(senses)
-        q = senses.position
-        q_toq, attitude = q, FREE
-        if self._mine is not None:
-            slot = self._mine[1]
-            q_toq, attitude = self._frame.to_world(slot.point), slot.attitude
+        q, mine, frame = senses.position, self._mine, senses.mission.frame
+        q_toq = frame.to_world(mine.slot.point) if mine is not None else q
         q_tg = bobber(q, senses.yaw, q_toq, self._zone)
         x, y, z = self._potential.omega(q, q_tg, senses.neighbours)
         wanted = saturated((-GAIN * x, -GAIN * y, -GAIN * z), self._max_speed, self._max_climb)
         velocity, yaw = steer(wanted, senses.yaw, self._cone)
         tilt = (0.0, 0.0)
-        if dist(q, q_toq) < AT_SLOT_M and velocity == wanted:
-            yaw = yaw if attitude.yaw is None else attitude.yaw + self._frame.yaw
+        if mine is not None and dist(q, q_toq) < AT_SLOT_M and velocity == wanted:
+            attitude = mine.slot.attitude
+            yaw = yaw if attitude.yaw is None else attitude.yaw + frame.yaw
             tilt = (attitude.pitch or 0.0, attitude.roll or 0.0)
         return Intent(
             wanted,
@@ -69,13 +64,20 @@ class QStructure:
             yaw % (2.0 * pi),
             GAIN * sqrt(x * x + y * y + z * z),
             q_tg,
-            q_toq if self._mine is not None else None,
-            self._mine[0] if self._mine is not None else None,
-            tilt,
+            target=q_toq if mine is not None else None,
+            place=mine.place if mine is not None else None,
+            tilt=tilt,
+            vertex=mine is not None and mine.vertex,
+            blocked=self._blocked,
         )
 
     def _choose(self, senses: Senses) -> None:
-        """Choose the own place anew, when it is time to (Algorithm 1 at 5 Hz)."""
-        if senses.now_s >= self._choose_at_s:
+        """Choose the own place anew: at 5 Hz (Algorithm 1), and at once in a new mission."""
+        mission = senses.mission
+        if senses.now_s >= self._choose_at_s or mission.key != self._chosen_for:
             self._choose_at_s = senses.now_s + 1.0 / CHOICE_HZ - 1e-9
-            self._mine = self._targets.choose(senses.team(), self._frame)
+            self._chosen_for = mission.key
+            team = senses.team()
+            self._blocked = self._targets.blocked(mission, len(team), senses.silent)
+            blocked = senses.blocked.union(self._blocked)
+            self._mine = self._targets.choose(mission, team, blocked)

@@ -6,30 +6,66 @@ beyond noise. A vertex shared by queues has one agent (E16); slots stand by arc 
 """
 
 from collections.abc import Sequence
+from math import dist
+from typing import NamedTuple
 
 from agent.comms.allocation import own_place
-from agent.controller import Peer
+from agent.controller import Flown, Peer
 from agent.messages import Place, Vector
-from agent.qstructure.formation import Formation, Layout, Slot
+from agent.qstructure.formation import Layout, Slot
 from agent.qstructure.frame import Frame
+
+MAX_BLOCKED = 8
+
+
+class OwnTarget(NamedTuple):
+    """An agent's place, where it is, and what comes with it.
+
+    slot [m, rad; target's frame]; vertex: whether the holder is a queue-vertex agent.
+    """
+
+    place: Place
+    slot: Slot
+    vertex: bool
 
 
 class TargetOnQueue:
-    """Chooses an agent's place, and says where that place is."""
+    """Chooses an agent's place in a formation. spacing: d_ir [m]."""
 
-    def __init__(self, own_id: int, formation: Formation) -> None:
+    def __init__(self, own_id: int, spacing: float) -> None:
         self._own_id = own_id
-        self._formation = formation
+        self._blocking_m = 0.5 * spacing
         self._seen: tuple[Layout, Frame, list[Vector]] | None = None
 
-    def choose(self, team: Sequence[Peer], frame: Frame) -> tuple[Place, Slot] | None:
-        """Return the own place and its slot [m, rad; target's frame].
+    def choose(
+        self, mission: Flown, team: Sequence[Peer], blocked: frozenset[Place]
+    ) -> OwnTarget | None:
+        """Return the own target; None where all queues are full.
 
-        team: all members known, oneself included, sorted by id. None where all queues are full.
+        team: all members known, oneself included, sorted by id; blocked: places that cannot be had.
         """
-        layout = self._formation.layout(len(team))
-        place = own_place(self._own_id, team, layout.places, self._points(layout, frame))
-        return None if place is None else (place, layout.slots[place])
+        layout = mission.formation.layout(len(team), blocked)
+        points = self._points(layout, mission.frame)
+        place = own_place(self._own_id, team, layout.places, points)
+        if place is None:
+            return None
+        return OwnTarget(place, layout.slots[place], place in layout.heads)
+
+    def blocked(self, mission: Flown, agents: int, silent: Sequence[Vector]) -> tuple[Place, ...]:
+        """Return the places of a team that are within d_ir / 2 of a silent body (E18)."""
+        found: set[Place] = set()
+        while silent and len(found) < MAX_BLOCKED:
+            layout = mission.formation.layout(agents, frozenset(found))
+            points = self._points(layout, mission.frame)
+            new = {
+                place
+                for place, point in zip(layout.places, points, strict=True)
+                if any(dist(point, body) <= self._blocking_m for body in silent)
+            }
+            if not new:
+                break
+            found |= new
+        return tuple(sorted(found))[:MAX_BLOCKED]
 
     def _points(self, layout: Layout, frame: Frame) -> list[Vector]:
         """Return where a layout's places are [m; world frame]; remembered while both stay."""

@@ -4,6 +4,7 @@ The ``...Spec`` structures are the tables of a formation file; :class:`Formation
 compute with, and a :class:`Layout` is the formation filled by a team of one size.
 """
 
+from collections.abc import Sequence
 from functools import cache
 from math import dist, inf
 from typing import Annotated, NamedTuple
@@ -24,6 +25,9 @@ from agent.qstructure.queue import Queue, QueueError
 from agent.qstructure.shape import ShapeError, ShapeSpec, Straight, shape_of
 
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
+
+
+NOTHING: frozenset[Place] = frozenset()
 
 
 class FormationError(ValueError):
@@ -71,12 +75,14 @@ class Slot(NamedTuple):
 class Layout(NamedTuple):
     """A formation filled by a team: its places in the order they fill, and where each is.
 
-    unplaced: how many of the team find no place, because every queue is closed and full.
+    unplaced: how many of the team find no place, because every queue is closed and full. heads: the
+    places whose holders are queue-vertex agents.
     """
 
     places: tuple[Place, ...]
     slots: dict[Place, Slot]
     unplaced: int
+    heads: frozenset[Place]
 
 
 class Formation:
@@ -98,7 +104,9 @@ class Formation:
         self.vertex_places = {name: places[0] for name, places in holders.items()}
         self.common = tuple(places[0] for places in holders.values() if len(places) > 1)
         self._own = self._own_vertices(holders)
-        self._owned = sum(len(own) for own in self._own)
+        self._through = {
+            places[0]: frozenset(place.queue for place in places) for places in holders.values()
+        }
         self.layout = cache(self._layout)
 
     def slot(self, place: Place, agents: int) -> Slot | None:
@@ -115,22 +123,31 @@ class Formation:
             return None
         return self._slot(place.queue, self.queues[place.queue].members(place.rank)[-1])
 
-    def divide(self, agents: int) -> tuple[int, ...]:
+    def queues_of(self, place: Place) -> frozenset[int]:
+        """Return the queues that a place belongs to: of a vertex, all that pass through it."""
+        return self._through.get(place) or frozenset((place.queue,))
+
+    def divide(self, agents: int, blocked: frozenset[Place] = NOTHING) -> tuple[int, ...]:
         """Return how many agents each queue gets besides the common ones of shared vertices.
 
         Vertices first, then largest remainder over the capacities, ties to the queue named first
-        (E16). What a closed queue cannot hold goes to those that can.
+        (E16). What a closed queue cannot hold goes to those that can. blocked: places that cannot
+        be had, since a dead body hovers there (E18).
         """
-        return self._divide(agents, [self._most(j) for j in range(len(self.queues))])
+        most = [self._most(j, blocked) for j in range(len(self.queues))]
+        return self._divide(agents, most, blocked)
 
-    def _divide(self, agents: int, most: list[float]) -> tuple[int, ...]:
+    def _divide(
+        self, agents: int, most: list[float], blocked: frozenset[Place] = NOTHING
+    ) -> tuple[int, ...]:
         """Divide with at most so many in each queue.
 
         One agent after the other goes where most are wanting: the method of largest remainders,
         with bounds.
         """
-        left = max(0, agents - len(self.common))
-        counts = [len(own) for own in self._own] if left >= self._owned else [0] * len(most)
+        left = max(0, agents - len(_but(self.common, blocked)))
+        owned = [len(_but(own, blocked)) for own in self._own]
+        counts = owned if left >= sum(owned) else [0] * len(most)
         for _ in range(left - sum(counts)):
             free = [j for j in range(len(counts)) if counts[j] < most[j]]
             if not free:
@@ -175,26 +192,49 @@ class Formation:
         except (CurveError, ExpressionError) as error:
             raise FormationError("queue", str(error)) from error
 
-    def _layout(self, agents: int) -> Layout:
-        counts = self.divide(agents)
-        ordered = [(0, 0, place) for place in self.common[:agents]]
-        slots: dict[Place, Slot] = {}
+    def _layout(self, agents: int, blocked: frozenset[Place] = NOTHING) -> Layout:
+        counts = self.divide(agents, blocked)
+        common = _but(self.common, blocked)[:agents]
+        ordered = [(0, 0, place) for place in common]
+        heads = {*common}
+        slots = {place: self._station(place) for place in common}
         for j, queue in enumerate(self.queues):
-            own = self._own[j][: counts[j]]
-            members = queue.members(counts[j] - len(own))
-            first = len(queue.stations)
+            own = _but(self._own[j], blocked)[: counts[j]]
+            members = self._members(j, counts[j] - len(own), blocked)
+            arc_lengths = queue.members(
+                members[-1].rank + 1 - len(queue.stations) if members else 0
+            )
+            slots |= {place: self._station(place) for place in own}
+            slots |= {
+                place: self._slot(j, arc_lengths[place.rank - len(queue.stations)])
+                for place in members
+            }
             ordered += [(0, 1, place) for place in own]
-            ordered += [(1 + k, j, Place(j, first + k)) for k in range(len(members))]
-            for k, s in enumerate(members):
-                slots[Place(j, first + k)] = self._slot(j, s)
-        for _, _, place in ordered:
-            if place not in slots:
-                slots[place] = self._slot(
-                    place.queue, self.queues[place.queue].stations[place.rank]
-                )
+            ordered += [(1 + k, j, place) for k, place in enumerate(members)]
+            heads.update(own if self._headed(j, blocked) else members[:1])
         ordered.sort()
         places = tuple(place for _, _, place in ordered)
-        return Layout(places, slots, agents - len(places))
+        return Layout(places, slots, agents - len(places), frozenset(heads))
+
+    def _members(self, queue: int, count: int, blocked: frozenset[Place]) -> list[Place]:
+        """Return the next ``count`` places behind or between a queue's vertices."""
+        first, found = len(self.queues[queue].stations), list[Place]()
+        rank = first
+        while len(found) < count:
+            place = Place(queue, rank)
+            if place not in blocked:
+                found.append(place)
+            rank += 1
+        return found
+
+    def _headed(self, queue: int, blocked: frozenset[Place]) -> bool:
+        """Whether one of a queue's vertices can be held; else its first member is the head."""
+        return any(
+            queue in queues and place not in blocked for place, queues in self._through.items()
+        )
+
+    def _station(self, place: Place) -> Slot:
+        return self._slot(place.queue, self.queues[place.queue].stations[place.rank])
 
     def _slot(self, queue: int, s: float) -> Slot:
         where = self.queues[queue]
@@ -222,10 +262,17 @@ class Formation:
                 own[places[0].queue].append(places[0])
         return [sorted(places) for places in own]
 
-    def _most(self, queue: int) -> float:
+    def _most(self, queue: int, blocked: frozenset[Place] = NOTHING) -> float:
         """Return how many agents a queue can hold besides the common ones."""
         room = self.queues[queue].room
-        return inf if room is None else len(self._own[queue]) + room
+        if room is None:
+            return inf
+        lost = sum(place.queue == queue and place not in self.common for place in blocked)
+        return max(0, len(self._own[queue]) + room - lost)
+
+
+def _but(places: Sequence[Place], blocked: frozenset[Place]) -> list[Place]:
+    return [place for place in places if place not in blocked]
 
 
 def _queue(table: QueueSpec, vertices: dict[str, Vector], spacing: float) -> Queue:

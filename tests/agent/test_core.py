@@ -14,7 +14,7 @@ from agent.messages import Beacon, Gossip, Observation
 from agent.qstructure.formation import FormationSpec
 from agent.setup import AgentSetup, Comms, Control, Vehicle
 from netem.wire.frame import Outgoing, Transmission, pack, unpack_transmission
-from tests.agent.comms.making import FAR, GREATEST, ORIGIN, beacon, greatest_record, record
+from tests.agent.comms.making import FAR, GREATEST, ORIGIN, UNLED, beacon, greatest_record, record
 
 TICK_S = 0.05
 SPEED = Vehicle().max_speed_mps
@@ -49,7 +49,7 @@ def agent(who=0, sensors=("proximity",), incarnation=0):
 
 
 def seen(tick, at=(2.0, 1.0, 0.5), vehicles=(), start_s=0.0):
-    return Observation(4 * tick, start_s + tick * TICK_S, at, ORIGIN, 0.3, tuple(vehicles))
+    return Observation(4 * tick, start_s + tick * TICK_S, at, ORIGIN, 0.3, tuple(vehicles), ())
 
 
 def airworthy(outbox, tick):
@@ -104,7 +104,7 @@ def test_mutated_frames_never_bring_it_down():
 
 CASES = {
     "spoofed": (beacon(2, 1, 1.0), 3),
-    "spoofed by gossip": (Gossip(2, 1.0, (record(2, 1, 1.0),)), 3),
+    "spoofed by gossip": (Gossip(2, 1.0, (record(2, 1, 1.0),), None), 3),
     "spoofed own": (beacon(0, 1, 1.0), 0),
     "future": (beacon(2, 1, 1.2), 2),
     "old": (beacon(2, 1, 20.0), 2),
@@ -141,7 +141,9 @@ def test_a_neighbour_may_say_it_is_anywhere(at, sensors):
     core = agent(sensors=sensors)
     for tick in range(60):
         now_s = tick * TICK_S
-        odd = Beacon(1, 0, tick, now_s, at, (100.0,) * 3, at, 2**15 - 1, 2**15 - 1, 100.0, ())
+        odd = Beacon(
+            1, 0, tick, now_s, at, (100.0,) * 3, at, 2**15 - 1, 2**15 - 1, 100.0, (), *UNLED
+        )
         hear(core, odd, now_s)
         airworthy(core.step(seen(tick, vehicles=[ORIGIN] if sensors else ())), tick)
     assert core.rejected.total() == 0
@@ -162,10 +164,10 @@ def test_however_many_are_heard_what_it_says_can_be_said(neighbours):
 
 def test_however_much_is_passed_on_what_it_says_can_be_said():
     core = agent()
-    for first in range(1, 3000, 16):
-        records = (greatest_record(who) for who in range(first, first + 16))
+    for first in range(1, 3000, 8):
+        records = (greatest_record(who) for who in range(first, first + 8))
         fresh = tuple(msgspec.structs.replace(each, stamp_s=0.0) for each in records)
-        hear(core, Gossip(1, 0.0, fresh), 0.0, 1)
+        hear(core, Gossip(1, 0.0, fresh, None), 0.0, 1)
     outbox = core.step(seen(0, at=(FAR, FAR, FAR)))
     airworthy(outbox, 0)
     assert sum(channel == MULTIHOP for channel, _ in outbox.frames) > 50

@@ -33,7 +33,15 @@ def sent(slot: int, incarnation: int = 0) -> bytes:
 
 def command(slot: int) -> Command:
     still = (0.0, 0.0, 0.0)
-    return Command(slot, 0, slot + 8, still, 0.0, (0.0, 0.0), Telemetry(still, 0.0, None, None, (), 0))
+    return Command(
+        slot,
+        0,
+        slot + 8,
+        still,
+        0.0,
+        (0.0, 0.0),
+        Telemetry(still, 0.0, None, None, (), 0, 0, -1, -1, 0),
+    )
 
 
 @pytest.fixture

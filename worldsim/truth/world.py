@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agent.messages import Command, Observation, Vector
 from agent.setup import Vehicle
@@ -86,7 +87,7 @@ class World:
         velocity = self.fleet.velocity[looking].tolist()
         yaw = self.fleet.yaw[looking].tolist()
         return [
-            Observation(self.slot, self.time_s, tuple(p), tuple(v), heading, bodies)
+            Observation(self.slot, self.time_s, tuple(p), tuple(v), heading, bodies, ())
             for p, v, heading, bodies in zip(position, velocity, yaw, sensed, strict=True)
         ]
 
@@ -106,16 +107,20 @@ class World:
             return False
         self.latest[agent] = command
         self._expires[agent] = min(command.expires_slot, command.slot + self._longest)
-        self._velocity[agent] = command.velocity
+        self._velocity[agent] = self.fleet.within_limits(agent, command.velocity)
         self._yaw[agent] = command.yaw
         self._tilt[agent] = command.tilt
         return True
 
     def advance(self) -> None:
         """Fly through the present slot; a vehicle whose command has expired stops and hovers."""
-        valid = self._expires > self.slot
-        velocity = np.where(valid[:, None], self._velocity, 0.0)
-        yaw = np.where(valid, self._yaw, self.fleet.yaw)
-        tilt = np.where(valid[:, None], self._tilt, self.fleet.tilt)
-        self.fleet.integrate(velocity, yaw, tilt, 1.0 / self.clock.slot_hz)
+        expired = self._expires <= self.slot
+        if expired.any():
+            self._hover(expired)
+        self.fleet.integrate(self._velocity, self._yaw, self._tilt, 1.0 / self.clock.slot_hz)
         self.slot += 1
+
+    def _hover(self, rows: NDArray[np.bool_]) -> None:
+        self._velocity[rows] = 0.0
+        self._yaw[rows] = self.fleet.yaw[rows]
+        self._tilt[rows] = self.fleet.tilt[rows]
