@@ -4,20 +4,17 @@ Each looks its subject up when it is called, so that a literal form of the paper
 place: see test_literal_forms.py.
 """
 
-from dataclasses import dataclass
-from itertools import pairwise
-from math import dist, hypot, pi, radians
+from math import dist, hypot
 from random import Random
 
 from agent.comms import allocation
 from agent.controller import Peer
-from agent.guidance import bobber as bobber_room
 from agent.guidance import potential as potential_room
-from agent.guidance.cone import Cone
-from agent.guidance.movement import saturated, steer
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Polyline, Ray
+from tests.laws import approach, energy
+from tests.laws.energy import Other, random_point
 
 D_OB = 0.25
 WEDGE = FormationSpec(
@@ -41,18 +38,6 @@ ZIGZAG = FormationSpec(
 )
 
 
-@dataclass(frozen=True)
-class Other:
-    """A neighbour as the potential sees it."""
-
-    position: Vector
-    target: Vector
-
-
-def _random_point(random: Random, size: float = 4.0) -> Vector:
-    return tuple(random.uniform(-size, size) for _ in range(3))  # type: ignore[return-value]
-
-
 def targets_are_an_equilibrium() -> None:
     """(21), (22), E1: agents that stand on their targets want to stay there."""
     potential = potential_room.Potential(D_OB)
@@ -67,7 +52,7 @@ def repulsion_never_attracts() -> None:
     random = Random(2)
     potential = potential_room.Potential(D_OB)
     for _ in range(2000):
-        q, q_j, q_tg = (_random_point(random, 1.0) for _ in range(3))
+        q, q_j, q_tg = (random_point(random, 1.0) for _ in range(3))
         q_tg_j = tuple(x + random.choice((0.0, 1e-3, 0.3, 1.0)) for x in q_tg)
         omega = potential.omega(q, q_tg, [Other(q_j, q_tg_j)])  # type: ignore[arg-type]
         own = potential.omega(q, q_tg, [])
@@ -81,8 +66,8 @@ def omega_is_the_gradient() -> None:
     random = Random(3)
     potential = potential_room.Potential(D_OB, k_ob=1.0, cap=1e9)
     for _ in range(300):
-        q_j, q_tg, q_tg_j = (_random_point(random, 1.0) for _ in range(3))
-        away = _random_point(random, 1.0)
+        q_j, q_tg, q_tg_j = (random_point(random, 1.0) for _ in range(3))
+        away = random_point(random, 1.0)
         r = random.uniform(0.5, 1.5)
         q = tuple(a + r * b / hypot(*away) for a, b in zip(q_j, away, strict=True))
         u_tg = potential.at_targets(dist(q_tg, q_tg_j))
@@ -117,42 +102,6 @@ def no_second_equilibrium() -> None:
             )
             left, right = left - 0.005 * a[0], right - 0.005 * b[0]
         assert abs(right - left - 1.0) < 0.01, f"from {apart} m apart it rests at {right - left}"
-
-
-def pole_and_zero_slope() -> None:
-    """Properties (a)-(e) of (23), (b) and (e) in the one-sided form (E3)."""
-    potential = potential_room.Potential(D_OB)
-    for u_tg in (0.03, 0.28, 1.0, 4.0):
-        assert potential.value(1e-9, u_tg) > 1e8
-        assert potential.slope(1e-6, u_tg) < -1e10
-        assert potential.slope(u_tg, u_tg) == 0.0
-        assert abs(potential.slope(u_tg * (1 - 1e-7), u_tg)) < 1e-4 * (1.0 + u_tg**-2)
-        steps = [u_tg * k / 200 for k in range(1, 400)]
-        values = [potential.value(u, u_tg) for u in steps]
-        assert all(value >= 0.0 for value in values)
-        assert all(a >= b - 1e-12 for a, b in pairwise(values))
-        assert all(potential.slope(u, u_tg) <= 0.0 for u in steps)
-
-
-def bobber_cycles_reach_the_target() -> None:
-    """Lemma 9 in its true form, E7, E9, E11: from any pose the bobber's cycles end at the target.
-
-    A vehicle of perfect obedience: it flies to the bobber, heading there, or turns on the spot.
-    """
-    random = Random(7)
-    cone, reach, speed, yaw_rate, dt = Cone(radians(45), radians(45)), 0.5, 0.5, pi, 0.05
-    zone = bobber_room.cast_zone(cone, reach, speed, yaw_rate)
-    for _ in range(300):
-        q, yaw = (0.0, 0.0, 0.0), random.uniform(-pi, pi)
-        target = _random_point(random, 3.0)
-        for _ in range(800):
-            q_ba = bobber_room.bobber(q, yaw, target, zone)
-            u = tuple(2.0 * (b - a) for a, b in zip(q, q_ba, strict=True))
-            velocity, heading = steer(saturated(u, speed, speed), yaw, cone)  # type: ignore[arg-type]
-            q = tuple(a + dt * v for a, v in zip(q, velocity, strict=True))  # type: ignore[assignment]
-            turn = (heading - yaw + pi) % (2 * pi) - pi
-            yaw += max(-yaw_rate * dt, min(yaw_rate * dt, turn))
-        assert dist(q, target) < 0.01, f"target {target}, still {dist(q, target):.3f} m away"
 
 
 def slots_stand_by_arc_length() -> None:
@@ -207,9 +156,9 @@ LAWS = {
     "E1 floor": repulsion_never_attracts,
     "E2": omega_is_the_gradient,
     "E3": no_second_equilibrium,
-    "(a)-(e)": pole_and_zero_slope,
-    "E7": bobber_cycles_reach_the_target,
     "E13": slots_stand_by_arc_length,
     "E16": everybody_gets_a_slot_of_their_own,
     "E17": noise_changes_no_order,
+    **energy.LAWS,
+    **approach.LAWS,
 }

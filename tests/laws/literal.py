@@ -4,7 +4,7 @@ Each is what a reader would write from the page; the law named beside it in
 test_literal_forms.py says what then breaks.
 """
 
-from math import acos, cos, dist, exp, sin, sqrt
+from math import acos, atan2, cos, dist, exp, hypot, pi, sin, sqrt
 
 from agent.messages import Place
 
@@ -76,6 +76,56 @@ def bobber(q, yaw, q_toq, zone):
             if potential < least:
                 best, least = at, potential
     return best
+
+
+def bobber_of_angle_alone(q, yaw, q_toq, zone):
+    """(10) without the walls of (3): the least angle at the bobber, which lies nearest to d_c1."""
+    near, theta = 0.05, zone.cone.left
+    choices = []
+    for ring in range(20):
+        for ray in range(41):
+            r, side = near + (zone.reach - near) * ring / 19, theta * (ray / 20.0 - 1.0)
+            at = (q[0] + r * cos(yaw + side), q[1] + r * sin(yaw + side), q[2])
+            onward = [t - a for t, a in zip(q_toq, at, strict=True)]
+            out = [a - b for a, b in zip(at, q, strict=True)]
+            cosine = sum(a * b for a, b in zip(out, onward, strict=True)) / (r * hypot(*onward))
+            choices.append((acos(max(-1.0, min(1.0, cosine))), at))
+    return min(choices)[1]
+
+
+def bobber_from_d_c1_on(q, yaw, q_toq, zone):
+    """Algorithm 2, lines 1, 3: a cast-zone from d_c1 = 0.05 m on; what is nearer lies outside."""
+    v = [t - a for t, a in zip(q_toq, q, strict=True)]
+    scale = min(max(1.0, 0.05 / max(hypot(*v), 1e-12)), zone.reach / max(hypot(*v), 1e-12))
+    return tuple(a + scale * x for a, x in zip(q, v, strict=True))
+
+
+def bobber_never_head_on(q, yaw, q_toq, zone):
+    """Algorithm 2, lines 7-10, and the proof of Lemma 9: always onwards, on the cone's edge."""
+    x, y, z = (t - a for t, a in zip(q_toq, q, strict=True))
+    error = atan2(y, x) - yaw
+    error -= 2.0 * pi * round(error / (2.0 * pi))
+    if zone.cone.holds(error):
+        scale = min(1.0, zone.reach / max(hypot(x, y, z), 1e-12))
+        return (q[0] + scale * x, q[1] + scale * y, q[2] + scale * z)
+    heading = yaw + (zone.cone.left if error > 0.0 else -zone.cone.right)
+    step = 0.5 * zone.reach
+    climb = min(max(z, -step), step)
+    return (q[0] + step * cos(heading), q[1] + step * sin(heading), q[2] + climb)
+
+
+def steer_in_a_pyramid(wanted, yaw, cone):
+    """(4), (5): the cone in azimuth and, theta_3,4 = 45 degrees, in elevation."""
+    heading = atan2(wanted[1], wanted[0])
+    error = heading - yaw
+    error -= 2.0 * pi * round(error / (2.0 * pi))
+    if cone.holds(error) and abs(wanted[2]) <= hypot(wanted[0], wanted[1]):
+        return wanted, heading
+    return (0.0, 0.0, 0.0), heading
+
+
+def adopt_nothing(self, gossip, now_s, slack_s):
+    """Algorithm 1, lines 12-15: the own list holds those within communication range, no more."""
 
 
 def members_by_chord(self, count):

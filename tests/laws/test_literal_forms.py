@@ -4,6 +4,7 @@ import pytest
 
 from agent.comms import allocation
 from agent.guidance import bobber as bobber_room
+from agent.guidance import movement
 from agent.guidance.potential import Potential
 from agent.qstructure.formation import Formation
 from agent.qstructure.queue import Queue
@@ -27,8 +28,23 @@ LITERAL = {
             "_push": literal.push_two_sided,
         },
     ),
-    "E3 (b)": ("(a)-(e)", Potential, {"slope": literal.slope_two_sided}),
+    "E3 (b)": ("(a)-(c)", Potential, {"slope": literal.slope_two_sided}),
+    "E3 (e)": (
+        "(e)",
+        Potential,
+        {"value": literal.value_two_sided, "slope": literal.slope_two_sided},
+    ),
+    "E3 Lemma 6": ("Lemma 6 (ii)", Potential, {"_push": literal.push_two_sided}),
+    "E1 Lemma 6": ("Lemma 6 (i)", Potential, {"at_targets": literal.at_targets}),
     "E7": ("E7", bobber_room, {"bobber": literal.bobber}),
+    "E7 Lemma 9": ("Lemma 9", bobber_room, {"bobber": literal.bobber}),
+    "E8": ("E8", bobber_room, {"bobber": literal.bobber_of_angle_alone}),
+    "E9": ("Lemma 9", bobber_room, {"bobber": literal.bobber_from_d_c1_on}),
+    "E9 reach": ("E7", bobber_room, {"bobber": literal.bobber_from_d_c1_on}),
+    "E10 climb": ("E10 climb", movement, {"steer": literal.steer_in_a_pyramid}),
+    "E10 dead band": ("E10 dead band", movement, {"steer": literal.steer_in_a_pyramid}),
+    "E11": ("E7", bobber_room, {"bobber": literal.bobber_never_head_on}),
+    "E11 Lemma 9": ("Lemma 9", bobber_room, {"bobber": literal.bobber_never_head_on}),
     "E13": ("E13", Queue, {"_behind": literal.members_by_chord}),
     "E16": ("E16", Formation, {"_holders": literal.holders_queue_by_queue}),
     "E17": ("E17", allocation, {"allot": literal.allot_by_distance}),
