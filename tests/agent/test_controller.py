@@ -1,0 +1,191 @@
+"""Controllers: how they are found by name, what is taken of theirs, and how they fail."""
+
+from math import hypot, inf, nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from agent.controller import ControllerError, Heard, Intent, Senses, load
+from agent.guidance.flocking import Flocking
+from agent.guidance.q_structure import QStructure
+from agent.pilot import FaultyControllerError, Pilot, plain
+from agent.setup import AgentSetup
+from worldsim.scenario.file import load as load_scenario
+
+SCENARIO = Path(__file__).parents[2] / "deploy" / "scenarios" / "flocking-9.toml"
+REST = (0.0, 0.0, 0.0)
+HERE = (1.0, 2.0, 3.0)
+HOVER = Intent(REST, REST, 0.5, 0.0, HERE)
+SENSES = Senses(2.5, HERE, REST, 0.5, (), (), tuple)
+
+
+class Puppet:
+    """Returns, or raises, what a test tells it to."""
+
+    says: Any = HOVER
+
+    def __init__(self, setup: AgentSetup) -> None:
+        if isinstance(self.says, OSError):
+            raise self.says
+
+    def decide(self, senses: Senses) -> Intent:
+        if isinstance(self.says, Exception):
+            raise self.says
+        return self.says  # type: ignore[no-any-return]
+
+
+class Mute:
+    """Has nothing to decide with."""
+
+
+def setup_of(controller: str) -> AgentSetup:
+    return load_scenario(SCENARIO, {"control.controller": controller}).agent_setup(3, 0, 1)
+
+
+@pytest.fixture
+def puppet(monkeypatch: pytest.MonkeyPatch) -> Any:
+    def saying(words: Any) -> Pilot:
+        monkeypatch.setattr(Puppet, "says", words)
+        return Pilot(setup_of(f"{__name__}:Puppet"))
+
+    return saying
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("q_structure", QStructure),
+        ("flocking", Flocking),
+        ("agent.guidance.flocking:Flocking", Flocking),
+    ],
+)
+def test_a_name_finds_its_class(name: str, found: type) -> None:
+    assert load(name) is found
+
+
+def test_an_installed_package_names_controllers_but_not_those_that_ship(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    info = tmp_path / "others-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: others\nVersion: 1.0\n")
+    entries = "\n".join(
+        f"{name} = agent.guidance.flocking:Flocking" for name in ("boids", "q_structure")
+    )
+    (info / "entry_points.txt").write_text(f"[qswarm.controllers]\n{entries}\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    assert load("boids") is Flocking
+    assert load("q_structure") is QStructure
+    with pytest.raises(ControllerError, match="boids"):
+        load("bird")
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("bird", "q_structure, flocking"),
+        ("no.such.module:Class", "No module named 'no'"),
+        ("agent.guidance.flocking:Bird", "'Bird'"),
+        (f"{__name__}:Mute", "no method 'decide'"),
+        (":Flocking", "neither known"),
+        ("agent.guidance.flocking:", "neither known"),
+    ],
+)
+def test_a_controller_that_cannot_be_had_is_told_why(name: str, why: str) -> None:
+    with pytest.raises(ControllerError) as refused:
+        load(name)
+    assert repr(name) in str(refused.value)
+    assert why in str(refused.value)
+
+
+def test_what_is_plain_is_taken_as_it_is() -> None:
+    assert plain(HOVER) is HOVER
+
+
+def test_numbers_of_numpy_become_plain_floats() -> None:
+    zero, here = np.zeros(3, dtype=np.float32), np.array(HERE)
+    taken = plain(Intent(zero, zero, np.float64(0.5), np.float32(0.0), here, here))
+    assert taken == HOVER._replace(target=HERE)
+    assert {type(number) for number in (*taken.wanted, *taken.heading_for, taken.yaw)} == {float}
+
+
+def test_far_from_the_origin_is_no_fault() -> None:
+    far = HOVER._replace(heading_for=(-9e5, 9e5, 100.5), target=(9e5, 0.0, 0.0), force=1e6)
+    assert plain(far) == far
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("wanted", (0.0, 0.0, nan)),
+        ("velocity", (0.0, inf, 0.0)),
+        ("velocity", (0.0, 0.0, 101.0)),
+        ("velocity", (0.0, 0.0)),
+        ("wanted", np.zeros(4)),
+        ("heading_for", (0.0, 2e6, 0.0)),
+        ("target", (nan, 0.0, 0.0)),
+        ("yaw", 100.5),
+        ("force", -0.1),
+        ("force", 2e9),
+        ("tilt", (0.0, 0.0, 0.0)),
+    ],
+)
+def test_what_no_command_may_hold_is_refused_by_name(field: str, value: Any) -> None:
+    with pytest.raises(ValueError, match=f"Intent's {field} "):
+        plain(HOVER._replace(**{field: value}))
+
+
+@pytest.mark.parametrize(
+    ("says", "told"),
+    [
+        (ZeroDivisionError("division by zero"), "ZeroDivisionError: division by zero"),
+        (None, "TypeError: decide returned NoneType, not an Intent"),
+        (HOVER._replace(yaw=nan), "ValueError: the Intent's yaw holds nan; at most 100 is allowed"),
+        (HOVER._replace(wanted=("a", "b", "c")), "TypeError: "),
+    ],
+)
+def test_a_failure_in_flight_names_controller_agent_and_time(
+    says: Any, told: str, puppet: Any
+) -> None:
+    pilot = puppet(says)
+    with pytest.raises(FaultyControllerError) as failed:
+        pilot.decide(SENSES)
+    begin = f"controller '{__name__}:Puppet' of agent 3 failed at 2.5 s: "
+    assert str(failed.value).startswith(begin + told)
+
+
+def test_a_failure_at_the_start_names_controller_and_agent(puppet: Any) -> None:
+    with pytest.raises(FaultyControllerError) as failed:
+        puppet(OSError("no battery"))
+    assert str(failed.value) == (
+        f"controller '{__name__}:Puppet' of agent 3 failed when it was made: OSError: no battery"
+    )
+
+
+def heard(x: float, velocity: tuple[float, float, float] = REST) -> Heard:
+    return Heard(1, 0.0, (x, 0.0, 0.0), velocity, (x, 0.0, 0.0), None)
+
+
+def flock(*neighbours: Heard) -> Intent:
+    senses = Senses(0.0, REST, REST, 0.0, (), neighbours, tuple)
+    return Flocking(setup_of("flocking")).decide(senses)
+
+
+def test_a_bird_alone_hovers() -> None:
+    assert flock().wanted == REST
+
+
+@pytest.mark.parametrize(("x", "way"), [(0.9, -1), (1.0, 0), (1.1, 1)])
+def test_birds_draw_together_and_keep_apart_about_spacing_m(x: float, way: int) -> None:
+    assert np.sign(flock(heard(x)).wanted[0]) == way
+
+
+def test_birds_fly_alike() -> None:
+    assert flock(heard(1.0, (0.0, 0.2, 0.1))).wanted == pytest.approx((0.0, 0.1, 0.05))
+
+
+def test_birds_keep_the_limits_of_their_vehicles() -> None:
+    assert hypot(*flock(heard(0.01)).wanted) == pytest.approx(0.5)
