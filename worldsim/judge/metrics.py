@@ -15,15 +15,15 @@ def swept_separation(before: Singles, after: Singles) -> Floats:
     that is alone, give NaN.
     """
     start = _between_rows(before)
-    change = [after - before for before, after in zip(start, _between_rows(after), strict=True)]
+    change = _between_rows(after) - start
     along = _dot(change, change)
     when = -_dot(start, change) / np.where(along > 0.0, along, 1.0)
     when = np.minimum(np.maximum(when, 0.0), 1.0)
-    nearest = [a + when * b for a, b in zip(start, change, strict=True)]
-    distance = np.sqrt(_dot(nearest, nearest))
-    np.fill_diagonal(distance, np.inf)
-    least = np.where(np.isnan(distance), np.inf, distance).min(axis=1)
-    return np.where(np.isfinite(least), least, np.nan)
+    nearest = start + when * change
+    square = _dot(nearest, nearest)
+    square.flat[:: len(before) + 1] = np.nan
+    least: Floats = np.fmin.reduce(square, axis=1, initial=np.nan)
+    return np.sqrt(least)
 
 
 def conserved(packets: Packets) -> bool:
@@ -33,10 +33,13 @@ def conserved(packets: Packets) -> bool:
     return known == packets["addressed"]
 
 
-def _between_rows(position: Singles) -> list[Floats]:
-    """Return x, y, z of row j as seen from row i, each (N, N) [m]."""
-    return [axis[None, :] - axis[:, None] for axis in position.T.astype(np.float64)]
+def _between_rows(position: Singles) -> Floats:
+    """Return x, y, z of row j as seen from row i, (3, N, N) [m]."""
+    axes: Floats = position.T.astype(np.float64)
+    return axes[:, None, :] - axes[:, :, None]
 
 
-def _dot(a: list[Floats], b: list[Floats]) -> Floats:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def _dot(a: Floats, b: Floats) -> Floats:
+    product = a * b
+    total: Floats = product[0] + product[1] + product[2]
+    return total

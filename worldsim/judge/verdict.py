@@ -6,7 +6,7 @@ agent means to hold, and computes where that place is by itself.
 
 from collections import Counter
 from dataclasses import dataclass
-from math import degrees, remainder, tau
+from math import degrees, inf, isfinite, remainder, tau
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,8 @@ class Phase:
         self._frame = Frame()
         self._since_s: float | None = None
         self._slots: dict[tuple[int, int, int], Slot | None] = {}
+        self._owned: dict[int, Slot] = {}
+        self._owned_by: tuple[bytes, bytes] | None = None
 
     def slot_error(self, tick: Tick) -> Floats:
         """Return each agent's distance to the slot it claims [m]; infinite without a valid one.
@@ -88,7 +90,16 @@ class Phase:
         return degrees(max(missed)) if missed else None
 
     def _own_slots(self, tick: Tick) -> dict[int, Slot]:
-        """Return the slot of each agent that claims a valid one alone, by row."""
+        """Return the slot of each agent that claims a valid one alone, by row.
+
+        What was found holds until a claim changes, or an agent goes.
+        """
+        claimed = tick.place.tobytes(), tick.alive.tobytes()
+        if claimed != self._owned_by:
+            self._owned_by, self._owned = claimed, self._find_slots(tick)
+        return self._owned
+
+    def _find_slots(self, tick: Tick) -> dict[int, Slot]:
         claims = [(queue, rank) for queue, rank in tick.place.tolist()]
         holders = Counter(claim for claim, alive in zip(claims, tick.alive, strict=True) if alive)
         team = int(np.sum(tick.alive))
@@ -106,11 +117,9 @@ class Phase:
 
     def see(self, time_s: float, error: Floats) -> bool:
         """Take the living agents' slot errors [m] at a tick; return whether all are in place."""
-        present = error[~np.isnan(error)]
-        in_place = len(present) > 0 and bool(np.all(present <= CONVERGED_M))
-        worst = float(present.max()) if len(present) else np.inf
-        self.residual_m = worst if np.isfinite(worst) else None
-        if not in_place:
+        worst = float(np.fmax.reduce(error, initial=-np.inf))
+        self.residual_m = worst if isfinite(worst) else None
+        if not 0.0 <= worst <= CONVERGED_M:
             self._since_s = None
             return False
         if self._since_s is None:
@@ -146,9 +155,9 @@ class Judge:
         separation = swept_separation(before, tick.position)
         self._see_separation(separation)
         self._see_packets(tick.packets)
-        self._turns += int(np.sum(~np.isnan(tick.turn_deg)))
-        self._turns_over += int(np.sum(tick.turn_deg > self._turn_left_deg))
-        self._turns_over += int(np.sum(tick.turn_deg < -self._turn_right_deg))
+        self._turns += int(np.count_nonzero(~np.isnan(tick.turn_deg)))
+        self._turns_over += int(np.count_nonzero(tick.turn_deg > self._turn_left_deg))
+        self._turns_over += int(np.count_nonzero(tick.turn_deg < -self._turn_right_deg))
         phase = self.phases[-1]
         error = phase.slot_error(tick)
         in_place = phase.see(tick.time_s, np.where(tick.alive, error, np.nan))
@@ -203,10 +212,9 @@ class Judge:
             self.packet_violations += not conserved(packets)
 
     def _see_separation(self, separation: Floats) -> None:
-        present = separation[~np.isnan(separation)]
-        if not len(present):
+        least = float(np.fmin.reduce(separation, initial=np.inf))
+        if least == inf:
             return
-        least = float(present.min())
         if self.min_separation_m is None or least < self.min_separation_m:
             self.min_separation_m = least
         if least < self._scenario.control.separation_m:

@@ -23,10 +23,11 @@ class ProximitySensor:
 
         position: (N, 3) [m; world frame], NaN for no vehicle. Order of bodies: by agent's row.
         """
-        relative = position[None, :, :] - position[looking, None, :]
-        x, y, z = relative[:, :, 0], relative[:, :, 1], relative[:, :, 2]
-        near = x * x + y * y + z * z <= PROXIMITY_RANGE_M * PROXIMITY_RANGE_M
-        near[np.arange(len(looking)), looking] = False
+        relative = position - position[looking, None]
+        square = relative * relative
+        near = square[:, :, 0] + square[:, :, 1] + square[:, :, 2] <= PROXIMITY_RANGE_M**2
+        for row, agent in enumerate(looking):
+            near[row, agent] = False
         return [
             self._sensed(relative[row, near[row]], agent, slot) for row, agent in enumerate(looking)
         ]

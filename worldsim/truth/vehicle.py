@@ -4,10 +4,12 @@ Only + - * / sqrt and rounding cross rows here, so that a trace is the same in e
 """
 
 from collections.abc import Sequence
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from agent.messages import Vector
 from agent.setup import Vehicle
 
 Floats = NDArray[np.float64]
@@ -32,8 +34,9 @@ class Fleet:
         self.yaw = yaw.astype(np.float64)
         self.tilt = np.zeros((len(yaw), 2))
         self._max_tilt = np.radians([[each.max_tilt_deg] for each in limits])
-        self._max_speed = np.array([each.max_speed_mps for each in limits])
-        self._max_climb = np.array([each.max_climb_mps for each in limits])
+        self._tilts = bool(self._max_tilt.any())
+        self._max_speed = [each.max_speed_mps for each in limits]
+        self._max_climb = [each.max_climb_mps for each in limits]
         self._max_yaw_rate = np.radians([each.max_yaw_rate_dps for each in limits])
 
     def __len__(self) -> int:
@@ -42,20 +45,23 @@ class Fleet:
     def integrate(self, velocity: Floats, yaw: Floats, tilt: Floats, dt: float) -> None:
         """Fly for ``dt`` [s] at velocities (N, 3) [m/s], towards yaws (N,) and tilts (N, 2) [rad].
 
-        A velocity beyond a limit is scaled down as a whole, so that its direction holds.
+        The velocities are within the vehicles' limits.
         """
-        self.velocity = self._limited(velocity)
-        self.position = self.position + self.velocity * dt
+        self.velocity = velocity.copy()
+        self.position = self.position + velocity * dt
         reach = self._max_yaw_rate * dt
         turn = np.minimum(np.maximum(wrapped(yaw - self.yaw), -reach), reach)
         self.yaw = wrapped(self.yaw + turn)
-        tilt = np.minimum(np.maximum(tilt, -self._max_tilt), self._max_tilt)
-        reach = reach[:, None]
-        self.tilt = self.tilt + np.minimum(np.maximum(tilt - self.tilt, -reach), reach)
+        if self._tilts:
+            self._tilt_towards(tilt, reach[:, None])
 
-    def _limited(self, velocity: Floats) -> Floats:
-        x, y, z = velocity[:, 0], velocity[:, 1], velocity[:, 2]
-        speed = np.sqrt(x * x + y * y + z * z)
-        scale = np.minimum(1.0, self._max_speed / np.maximum(speed, 1e-12))
-        scale = np.minimum(scale, self._max_climb / np.maximum(np.abs(z), 1e-12))
-        return velocity * scale[:, None]
+    def within_limits(self, row: int, velocity: Vector) -> Vector:
+        """Return a velocity [m/s] as a vehicle flies it: scaled down as a whole, beyond a limit."""
+        x, y, z = velocity
+        speed = self._max_speed[row] / max(sqrt(x * x + y * y + z * z), 1e-12)
+        scale = min(1.0, speed, self._max_climb[row] / max(abs(z), 1e-12))
+        return x * scale, y * scale, z * scale
+
+    def _tilt_towards(self, tilt: Floats, reach: Floats) -> None:
+        tilt = np.minimum(np.maximum(tilt, -self._max_tilt), self._max_tilt)
+        self.tilt = self.tilt + np.minimum(np.maximum(tilt - self.tilt, -reach), reach)

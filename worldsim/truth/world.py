@@ -87,7 +87,7 @@ class World:
         velocity = self.fleet.velocity[looking].tolist()
         yaw = self.fleet.yaw[looking].tolist()
         return [
-            Observation(self.slot, self.time_s, tuple(p), tuple(v), heading, bodies, ())
+            Observation(self.slot, self.time_s, tuple(p), tuple(v), heading, bodies)
             for p, v, heading, bodies in zip(position, velocity, yaw, sensed, strict=True)
         ]
 
