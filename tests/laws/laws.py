@@ -13,7 +13,7 @@ from agent.guidance import potential as potential_room
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Polyline, Ray
-from tests.laws import approach, energy
+from tests.laws import approach, energy, radio
 from tests.laws.energy import Other, random_point
 
 D_OB = 0.25
@@ -161,4 +161,5 @@ LAWS = {
     "E17": noise_changes_no_order,
     **energy.LAWS,
     **approach.LAWS,
+    **radio.LAWS,
 }
