@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from agent.comms.mission import Missions
 from agent.controller import ControllerError, Heard, Intent, Senses, load
 from agent.guidance.flocking import Flocking
 from agent.guidance.q_structure import QStructure
@@ -18,7 +19,8 @@ SCENARIO = Path(__file__).parents[2] / "deploy" / "scenarios" / "flocking-9.toml
 REST = (0.0, 0.0, 0.0)
 HERE = (1.0, 2.0, 3.0)
 HOVER = Intent(REST, REST, 0.5, 0.0, HERE)
-SENSES = Senses(2.5, HERE, REST, 0.5, (), (), tuple)
+MISSION = Missions(3, load_scenario(SCENARIO).formation, spacing=1.0).flown
+SENSES = Senses(2.5, HERE, REST, 0.5, (), (), tuple, MISSION)
 
 
 class Puppet:
@@ -170,7 +172,7 @@ def heard(x: float, velocity: tuple[float, float, float] = REST) -> Heard:
 
 
 def flock(*neighbours: Heard) -> Intent:
-    senses = Senses(0.0, REST, REST, 0.0, (), neighbours, tuple)
+    senses = SENSES._replace(position=REST, yaw=0.0, neighbours=neighbours)
     return Flocking(setup_of("flocking")).decide(senses)
 
 

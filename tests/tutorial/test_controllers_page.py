@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from agent.controller import Heard, Intent, Peer, Senses
+from agent.controller import Flown, Heard, Intent, Peer, Senses
 from tests.tutorial.bench import ROOT, set_up
 from tests.tutorial.page import Newcomer, blocks
 
@@ -23,7 +23,9 @@ def test_followed_word_for_word_it_works(tmp_path: Path) -> None:
     assert (tmp_path / "carousel" / "runs" / "named" / "summary.json").exists()
 
 
-@pytest.mark.parametrize("table", [Senses, Heard, Peer, Intent], ids=lambda table: table.__name__)
+@pytest.mark.parametrize(
+    "table", [Senses, Heard, Peer, Flown, Intent], ids=lambda table: table.__name__
+)
 def test_every_field_is_told(table: Any) -> None:
     assert [name for name in table._fields if not re.search(rf"`{name}\W", PAGE)] == []
 
