@@ -87,7 +87,7 @@ class World:
         velocity = self.fleet.velocity[looking].tolist()
         yaw = self.fleet.yaw[looking].tolist()
         return [
-            Observation(self.slot, self.time_s, tuple(p), tuple(v), heading, bodies)
+            Observation(self.slot, self.time_s, tuple(p), tuple(v), heading, bodies, ())
             for p, v, heading, bodies in zip(position, velocity, yaw, sensed, strict=True)
         ]
 
@@ -115,7 +115,7 @@ class World:
     def advance(self) -> None:
         """Fly through the present slot; a vehicle whose command has expired stops and hovers."""
         expired = self._expires <= self.slot
-        if expired.any():
+        if np.count_nonzero(expired):
             self._hover(expired)
         self.fleet.integrate(self._velocity, self._yaw, self._tilt, 1.0 / self.clock.slot_hz)
         self.slot += 1
