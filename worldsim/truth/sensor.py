@@ -23,7 +23,7 @@ class ProximitySensor:
 
         position: (N, 3) [m; world frame], NaN for no vehicle. Order of bodies: by agent's row.
         """
-        relative = position - position[looking, None]
+        relative = position - position.take(looking, axis=0)[:, None]
         square = relative * relative
         near = square[:, :, 0] + square[:, :, 1] + square[:, :, 2] <= PROXIMITY_RANGE_M**2
         for row, agent in enumerate(looking):

@@ -83,9 +83,9 @@ class World:
         sensed = [
             each if self._senses[agent] else () for agent, each in zip(looking, read, strict=True)
         ]
-        position = self.fleet.position[looking].tolist()
-        velocity = self.fleet.velocity[looking].tolist()
-        yaw = self.fleet.yaw[looking].tolist()
+        position = self.fleet.position.take(looking, axis=0).tolist()
+        velocity = self.fleet.velocity.take(looking, axis=0).tolist()
+        yaw = self.fleet.yaw.take(looking).tolist()
         return [
             Observation(self.slot, self.time_s, tuple(p), tuple(v), heading, bodies, ())
             for p, v, heading, bodies in zip(position, velocity, yaw, sensed, strict=True)
