@@ -28,7 +28,7 @@ OPERATORS: dict[type[ast.AST], Any] = {
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
 }
-NODES = (ast.Expr, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, *OPERATORS)
+NODES = (ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, *OPERATORS)
 FUNCTIONS = {
     name: getattr(math, name)
     for name in (
@@ -55,8 +55,8 @@ class Expression:
         if len(text) > MAX_LENGTH:
             raise ExpressionError(f"longer than {MAX_LENGTH} characters")
         try:
-            self._tree = self._evaluator.parse(text.strip())
-        except (SyntaxError, InvalidExpression, ValueError, RecursionError) as error:
+            self._tree = ast.parse(text.strip(), mode="eval").body
+        except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
             raise ExpressionError(f"{text!r} is no expression in {variable}") from error
         self._check_nodes()
 

@@ -14,7 +14,7 @@ from worldsim.run.virtual import VirtualFleet
 from worldsim.scenario.file import parse
 
 TOLERANCE_M = 1e-9
-"""Coordinates up to 30 m round by 4e-15 m each step; 400 steps, amplified some hundred times."""
+"""Coordinates up to 30 m round by 4e-15 m each step; 400 steps, amplified: 3e-13 was seen."""
 DURATION_S = 5.0
 EDGES = [(-1, 1, 1), (-1, -1, 1), (-1, 1, -1), (-1, -1, -1)]
 AGENTS = 7

@@ -1,0 +1,164 @@
+"""Shapes by arc length: whatever a curve is written in, a metre along it is a metre."""
+
+from itertools import pairwise
+from math import cos, dist, pi, sin
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from agent.qstructure.curve import CurveError
+from agent.qstructure.expression import ExpressionError
+from agent.qstructure.shape import (
+    Arc,
+    Curve,
+    Helix,
+    Polyline,
+    Ray,
+    ShapeError,
+    Spline,
+    shape_of,
+)
+
+WITHIN_M = 1e-3
+FINE = 2000
+SHAPES = {
+    "ray": Ray((-1.0, 2.0, 0.5)),
+    "polyline": Polyline(((0.0, 0.0, 0.0), (1.5, 0.0, 0.0), (1.5, 1.5, 0.0), (0.0, 1.5, 1.5))),
+    "arc": Arc(2.0, 200.0),
+    "arc to the right": Arc(3.0, -90.0, 45.0),
+    "helix": Helix(1.5, 0.8),
+    "helix downwards": Helix(0.7, -2.0, 30.0),
+    "spline": Spline(((1.0, 1.0, 0.0), (3.0, 1.5, 0.5), (4.0, 4.0, 1.0), (1.0, 6.0, 0.0))),
+    "curve": Curve("2*cos(s)", "2*sin(s)", "0.3*s"),
+    "curve that hurries": Curve("s**2", "sin(s)", "exp(s/3)"),
+    "curve that starts slowly": Curve("s**3", "0", "s**2"),
+    "curve with a corner": Curve("s", "abs(s-1.3)", "0"),
+}
+
+
+def length(shape, start, end):
+    """Return the length of a piece of a shape, by the sum of many short chords [m]."""
+    points = [shape.point(start + (end - start) * k / FINE) for k in range(FINE + 1)]
+    return sum(dist(a, b) for a, b in pairwise(points))
+
+
+@pytest.mark.parametrize("spec", SHAPES.values(), ids=SHAPES)
+@pytest.mark.parametrize("spacing", [0.6, 1.0])
+def test_slots_are_d_ir_apart_along_the_shape(spec, spacing):
+    shape = shape_of(spec)
+    for rank in range(10):
+        assert length(shape, rank * spacing, (rank + 1) * spacing) == pytest.approx(
+            spacing, abs=WITHIN_M
+        )
+
+
+@pytest.mark.parametrize("spec", SHAPES.values(), ids=SHAPES)
+def test_a_shape_starts_at_its_vertex_and_never_jumps(spec):
+    shape = shape_of(spec)
+    assert dist(shape.point(0.0), (0.0, 0.0, 0.0)) < 1e-12
+    for k in range(1000):
+        assert dist(shape.point(0.012 * k), shape.point(0.012 * (k + 1))) <= 0.012 + WITHIN_M
+
+
+SPEEDS = {
+    "half": "(s/2)",
+    "tenfold": "(10*s)",
+    "growing": "(s**2)",
+    "slowing": "sqrt(s)",
+    "uneven": "(s+0.9*sin(s))",
+    "exponential": "(exp(s)-1)",
+}
+
+
+@pytest.mark.parametrize("parameter", SPEEDS.values(), ids=SPEEDS)
+@pytest.mark.parametrize(
+    ("x", "y", "z", "at"),
+    [
+        ("2*cos({}/2)", "2*sin({}/2)", "0", lambda s: (2 * cos(s / 2) - 2, 2 * sin(s / 2), 0.0)),
+        ("0.6*{}", "-0.8*{}", "0", lambda s: (0.6 * s, -0.8 * s, 0.0)),
+        (
+            "0.6*cos({0})",
+            "0.6*sin({0})",
+            "0.8*{0}",
+            lambda s: (0.6 * cos(s) - 0.6, 0.6 * sin(s), 0.8 * s),
+        ),
+    ],
+    ids=["circle", "line", "screw"],
+)
+def test_the_parameters_speed_does_not_show(parameter, x, y, z, at):
+    """``at`` is the same curve at unit speed."""
+    shape = shape_of(Curve(*(each.format(parameter) for each in (x, y, z))))
+    for k in range(41):
+        assert dist(shape.point(0.25 * k), at(0.25 * k)) < WITHIN_M
+
+
+@given(
+    radius=st.floats(0.3, 50.0),
+    sweep=st.floats(5.0, 360.0),
+    left=st.booleans(),
+    heading=st.floats(-360.0, 360.0),
+)
+@settings(max_examples=30, deadline=None)
+def test_an_arc_keeps_its_radius_then_goes_straight_on(radius, sweep, left, heading):
+    side, turn = (1.0, sweep) if left else (-1.0, -sweep)
+    shape = shape_of(Arc(radius, turn, heading))
+    assert shape.end == pytest.approx(radius * sweep * pi / 180.0, abs=WITHIN_M * (1.0 + radius))
+    towards = heading * pi / 180.0
+    centre = (-side * radius * sin(towards), side * radius * cos(towards), 0.0)
+    for share in (0.1, 0.5, 1.0):
+        assert dist(shape.point(share * shape.end), centre) == pytest.approx(radius, abs=WITHIN_M)
+    beyond = dist(shape.point(shape.end), shape.point(shape.end + 2.0))
+    assert beyond == pytest.approx(2.0, abs=1e-9)
+
+
+def test_a_helix_climbs_its_pitch_in_a_turn():
+    turn = (4.0 * pi * pi * 1.5 * 1.5 + 0.8 * 0.8) ** 0.5
+    x, y, z = shape_of(SHAPES["helix"]).point(turn)
+    assert (x, y, z) == pytest.approx((0.0, 0.0, 0.8), abs=WITHIN_M)
+
+
+def test_a_spline_and_a_polyline_pass_through_their_points():
+    for spec in (SHAPES["spline"], SHAPES["polyline"]):
+        shape, first = shape_of(spec), spec.points_m[0]
+        fine = [shape.point(shape.end * k / FINE) for k in range(FINE + 1)]
+        for point in spec.points_m:
+            where = tuple(a - b for a, b in zip(point, first, strict=True))
+            assert min(dist(where, each) for each in fine) < shape.end / FINE
+
+
+REFUSED = {
+    "a ray without direction": (Ray((0.0, 0.0, 0.0)), "direction"),
+    "an arc without sweep": (Arc(1.0, 0.0), "sweep_deg"),
+    "two points in one": (Polyline(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))), "points_m"),
+    "a spline with two points in one": (
+        Spline(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0))),
+        "points_m",
+    ),
+    "an unknown name": (Curve("t", "0", "0"), "x"),
+    "no real number at the vertex": (Curve("s", "0", "sqrt(-1-s)"), ""),
+    "a pole at the vertex": (Curve("1/s", "0", "0"), ""),
+}
+
+
+@pytest.mark.parametrize(("spec", "key"), REFUSED.values(), ids=REFUSED)
+def test_what_is_no_shape_is_refused_by_its_key(spec, key):
+    with pytest.raises(ShapeError) as refused:
+        shape_of(spec)
+    assert refused.value.key == key
+
+
+WITHOUT_AN_END = {
+    "a pole on the way": ("1/(2-s)", "0", "0"),
+    "a jump": ("s", "floor(s/2)", "0"),
+    "no length": ("1", "2", "3"),
+    "a standstill": ("min(s,1.5)", "0", "0"),
+    "an end that is never reached": ("tanh(s)", "0", "0"),
+    "no real number on the way": ("s", "sqrt(2-s)", "0"),
+}
+
+
+@pytest.mark.parametrize("texts", WITHOUT_AN_END.values(), ids=WITHOUT_AN_END)
+def test_a_curve_that_cannot_be_followed_says_so(texts):
+    with pytest.raises((CurveError, ExpressionError)):
+        shape_of(Curve(*texts)).check(5.0)
