@@ -1,0 +1,118 @@
+"""What cannot be flown is refused, by the name of the queue and by the key."""
+
+import pytest
+
+from agent.qstructure.formation import Formation, FormationError, FormationSpec, QueueSpec
+from agent.qstructure.orientation import OrientationSpec
+from agent.qstructure.shape import Arc, Curve, Polyline, Ray
+
+LEAST_M = 0.5
+AWAY = Ray((0.0, 0.0, 1.0))
+VERTICES = {"V1": (0.0, 0.0, 0.0), "V2": (6.0, 0.0, 0.0)}
+
+
+def checked(queue, agents=6, spacing=1.0, vertices=VERTICES, others=()):
+    """Check a formation of one queue, and of others if there are any."""
+    used = {name for each in (queue, *others) for name in each.vertices}
+    kept = {name: at for name, at in vertices.items() if name in used}
+    Formation(FormationSpec("f", kept, (queue, *others)), spacing).check(agents, LEAST_M)
+
+
+def curve(x, y="0", z="0", **more):
+    return QueueSpec("bent", ("V1",), Curve(x, y, z), **more)
+
+
+def oriented(**angles):
+    return QueueSpec("bent", ("V1",), AWAY, None, OrientationSpec(**angles))
+
+
+REFUSED = {
+    "a pole on the way": (curve("1/(2-s)"), "shape"),
+    "a pole that no step meets": (curve("s", "1/(s-pi)"), "shape"),
+    "a pole at the vertex": (curve("1/s"), "shape"),
+    "zero length": (curve("1", "2", "3"), "shape"),
+    "standing still": (curve("min(s, 2)"), "shape"),
+    "an end that is never reached": (curve("tanh(s)"), "shape"),
+    "a jump": (curve("s", "2*floor(s/3)"), "shape"),
+    "not real on the way": (curve("s", "sqrt(3-s)"), "shape"),
+    "not real at the vertex": (curve("s", "log(s)"), "shape"),
+    "an unknown name": (curve("s", "t"), "shape.y"),
+    "an attempt at code": (curve("s", "0", "__import__('os').getpid()"), "shape.z"),
+    "a comparison": (curve("s", "s < 1"), "shape.y"),
+    "a power that fills memory": (curve("s", "9**9**9**9"), "shape"),
+    "a ray without direction": (
+        QueueSpec("bent", ("V1",), Ray((0.0, 0.0, 0.0))),
+        "shape.direction",
+    ),
+    "no shape": (QueueSpec("bent", ("V1",)), "shape"),
+    "a closed queue too short": (
+        QueueSpec("bent", ("V1", "V3")),
+        "vertices",
+    ),
+    "a shape that misses its vertex": (QueueSpec("bent", ("V1", "V2"), AWAY), "shape"),
+    "a yaw that is no number at slot 3": (oriented(yaw_deg="1/(d-3)"), "orientation.yaw_deg"),
+    "a pitch that is not real behind slot 4": (
+        oriented(pitch_deg="sqrt(4.5-d)"),
+        "orientation.pitch_deg",
+    ),
+    "a roll of an unknown variable": (oriented(roll_deg="5*s"), "orientation.roll_deg"),
+    "a yaw that is code": (oriented(yaw_deg="(lambda: 1)()"), "orientation.yaw_deg"),
+}
+
+
+@pytest.mark.parametrize(("queue", "key"), REFUSED.values(), ids=REFUSED)
+def test_what_cannot_be_flown_is_refused_by_its_queue(queue, key):
+    with pytest.raises(FormationError) as refused:
+        checked(queue, vertices={**VERTICES, "V3": (0.9, 0.0, 0.0)})
+    assert "'bent'" in refused.value.key
+    assert refused.value.key.endswith(key)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_spacing_under_the_floor_is_refused():
+    with pytest.raises(FormationError, match=r"two of its slots are 0\.450 m apart") as refused:
+        checked(QueueSpec("bent", ("V1",), AWAY), spacing=0.45)
+    assert refused.value.key == "queue 'bent'"
+    checked(QueueSpec("bent", ("V1",), AWAY), spacing=0.5)
+
+
+def test_slots_that_are_near_by_the_chord_are_refused():
+    folded = Polyline(((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (3.0, 0.3, 0.0), (0.0, 0.3, 0.0)))
+    with pytest.raises(FormationError, match="two of its slots") as refused:
+        checked(QueueSpec("bent", ("V1",), folded))
+    assert "'bent'" in refused.value.key
+
+
+def test_queues_that_cross_too_near_name_both():
+    others = (QueueSpec("other", ("V2",), Ray((-1.0, 0.0, 0.0))),)
+    with pytest.raises(FormationError) as refused:
+        checked(QueueSpec("bent", ("V1",), Ray((1.0, 0.0, 0.0))), 14, others=others)
+    assert refused.value.key == "queue 'bent' and 'other'"
+
+
+def test_a_closed_queue_whose_share_does_not_fit_is_refused():
+    others = (QueueSpec("other", ("V2",), AWAY),)
+    with pytest.raises(FormationError, match="its capacity asks for 10 members, 6 fit") as refused:
+        checked(QueueSpec("bent", ("V1", "V2")), 20, others=others)
+    assert refused.value.key == "queue 'bent'"
+
+
+def test_all_closed_and_full_says_how_many_are_left():
+    with pytest.raises(FormationError, match="3 of 10 agents find no place"):
+        checked(QueueSpec("bent", ("V1", "V2")), agents=10)
+    checked(QueueSpec("bent", ("V1", "V2")), agents=7)
+
+
+SOUND = {
+    "a pole beyond the last slot": curve("s", "0.1/(30-s)"),
+    "not real beyond the last slot": curve("s", "0.1*sqrt(30-s)"),
+    "an arc that goes straight on": QueueSpec("bent", ("V1",), Arc(2.0, 90.0)),
+    "a yaw that has a pole between slots": oriented(yaw_deg="1/(d-2.5)"),
+    "angles as numbers": oriented(yaw_deg=90, pitch_deg=-5.0),
+    "a corner": curve("s", "abs(s-2)"),
+}
+
+
+@pytest.mark.parametrize("queue", SOUND.values(), ids=SOUND)
+def test_what_can_be_flown_is_not_refused(queue):
+    checked(queue)
