@@ -18,6 +18,7 @@ class Cause(IntEnum):
     DROPPED_RANGE = 1
     DROPPED_LOSS = 2
     DROPPED_MEDIUM = 3
+    DROPPED_PARTITION = 4
 
 
 class Verdict(NamedTuple):
@@ -71,6 +72,7 @@ def draw(
 
 LOST_TO_RANGE = Verdict(Cause.DROPPED_RANGE)
 LOST = Verdict(Cause.DROPPED_LOSS)
+LOST_TO_PARTITION = Verdict(Cause.DROPPED_PARTITION)
 
 
 def verdict(

@@ -11,8 +11,8 @@ from heapq import heappop, heappush
 from math import nan, sqrt
 from struct import Struct as Layout
 
-from netem.link import Cause, draw, verdict
-from netem.messages import MediumSetup, Position, Verdicts
+from netem.link import LOST_TO_PARTITION, Cause, draw, verdict
+from netem.messages import Conditions, Groups, MediumSetup, Position, Verdicts
 from netem.schedule import Schedule
 from netem.wire.frame import (
     BATCH_HEAD_B,
@@ -32,8 +32,9 @@ _InFlight = tuple[float, int, int, int, int, Frame]
 class Medium:
     """Frames between agents under a seed and conditions.
 
-    Conservation, at every moment: ``addressed`` (frames sent, times the other agents) equals
-    the sum of all fates plus what is in flight.
+    Conservation, at every moment: ``addressed`` (frames sent, times the other agents, whether they
+    are there or not) equals the sum of all fates plus what is in flight. A frame for a radio that
+    is not there is out of range; what is in flight to one that goes is dropped by the medium.
     """
 
     def __init__(self, setup: MediumSetup) -> None:
@@ -54,8 +55,24 @@ class Medium:
         return self.sent * (self._agents - 1)
 
     def place(self, positions: tuple[Position | None, ...]) -> None:
-        """Take the true positions, row i = agent i [m; world frame]; None is not in the world."""
+        """Take the true positions, row i = agent i [m; world frame]; None where no radio is."""
         self._positions = positions
+        if None in positions:
+            for receiver, where in enumerate(positions):
+                if where is None and self._queues[receiver]:
+                    self.discard(receiver)
+
+    def change(self, conditions: Conditions) -> None:
+        """Judge later frames under other conditions; what is in flight has its verdict."""
+        self._schedule.change(conditions)
+
+    def partition(self, groups: Groups) -> None:
+        """Let no later frame across between groups; agents not named form one group more."""
+        self._schedule.partition(groups)
+
+    def heal(self) -> None:
+        """Let later frames across again."""
+        self._schedule.heal()
 
     def transmit(self, source: int, sent_s: float, transmission: Transmission) -> None:
         """Judge one agent's frames of one slot, sent at ``sent_s`` [s], on every link."""
@@ -110,17 +127,19 @@ class Medium:
             frame.channel,
             frame.count,
         )
-        here = self._positions[source]
+        here, schedule = self._positions[source], self._schedule
         journal = []
         for receiver, there in enumerate(self._positions):
             if receiver == source:
                 continue
-            link = self._schedule.model(channel, source, receiver)
+            link = schedule.model(channel, source, receiver)
             distance_m = _distance(here, there) if here and there else nan
             draws = None
             if link.draws:
                 draws = draw(self._seed, source, incarnation, receiver, channel, count)
             cause, delay_s = verdict(link, distance_m, draws)
+            if schedule.parted and schedule.cut(source, receiver):
+                cause, delay_s = LOST_TO_PARTITION
             journal.append(_FATE(source, incarnation, receiver, channel, count, cause, delay_s))
             if cause is DELIVERED:
                 order = (sent_s + delay_s, source, incarnation, channel, count, frame)

@@ -38,6 +38,10 @@ class Conditions(LinkKeys, frozen=True):
     link: tuple[DirectedLink, ...] = ()
 
 
+Groups = tuple[tuple[AgentId, ...], ...]
+"""Who hears whom in a partition; the agents that no group names form one more."""
+
+
 class MediumSetup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """All that a medium needs to begin; ``speed``: simulated seconds in one of the wall clock."""
 
@@ -52,7 +56,8 @@ class MediumSetup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Truth(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
     """Where the vehicles truly are at the start of a slot.
 
-    positions: row i = agent i [m; world frame], None where it has no vehicle in the world.
+    positions: row i = agent i [m; world frame], None where no radio is: the agent has no vehicle in
+    the world, or its process is gone.
     """
 
     slot: Count
