@@ -175,8 +175,10 @@ class Agent:
         now_s = observation.time_s
         self._neighbours.forget_silent(now_s)
         self._table.forget_silent(now_s, self._neighbours.silences_s())
-        heard = self._neighbours.heard(now_s)
-        self._silent = self._bodies.look(now_s, observation.position, observation.vehicles, heard)
+        heard = [other.position for other in self._neighbours.heard(now_s)]
+        told = self._table.positions()
+        here = observation.position
+        self._silent = self._bodies.look(now_s, here, observation.vehicles, heard, told)
         self._lagging = self._neighbours.behind(self._missions.flown.key)
         self._blocked = self._table.blocked(self._missions.flown.key)
         vertex = self._intent is not None and self._intent.vertex

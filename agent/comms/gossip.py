@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from agent.codec import encode
 from agent.controller import Peer
-from agent.messages import Beacon, Gossip, Piece, Place, Record
+from agent.messages import Beacon, Gossip, Piece, Place, Record, Vector
 
 RELAYED_SILENCE_ROUNDS = 12
 """T_d = (2 D + 10) / (1 - loss) rounds: what of it is the same at any distance. The rest, for D
@@ -86,6 +86,10 @@ class Table:
             peers.append(Peer(who, newest.position, place))
         peers.sort()
         return tuple(peers)
+
+    def positions(self) -> list[Vector]:
+        """Return where each member last said it was [m; world frame]."""
+        return [newest.position for newest in self._newest.values()]
 
     def blocked(self, mission: int) -> frozenset[Place]:
         """Return the places that others see taken by a silent body (E18)."""

@@ -1,13 +1,13 @@
 """Silent bodies: vehicles that are sensed and stay put, but from which nothing is heard (E18).
 
-A dead agent's vehicle may hover in a slot. Whoever senses it long enough without hearing anybody
-there takes it for what it is, and remembers it while out of the sensor's range.
+A dead agent's vehicle may hover in a slot. Whoever senses it long enough without knowing of anybody
+there takes it for what it is, and remembers it while out of the sensor's range. A sensor may see
+farther than a radio hears: a body is silent only if others as far away are heard.
 """
 
 from collections.abc import Sequence
 from math import dist
 
-from agent.controller import Heard
 from agent.messages import Vector
 
 SAME_BODY_M = 0.2
@@ -28,13 +28,21 @@ class SilentBodies:
         now_s: float,
         position: Vector,
         sensed: Sequence[Vector],
-        neighbours: Sequence[Heard],
+        heard: Sequence[Vector],
+        told: Sequence[Vector],
     ) -> tuple[Vector, ...]:
         """Return where silent bodies stand [m; world frame].
 
-        sensed: bodies relative to ``position`` [m; world axes].
+        sensed: bodies relative to ``position`` [m; world axes]; heard, told: where members of the
+        team are, by their own words and by what others pass on [m; world frame].
         """
-        unknown = self._unexplained(position, sensed, neighbours)
+        reach = max((dist(position, other) for other in heard), default=0.0)
+        unknown = [
+            body
+            for body in _in_world(position, sensed)
+            if dist(position, body) <= reach + SAME_BODY_M
+            and all(dist(body, other) >= NEIGHBOUR_M for other in (*heard, *told))
+        ]
         kept = [
             (body, since_s)
             for body, since_s in self._since
@@ -49,13 +57,6 @@ class SilentBodies:
         self._since = kept + new
         return tuple(body for body, since_s in self._since if now_s - since_s >= SILENCE_S)
 
-    @staticmethod
-    def _unexplained(
-        position: Vector, sensed: Sequence[Vector], neighbours: Sequence[Heard]
-    ) -> list[Vector]:
-        seen = [(position[0] + x, position[1] + y, position[2] + z) for x, y, z in sensed]
-        return [
-            body
-            for body in seen
-            if all(dist(body, other.position) >= NEIGHBOUR_M for other in neighbours)
-        ]
+
+def _in_world(position: Vector, sensed: Sequence[Vector]) -> list[Vector]:
+    return [(position[0] + x, position[1] + y, position[2] + z) for x, y, z in sensed]

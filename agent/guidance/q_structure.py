@@ -9,10 +9,11 @@ from math import dist, pi, radians, sqrt
 from agent.controller import Intent, Senses
 from agent.guidance.bobber import bobber, cast_zone
 from agent.guidance.cone import cone_of
+from agent.guidance.dodge import Dodge
 from agent.guidance.movement import saturated, steer
 from agent.guidance.potential import Potential
 from agent.guidance.target_on_queue import OwnTarget, TargetOnQueue
-from agent.messages import Place
+from agent.messages import Place, Vector
 from agent.setup import AgentSetup
 
 GAIN = 2.0
@@ -39,6 +40,7 @@ class QStructure:
         )
         self._potential = Potential(control.separation_m)
         self._targets = TargetOnQueue(setup.id, control.spacing_m)
+        self._dodge = Dodge(setup.id)
         self._mine: OwnTarget | None = None
         self._blocked: tuple[Place, ...] = ()
         self._chosen_for = -1
@@ -51,7 +53,7 @@ class QStructure:
         q_toq = frame.to_world(mine.slot.point) if mine is not None else q
         q_tg = bobber(q, senses.yaw, q_toq, self._zone)
         x, y, z = self._potential.omega(q, q_tg, senses.neighbours)
-        wanted = saturated((-GAIN * x, -GAIN * y, -GAIN * z), self._max_speed, self._max_climb)
+        wanted = self._wanted((-GAIN * x, -GAIN * y, -GAIN * z), senses, q_toq)
         velocity, yaw = steer(wanted, senses.yaw, self._cone)
         tilt = (0.0, 0.0)
         if mine is not None and dist(q, q_toq) < AT_SLOT_M and velocity == wanted:
@@ -70,6 +72,16 @@ class QStructure:
             vertex=mine is not None and mine.vertex,
             blocked=self._blocked,
         )
+
+    def _wanted(self, u: Vector, senses: Senses, q_toq: Vector) -> Vector:
+        """Return u of (28) [m/s] within the vehicle's limits, and past what holds it (E23)."""
+        wanted = saturated(u, self._max_speed, self._max_climb)
+        aside = self._dodge.direction(senses, q_toq)
+        if aside is None:
+            return wanted
+        v = self._max_speed
+        past = (wanted[0] + v * aside[0], wanted[1] + v * aside[1], wanted[2] + v * aside[2])
+        return saturated(past, self._max_speed, self._max_climb)
 
     def _choose(self, senses: Senses) -> None:
         """Choose the own place anew: at 5 Hz (Algorithm 1), and at once in a new mission."""

@@ -120,8 +120,9 @@ class PromiseFilter:
 def limited(velocity: Vector, bounds: Sequence[Bound], yaw: float, cone: Cone) -> Vector:
     """Return a velocity that keeps every bound [m/s].
 
-    It first slides along what is in the way; if that leaves the cone about ``yaw`` [rad], or is
-    still too fast somewhere, the velocity is only shortened.
+    It first slides along what is in the way, and is shortened where it is still too fast. A slide
+    that leaves the cone about ``yaw`` [rad] is not flown: of its climb alone, and of the velocity
+    merely shortened, the faster is.
     """
     if all(_keeps(velocity, bound) for bound in bounds):
         return velocity
@@ -130,9 +131,10 @@ def limited(velocity: Vector, bounds: Sequence[Bound], yaw: float, cone: Cone) -
         for bound in bounds:
             if not _keeps(sliding, bound):
                 sliding = _slid(sliding, bound)
-    if not _in_cone(sliding, yaw, cone):
-        sliding = velocity
-    return _kept(sliding, bounds)
+    if _in_cone(sliding, yaw, cone):
+        return _kept(sliding, bounds)
+    climbing = _kept((0.0, 0.0, sliding[2]), bounds)
+    return max(climbing, _kept(velocity, bounds), key=lambda v: hypot(*v))
 
 
 def shortened(velocity: Vector, max_speed: float) -> Vector:

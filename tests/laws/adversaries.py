@@ -92,10 +92,18 @@ class Law:
             slid = share[:, None] * across - np.minimum(approach, limit)[:, None] * away
             keeps = self._keeps(sliding, away, limit, aside)
             sliding = np.where(keeps[:, None], sliding, slid)
-        sliding = np.where(_in_cone(sliding, yaw, cone)[:, None], sliding, wanted)
-        approach, across = _parts(sliding, away)
+        inside = _in_cone(sliding, yaw, cone)[:, None]
+        climbing = self._kept(sliding * (0.0, 0.0, 1.0), away, limit, aside)
+        short = self._kept(wanted, away, limit, aside)
+        out = np.where((norm(climbing) >= norm(short))[:, None], climbing, short)
+        safe = np.where(inside, self._kept(sliding, away, limit, aside), out)
+        return np.where(held[:, None], wanted, safe)
+
+    @staticmethod
+    def _kept(velocity, away, limit, aside):
+        approach, across = _parts(velocity, away)
         scale = np.minimum(_ratio(limit, approach), _ratio(aside, norm(across)))
-        return np.where(held[:, None], wanted, scale[:, None] * sliding)
+        return scale[:, None] * velocity
 
     @staticmethod
     def _keeps(velocity, away, limit, aside):

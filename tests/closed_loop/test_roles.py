@@ -1,0 +1,118 @@
+"""Tiers, and slots that a dead body blocks: what agents make of what they hear and sense."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agent.comms.hierarchy import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
+from worldsim.run.virtual import VirtualFleet
+from worldsim.scenario.file import load, parse
+
+WEDGE = Path(__file__).parents[2] / "deploy" / "scenarios" / "wedge-9.toml"
+LINE = """
+duration_s = 60
+[fleet]
+agents = {agents}
+start = {{ kind = "list", positions_m = {positions} }}
+[netem]
+range_m = {range_m}
+[formation]
+name = "line"
+vertices = {{ V1 = [0, 0, 0] }}
+[[formation.queue]]
+name = "Q1"
+vertices = ["V1"]
+shape = {{ kind = "ray", direction = [-1, 0, 0] }}
+"""
+
+
+def line(xs, range_m):
+    positions = [[-float(x), 0.0, 0.0] for x in xs]
+    return VirtualFleet(
+        parse(LINE.format(agents=len(positions), positions=positions, range_m=range_m))
+    )
+
+
+def told(fleet):
+    return [command.telemetry for command in fleet.loop.world.latest]
+
+
+def fly(fleet, seconds):
+    for _ in range(round(seconds * 80)):
+        fleet.slot()
+
+
+def test_remark_5_a_line_whose_radio_reaches_the_next_only():
+    fleet = line(range(8), 1.0 + 1e-6)
+    fly(fleet, 5.0)
+    settled = [(each.tier, each.parent, each.role) for each in told(fleet)]
+    assert [tier for tier, _, _ in settled] == list(range(8))
+    assert [parent for _, parent, _ in settled] == list(range(-1, 7))
+    assert [role for _, _, role in settled] == [VERTEX, *[SUB_VERTEX] * 6, MEMBER]
+    flips = 0
+    for _ in range(60 * 20):
+        fly(fleet, 0.05)
+        now = [(each.tier, each.parent, each.role) for each in told(fleet)]
+        flips += now != settled
+    assert flips == 0
+
+
+def test_fig_4_five_agents_on_one_queue():
+    """r1 is heard by r2 and r3, r4 by r3, r5 by r4: r3 and r4 are sub-vertices of tiers 1 and 2."""
+    fleet = line((0.0, 0.9, 1.8, 3.2, 4.6), 1.9)
+    fly(fleet, 1.0)
+    assert [(each.tier, each.parent, each.role) for each in told(fleet)] == [
+        (0, -1, VERTEX),
+        (1, 0, MEMBER),
+        (1, 0, SUB_VERTEX),
+        (2, 2, SUB_VERTEX),
+        (3, 3, MEMBER),
+    ]
+
+
+def test_a_tail_that_hears_nobody_is_in_distress():
+    fleet = line((0.0, 1.0, 30.0), 2.5)
+    fly(fleet, 0.5)
+    assert [each.role for each in told(fleet)][:2] == [VERTEX, MEMBER]
+    alone = told(fleet)[2]
+    assert alone.role == VERTEX, "alone in its world, it makes for the vertex"
+    assert alone.target == (0.0, 0.0, 0.0)
+    assert DISTRESS not in (alone.role,)
+
+
+def wedge_without(place, seed, **overrides):
+    """Fly the wedge; at 10 s the agent in a place dies, and its vehicle hovers there."""
+    fleet = VirtualFleet(load(WEDGE, {"seed": str(seed), "duration_s": "40", **overrides}))
+    fly(fleet, 10.0)
+    dead = [tuple(each.place) for each in told(fleet)].index(place)
+    fleet.loop.lost(dead, planned=True)
+    fly(fleet, 30.0)
+    living = [agent for agent in range(9) if agent != dead]
+    return fleet, living
+
+
+@pytest.mark.parametrize("lossy", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_dead_apex_is_left_alone(seed, lossy):
+    radio = {"netem.loss_percent": "50", "netem.delay_ms": "200"} if lossy else {}
+    fleet, living = wedge_without((0, 0), seed, **radio)
+    telemetry = told(fleet)
+    places = sorted(tuple(telemetry[agent].place) for agent in living)
+    assert places == [(queue, rank) for queue in range(4) for rank in (1, 2)]
+    heads = [agent for agent in living if telemetry[agent].role == VERTEX]
+    assert sorted(tuple(telemetry[agent].place) for agent in heads) == [(q, 1) for q in range(4)]
+    assert fleet.loop.judge.min_separation_m >= 0.25
+    assert max(fleet.loop.figures.slot_error[living]) < 0.01
+    changes = [event["t_s"] for event in fleet.loop.events if event["kind"] == "slot"]
+    assert max(changes) <= 25.0, "quiet within 15 s"
+
+
+@pytest.mark.parametrize("place", [(1, 1), (2, 2)])
+def test_a_dead_follower_is_passed_by(place):
+    fleet, living = wedge_without(place, 1)
+    places = [tuple(told(fleet)[agent].place) for agent in living]
+    assert place not in places
+    assert len(set(places)) == 8
+    assert fleet.loop.judge.min_separation_m >= 0.25
+    assert np.max(fleet.loop.figures.slot_error[living]) < 0.01
