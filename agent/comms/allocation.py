@@ -6,12 +6,13 @@ agents that know less find nearly the same, and the claims heard mend the rest.
 """
 
 from collections.abc import Sequence
+from math import sqrt
 
 from agent.controller import Peer
 from agent.messages import Place, Vector
 
 HYSTERESIS_M2 = 0.5
-CONFLICT_M2 = 0.05
+CONFLICT_M = 0.05
 """Two that claim one place: the nearer by more than this keeps the claim, else the lower id."""
 GAIN_M2 = 1e-9
 UNPLACED_M2 = 0.0
@@ -103,7 +104,7 @@ def _undisputed(claims: list[int | None], squares: list[list[float]]) -> list[in
             continue
         rival = holder.get(column)
         if rival is not None:
-            if squares[row][column] >= squares[rival][column] - CONFLICT_M2:
+            if sqrt(squares[row][column]) >= sqrt(squares[rival][column]) - CONFLICT_M:
                 continue
             kept[rival] = None
         holder[column] = row

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agent.comms.allocation import CONFLICT_M2, HYSTERESIS_M2, allot
+from agent.comms.allocation import CONFLICT_M, HYSTERESIS_M2, allot
 from tests.agent.comms.making import peer, places
 
 coordinate = st.floats(-10.0, 10.0)
@@ -167,8 +167,8 @@ def disputed(first_m2, second_m2):
 
 def test_a_conflict_goes_to_the_nearer_by_a_margin_else_to_the_lower_id():
     assert disputed(1.0, 1.0) == 0
-    assert disputed(1.0, 1.0 - 0.9 * CONFLICT_M2) == 0
-    assert disputed(1.0, 1.0 - 1.1 * CONFLICT_M2) == 1
+    assert disputed(1.0, (1.0 - 0.9 * CONFLICT_M) ** 2) == 0
+    assert disputed(1.0, (1.0 - 1.1 * CONFLICT_M) ** 2) == 1
     assert disputed(1.0, 2.0) == 0
 
 
