@@ -6,10 +6,12 @@ from math import dist, hypot
 from random import Random
 
 from agent.guidance import potential as potential_room
+from agent.guidance import q_structure
 from agent.guidance.movement import saturated
 from agent.messages import Vector
 
 D_OB = 0.25
+TICK_HZ = 20.0
 U_TARGETS = (0.032, 0.1, 0.28, 1.0, 4.0, 30.0)
 """U_tg from the floor's on [m^2]: targets 0.5 to 8 m apart."""
 
@@ -178,6 +180,13 @@ def stiffness_is_bounded() -> None:
                 assert (abs(dist(*now) - apart) < off) == shrinks, (apart, k_ob, factor)
 
 
+def what_flies_is_not_stiff() -> None:
+    """E4: with the gain, the weight and the tick that fly, slots 0.51 m apart are within it."""
+    k_ob, c_dt = potential_room.Potential(D_OB).k_ob, q_structure.GAIN / TICK_HZ
+    for apart in (0.51, 0.6, 1.0, 2.0):
+        assert c_dt * (1.0 + 16.0 * k_ob / (apart - D_OB) ** 4) < 2.0, apart
+
+
 LAWS = {
     "(a)-(c)": pole_and_zero_slope,
     "(d)": curved_upwards_at_the_targets,
@@ -187,4 +196,5 @@ LAWS = {
     "Lemma 6 (ii)": no_other_rest,
     "Lemma 6 head-on": head_on_is_unstable,
     "E4": stiffness_is_bounded,
+    "E4 flown": what_flies_is_not_stiff,
 }

@@ -34,6 +34,12 @@ def omega(self, q, q_tg, others):
     return tuple(total)
 
 
+def unit_weight(self, d_ob, a_t=1.0, k_ob=1.0, cap=1e9):
+    """(20), (28): repulsion at unit weight, and no limit to it."""
+    self.d_ob, self.a_t, self.k_ob, self.cap = d_ob, a_t, k_ob, cap
+    self._floor = d_ob + 0.25
+
+
 def value_two_sided(self, u, u_tg):
     """(23), on both sides of U_tg."""
     sigma = 1.0 / (1.0 + exp(min(self.a_t * (u - u_tg) ** 3, 700.0)))

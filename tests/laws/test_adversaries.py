@@ -18,6 +18,7 @@ from tests.laws.adversaries import (
     Law,
     directions,
     least_distance,
+    main,
     norm,
     swept,
     vehicles,
@@ -71,6 +72,14 @@ def test_the_array_form_is_the_law_that_flies():
 def test_every_kind_of_adversary_takes_part():
     kinds = vehicles(np.random.default_rng(5), np.zeros((200, 3)), 1.0).kind
     assert set(kinds.tolist()) == set(range(len(KINDS)))
+
+
+def test_the_command_says_what_it_found(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["adversaries", "--pairs", "50"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 0
+    assert capsys.readouterr().out.count("0 of 50 violate") == len(FLEETS)
 
 
 def test_distances_are_those_of_the_way_not_of_its_ends():

@@ -37,6 +37,7 @@ LITERAL = {
     ),
     "E3 Lemma 6": ("Lemma 6 (ii)", Potential, {"_push": literal.push_two_sided}),
     "E1 Lemma 6": ("Lemma 6 (i)", Potential, {"at_targets": literal.at_targets}),
+    "E4": ("E4 flown", Potential, {"__init__": literal.unit_weight}),
     "E7": ("E7", bobber_room, {"bobber": literal.bobber}),
     "E7 Lemma 9": ("Lemma 9", bobber_room, {"bobber": literal.bobber}),
     "E8": ("E8", bobber_room, {"bobber": literal.bobber_of_angle_alone}),
