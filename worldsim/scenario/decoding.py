@@ -132,9 +132,9 @@ def _chosen(kind: Any, value: Any) -> Any:
     options = [option for option in get_args(kind) if option is not types.NoneType]
     if len(options) == 1:
         return _chosen(options[0], value)
-    for option in options:
-        config = option.__struct_config__
-        if isinstance(value, dict) and value.get(config.tag_field) == config.tag:
+    for option in options if isinstance(value, dict) else ():
+        config = getattr(option, "__struct_config__", None)
+        if config is not None and (not config.tag or value.get(config.tag_field) == config.tag):
             return option
     return kind
 

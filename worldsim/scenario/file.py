@@ -13,6 +13,7 @@ import msgspec
 import tomli_w
 
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
+from worldsim.scenario.course import Whose, check_course
 from worldsim.scenario.decoding import decode
 from worldsim.scenario.rules import TARGET_FLOOR_M, check, tilts_where_asked
 from worldsim.scenario.tables import Scenario
@@ -38,9 +39,11 @@ def parse(
         data = tables(text, name)
         override(data, overrides, name)
         whose = _place_formation(data, Path(name))
+        later = _place_events(data, Path(name))
         scenario = decode(data, Scenario, name)
         check(scenario, name)
         _check_formation(scenario, Path(name), *whose)
+        check_course(scenario, Path(name), later)
     except ScenarioError as error:
         raise _told_as_override(error, overrides) from error
     return scenario
@@ -52,25 +55,41 @@ def dump(scenario: Scenario) -> str:
     return _PLAIN_ARRAY.sub(_on_one_line, text)
 
 
-def _place_formation(data: Data, file: Path) -> tuple[Path, str]:
-    """Put what a formation's file holds in place of its name; return whose keys they are.
-
-    That is the file, and what its keys begin with.
-    """
+def _place_formation(data: Data, file: Path) -> Whose:
+    """Put what the formation's file holds in place of its name; return whose keys they are."""
     table = data.get("formation")
     if not isinstance(table, dict) or "file" not in table:
-        return file, "formation."
+        return Whose(file, "formation.")
     other = next((key for key in table if key != "file"), None)
     if other is not None:
         raise ScenarioError(file, f"formation.{other}", "not beside file; one or the other")
     if not isinstance(table["file"], str):
         raise ScenarioError(file, "formation.file", "the path of a formation file, as text")
-    path = file.parent / table["file"]
-    if not path.exists():
-        raise ScenarioError(file, "formation.file", f"no such file: {path}")
-    data["formation"] = tables(read(path), path)
-    decode(data["formation"], FormationSpec, path)
-    return path, ""
+    path, data["formation"] = _formation_file(file, "formation.file", table["file"])
+    return Whose(path, "")
+
+
+def _place_events(data: Data, file: Path) -> dict[int, Whose]:
+    """Put what formations' files hold in place of their names; return whose keys they are."""
+    events = data.get("event")
+    whose = {}
+    for index, event in enumerate(events if isinstance(events, list) else ()):
+        named = event.get("formation") if isinstance(event, dict) else None
+        if isinstance(named, str):
+            key = f"event[{index}].formation"
+            path, event["formation"] = _formation_file(file, key, named)
+            whose[index] = Whose(path, "")
+    return whose
+
+
+def _formation_file(file: Path, key: str, named: str) -> tuple[Path, Data]:
+    """Return the path and the tables of the formation's file that a key names."""
+    path = file.parent / named
+    if "\0" in named or not path.exists():
+        raise ScenarioError(file, key, f"no such file: {path}")
+    formation = tables(read(path), path)
+    decode(formation, FormationSpec, path)
+    return path, formation
 
 
 def _check_formation(scenario: Scenario, file: Path, whose: Path, prefix: str) -> None:
@@ -80,7 +99,7 @@ def _check_formation(scenario: Scenario, file: Path, whose: Path, prefix: str) -
         formation.check(scenario.fleet.agents, control.separation_m + TARGET_FLOOR_M)
     except FormationError as error:
         raise ScenarioError(whose, prefix + error.key, error.detail) from error
-    tilted = tilts_where_asked(scenario, formation)
+    tilted = tilts_where_asked(scenario, formation, scenario.fleet.agents)
     if tilted is not None:
         raise ScenarioError(file, *tilted)
 

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from agent.qstructure.formation import Formation
-from worldsim.scenario.tables import SLOTS_PER_TICK, BoxStart, Scenario
+from worldsim.scenario.starting import BoxStart
+from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 from worldsim.scenario.toml import ScenarioError
 
 TARGET_FLOOR_M = 0.25
@@ -115,7 +116,7 @@ def _start_for_each(scenario: Scenario) -> Finding | None:
 
 
 def _agents_of_the_fleet(scenario: Scenario) -> Finding | None:
-    last = scenario.fleet.agents - 1
+    last = scenario.rows - 1
     for index, table in enumerate(scenario.agent):
         for agent in table.ids:
             if agent > last:
@@ -123,10 +124,10 @@ def _agents_of_the_fleet(scenario: Scenario) -> Finding | None:
     return None
 
 
-def tilts_where_asked(scenario: Scenario, formation: Formation) -> Finding | None:
-    """Say which vehicle cannot roll or pitch as far as a queue's orientation asks for."""
+def tilts_where_asked(scenario: Scenario, formation: Formation, team: int) -> Finding | None:
+    """Say which vehicle cannot roll or pitch as far as a queue asks for in a team of that size."""
     least, agent = min((each.max_tilt_deg, i) for i, each in enumerate(scenario.vehicles))
-    for place, slot in formation.layout(scenario.fleet.agents).slots.items():
+    for place, slot in formation.layout(team).slots.items():
         asked = max(abs(degrees(angle or 0.0)) for angle in slot.attitude[1:])
         if asked > least + 1e-9:
             queue = formation.queues[place.queue].name
@@ -140,7 +141,7 @@ def tilts_where_asked(scenario: Scenario, formation: Formation) -> Finding | Non
 
 def _links_of_the_fleet(scenario: Scenario) -> Finding | None:
     seen: set[tuple[int, int]] = set()
-    last = scenario.fleet.agents - 1
+    last = scenario.rows - 1
     for index, link in enumerate(scenario.netem.link):
         for name, agent in (("from", link.source), ("to", link.to)):
             if agent > last:

@@ -1,6 +1,6 @@
 """The JSON Schema of a scenario file, for editors: what each key may hold by itself.
 
-A file may name its formation's file where a resolved scenario holds the formation.
+A file may name a formation's file where a resolved scenario holds the formation.
 """
 
 from typing import Any
@@ -26,6 +26,8 @@ def schema() -> dict[str, Any]:
     scenario = tables["Scenario"]
     inline = scenario["properties"]["formation"]
     scenario["properties"]["formation"] = {"anyOf": [{"$ref": "#/$defs/FormationFile"}, inline]}
+    later = tables["EventTable"]["properties"]
+    later["formation"] = {"anyOf": [{"type": "string"}, later["formation"]]}
     return {
         "$schema": DIALECT,
         "title": "A scenario of qswarm",

@@ -9,16 +9,16 @@ from typing import Annotated, Any, get_type_hints
 import msgspec
 from msgspec import Meta
 
-from agent.messages import AgentId, Metres
+from agent.messages import AgentId
 from agent.qstructure.formation import FormationSpec
 from agent.setup import AgentSetup, Comms, Control, Hertz, Positive, Table, Vehicle
 from netem.messages import Conditions, MediumSetup
+from worldsim.scenario.events import EventTable
+from worldsim.scenario.starting import BoxStart, ListStart
 
 SLOTS_PER_TICK = 4
 MAX_AGENTS = 1000
 
-Triple = tuple[Metres, Metres, Metres]
-Extent = Annotated[float, Meta(ge=0, le=1e5)]
 RunName = Annotated[
     str,
     Meta(
@@ -29,27 +29,16 @@ RunName = Annotated[
 ]
 
 
-class BoxStart(Table, frozen=True, tag="box", tag_field="kind"):
-    """Random starts in a box, at least ``spacing_m`` apart, with random headings."""
-
-    centre_m: Triple = (0.0, 0.0, 0.0)
-    size_m: tuple[Extent, Extent, Extent] = (5.0, 5.0, 3.0)
-    spacing_m: Extent = 0.6
-
-
-class ListStart(Table, frozen=True, tag="list", tag_field="kind"):
-    """Starts given one by one; headings left out are 0."""
-
-    positions_m: tuple[Triple, ...]
-    yaws_deg: tuple[Annotated[float, Meta(ge=-360, le=360)], ...] | None = None
-
-
 class Fleet(Table, frozen=True):
-    """How many agents, how fast they think, and where they start."""
+    """How many agents, how fast they think, and where they start.
+
+    boot_s: simulated time from a restart or a join to the agent's first step.
+    """
 
     agents: Annotated[int, Meta(ge=1, le=MAX_AGENTS)]
     tick_hz: Hertz = 20.0
     start: BoxStart | ListStart = BoxStart()
+    boot_s: Annotated[float, Meta(ge=0, le=3600)] = 1.0
 
 
 class ProximitySensor(Table, frozen=True):
@@ -89,10 +78,12 @@ class AgentTable(Table, frozen=True):
 class Expectations(Table, frozen=True):
     """What a run must show; ``converge_within_s`` counts from each formation's start.
 
+    reform_within_s: from each change of the team until all stand in a whole formation again.
     converge: false where no formation is to be formed, as with a controller that knows none.
     """
 
     converge_within_s: Positive | None = None
+    reform_within_s: Positive | None = None
     converge: bool = True
     min_separation_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
 
@@ -112,6 +103,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
     control: Control = Control()
     comms: Comms = Comms()
     netem: Conditions = Conditions()
+    event: tuple[EventTable, ...] = ()
     expect: Expectations = Expectations()
 
     @property
@@ -123,6 +115,11 @@ class Scenario(Table, frozen=True, omit_defaults=False):
     def slots(self) -> int:
         """How many slots the run lasts."""
         return round(self.duration_s * self.slot_hz)
+
+    @property
+    def rows(self) -> int:
+        """How many agents there are in all: those at the start, and all that join."""
+        return self.fleet.agents + sum(event.joiners for event in self.event)
 
     def vehicle_of(self, agent: int) -> Vehicle:
         """Return one agent's vehicle: [vehicle], with what [[agent]] says differs."""
@@ -137,11 +134,11 @@ class Scenario(Table, frozen=True, omit_defaults=False):
     @property
     def vehicles(self) -> list[Vehicle]:
         """Every agent's vehicle, by id."""
-        return [self.vehicle_of(agent) for agent in range(self.fleet.agents)]
+        return [self.vehicle_of(agent) for agent in range(self.rows)]
 
     def medium_setup(self) -> MediumSetup:
         """Return what the medium is told."""
-        return MediumSetup(self.seed, self.fleet.agents, SLOTS_PER_TICK, self.slot_hz, self.netem)
+        return MediumSetup(self.seed, self.rows, SLOTS_PER_TICK, self.slot_hz, self.netem)
 
     def agent_setup(self, agent: int, incarnation: int, command_ticks: int) -> AgentSetup:
         """Return what one agent is told; ``command_ticks`` is the clock's (one, or two)."""

@@ -49,6 +49,9 @@ EXAMPLES: Given = {
     "agent.ids": [0],
     "agent.vehicle.max_speed_mps": 0.3,
     "control.cast_far_m": 0.5,
+    "event.at_s": 10.0,
+    "event.kill": [4],
+    "expect.reform_within_s": 10.0,
     "expect.min_separation_m": 0.25,
     "formation.queue.capacity": 0.5,
     "formation.queue.orientation.yaw_deg": "10*d",
@@ -65,6 +68,7 @@ EXAMPLES: Given = {
 }
 BRIEF: Mapping[str, tuple[str, ...]] = {
     "agent.vehicle": ("max_speed_mps",),
+    "event": ("at_s", "kill"),
     "formation.queue.orientation": ("yaw_deg",),
     "netem.local": ("loss_percent",),
     "netem.multihop": ("loss_percent",),

@@ -7,7 +7,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from worldsim.scenario.tables import BoxStart, Scenario
+from worldsim.scenario.starting import BoxStart
+from worldsim.scenario.tables import Scenario
 from worldsim.show import layout
 
 TRAIL_S = 4.0

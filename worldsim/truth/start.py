@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from worldsim.scenario.tables import BoxStart, ListStart
+from worldsim.scenario.starting import BoxStart, ListStart
 from worldsim.truth.vehicle import Floats
 
 TRIES = 10_000

@@ -1,0 +1,94 @@
+"""The timeline's tables: what happens to a fleet while it flies.
+
+An event is one action at one time. What must hold between events is said in ``course``.
+"""
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from agent.messages import AgentId
+from agent.qstructure.formation import FormationSpec
+from agent.setup import Positive, Table
+from netem.messages import Conditions
+from worldsim.scenario.starting import BoxStart, Degrees, ListStart, Triple
+
+Time = Annotated[float, Meta(ge=0, le=86_400)]
+Selector = Annotated[
+    int | str,
+    Meta(description="an id, 'vertex:V1', 'queue:Q1', 'random:2' or 'all'"),
+]
+Selectors = Annotated[tuple[Selector, ...], Meta(min_length=1, max_length=1000)]
+Joiners = Annotated[int, Meta(ge=1, le=1000)]
+Group = Annotated[tuple[AgentId, ...], Meta(min_length=1, max_length=1000)]
+
+
+class JoinTable(Table, frozen=True):
+    """How many join, and where; ``start`` left out is that of [fleet]."""
+
+    count: Joiners
+    start: BoxStart | ListStart | None = None
+
+
+class FrameTable(Table, frozen=True):
+    """Where the target's frame stands from now on; what is left out stays as it was.
+
+    waypoints_m: one point, where the frame's origin is from then on.
+    """
+
+    yaw_deg: Degrees | None = None
+    waypoints_m: Annotated[tuple[Triple, ...], Meta(min_length=1, max_length=64)] | None = None
+
+
+class EventTable(Table, frozen=True):
+    """One action at ``at_s``; ``for_s`` later it is undone (kill, leave, partition, netem).
+
+    kill: processes die, their vehicles stop and hover; leave: the vehicles go too; restart: they
+    come back; join: new ones come, under the next free ids. partition: groups that hear only
+    themselves, agents not named form one more; heal ends it. netem: keys of [netem] that change.
+    formation, frame: a mission for the team.
+    """
+
+    at_s: Time
+    for_s: Positive | None = None
+    kill: Selectors | None = None
+    leave: Selectors | None = None
+    restart: Selectors | None = None
+    join: Joiners | JoinTable | None = None
+    partition: Annotated[tuple[Group, ...], Meta(min_length=1, max_length=1000)] | None = None
+    heal: bool | None = None
+    netem: Conditions | None = None
+    formation: FormationSpec | None = None
+    frame: FrameTable | None = None
+
+    @property
+    def actions(self) -> list[str]:
+        """The actions that are given; a sound event has one."""
+        return [name for name in ACTIONS if getattr(self, name) is not None]
+
+    @property
+    def kind(self) -> str:
+        """The event's own key: its action."""
+        return self.actions[0]
+
+    @property
+    def joiners(self) -> int:
+        """How many agents join by this event."""
+        if self.join is None:
+            return 0
+        return self.join.count if isinstance(self.join, JoinTable) else self.join
+
+    @property
+    def start(self) -> BoxStart | ListStart | None:
+        """Where its joiners start, if it is not where the fleet did."""
+        return self.join.start if isinstance(self.join, JoinTable) else None
+
+    @property
+    def selectors(self) -> tuple[int | str, ...]:
+        """Whom a kill, leave or restart is about."""
+        return self.kill or self.leave or self.restart or ()
+
+
+ACTIONS = tuple(name for name in EventTable.__struct_fields__ if name not in {"at_s", "for_s"})
+UNDONE = ("kill", "leave", "partition", "netem")
+"""Actions that ``for_s`` can undo."""
