@@ -139,7 +139,8 @@ class Agent:
             raise RejectedError("spoofed", f"{source} says it is {beacon.id}")
         self._neighbours.hear(beacon, now_s, self._broadcast.sent_s)
         self._table.adopt_beacon(beacon)
-        self._missions.glimpse(beacon)
+        if beacon.frame_key > self._missions.frame_key:
+            self._missions.glimpse(beacon)
 
     def _hear_gossip(self, source: int, payload: bytes, now_s: float) -> None:
         gossip = self._decoders.gossip(payload)
@@ -175,9 +176,8 @@ class Agent:
         now_s = observation.time_s
         self._neighbours.forget_silent(now_s)
         self._table.forget_silent(now_s, self._neighbours.silences_s())
-        heard = [other.position for other in self._neighbours.heard(now_s)]
-        told = self._table.positions()
-        here = observation.position
+        heard = [beacon.position for beacon in self._neighbours.beacons()]
+        here, told = observation.position, self._table.positions()
         self._silent = self._bodies.look(now_s, here, observation.vehicles, heard, told)
         self._lagging = self._neighbours.behind(self._missions.flown.key)
         self._blocked = self._table.blocked(self._missions.flown.key)
@@ -190,13 +190,15 @@ class Agent:
         mission = self._missions.flown
         if self._intent is None or self._intent.place is None:
             return []
-        mine = mission.formation.queues_of(self._intent.place)
+        mine, formation = mission.formation.queues_of(self._intent.place), mission.formation
         return [
             beacon
             for beacon in self._neighbours.beacons()
-            if beacon.queue >= 0
-            and beacon.mission == mission.key
-            and not mine.isdisjoint(mission.formation.queues_of(Place(beacon.queue, beacon.rank)))
+            if beacon.mission == mission.key
+            and (
+                beacon.queue in mine
+                or not mine.isdisjoint(formation.queues_of((beacon.queue, beacon.rank)))
+            )
         ]
 
     def _safe(self, intent: Intent, senses: Senses) -> Vector:

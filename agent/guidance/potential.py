@@ -52,9 +52,14 @@ class Potential:
         self.cap = cap
         self._floor = d_ob + TARGET_FLOOR_M
 
+    def gap_at_targets(self, between_targets_m: float) -> float:
+        """Return the gap g that belongs to two immediate targets so far apart [m]: E1."""
+        floor = self._floor
+        return (between_targets_m if between_targets_m > floor else floor) - self.d_ob
+
     def at_targets(self, between_targets_m: float) -> float:
         """Return U_tg for two immediate targets that far apart [m]: (22) with E1."""
-        gap = max(between_targets_m, self._floor) - self.d_ob
+        gap = self.gap_at_targets(between_targets_m)
         return 0.5 * gap * gap
 
     def value(self, u: float, u_tg: float) -> float:
@@ -93,12 +98,13 @@ class Potential:
         dx, dy, dz = q[0] - q_j[0], q[1] - q_j[1], q[2] - q_j[2]
         tx, ty, tz = q_tg[0] - q_tg_j[0], q_tg[1] - q_tg_j[1], q_tg[2] - q_tg_j[2]
         r = sqrt(dx * dx + dy * dy + dz * dz)
-        g = max(r - self.d_ob, LEAST_GAP_M)
-        u = 0.5 * g * g
-        u_tg = self.at_targets(sqrt(tx * tx + ty * ty + tz * tz))
-        if u >= u_tg or r == 0.0:
+        g = r - self.d_ob
+        gap = self.gap_at_targets(sqrt(tx * tx + ty * ty + tz * tz))
+        if g >= gap or r == 0.0:
             return 0.0
-        return max(self.k_ob * self.slope(u, u_tg) * g, -self.cap) / r
+        g = max(g, LEAST_GAP_M)
+        slope = self.slope(0.5 * g * g, 0.5 * gap * gap)
+        return max(self.k_ob * slope * g, -self.cap) / r
 
     def _sigma(self, d: float) -> float:
         return 1.0 / (1.0 + exp(self.a_t * d * d * d))

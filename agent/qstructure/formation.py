@@ -123,9 +123,9 @@ class Formation:
             return None
         return self._slot(place.queue, self.queues[place.queue].members(place.rank)[-1])
 
-    def queues_of(self, place: Place) -> frozenset[int]:
+    def queues_of(self, place: Place | tuple[int, int]) -> frozenset[int]:
         """Return the queues that a place belongs to: of a vertex, all that pass through it."""
-        return self._through.get(place) or frozenset((place.queue,))
+        return self._through.get(Place(*place)) or frozenset(place[:1])
 
     def divide(self, agents: int, blocked: frozenset[Place] = NOTHING) -> tuple[int, ...]:
         """Return how many agents each queue gets besides the common ones of shared vertices.

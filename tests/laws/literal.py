@@ -11,15 +11,14 @@ from agent.messages import Place
 STEP_M = 1e-3
 
 
-def at_targets(self, between_targets_m):
-    """(22): U_tg,ij = |q_tg,i - q_tg,j|^2 / 2."""
-    return 0.5 * between_targets_m * between_targets_m
+def gap_at_targets(self, between_targets_m):
+    """(22): U_tg,ij = |q_tg,i - q_tg,j|^2 / 2, so the gap is the whole distance."""
+    return between_targets_m
 
 
-def at_targets_without_floor(self, between_targets_m):
+def gap_at_targets_without_floor(self, between_targets_m):
     """(22) with (21)'s offset but no floor."""
-    gap = max(between_targets_m - self.d_ob, 1e-4)
-    return 0.5 * gap * gap
+    return max(between_targets_m - self.d_ob, 1e-4)
 
 
 def omega(self, q, q_tg, others):

@@ -13,11 +13,11 @@ from tests.laws import literal
 from tests.laws.laws import LAWS
 
 LITERAL = {
-    "E1": ("E1", Potential, {"at_targets": literal.at_targets}),
+    "E1": ("E1", Potential, {"gap_at_targets": literal.gap_at_targets}),
     "E1 floor": (
         "E1 floor",
         Potential,
-        {"at_targets": literal.at_targets_without_floor, "_push": literal.push_two_sided},
+        {"gap_at_targets": literal.gap_at_targets_without_floor, "_push": literal.push_two_sided},
     ),
     "E2": ("E2", Potential, {"omega": literal.omega}),
     "E3": (
@@ -36,7 +36,7 @@ LITERAL = {
         {"value": literal.value_two_sided, "slope": literal.slope_two_sided},
     ),
     "E3 Lemma 6": ("Lemma 6 (ii)", Potential, {"_push": literal.push_two_sided}),
-    "E1 Lemma 6": ("Lemma 6 (i)", Potential, {"at_targets": literal.at_targets}),
+    "E1 Lemma 6": ("Lemma 6 (i)", Potential, {"gap_at_targets": literal.gap_at_targets}),
     "E4": ("E4 flown", Potential, {"__init__": literal.unit_weight}),
     "E7": ("E7", bobber_room, {"bobber": literal.bobber}),
     "E7 Lemma 9": ("Lemma 9", bobber_room, {"bobber": literal.bobber}),
