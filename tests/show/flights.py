@@ -55,6 +55,7 @@ def straight_flight(scenario: Scenario) -> Iterator[Tick]:
             turn_deg=generator.uniform(-60, 60, agents).astype(np.float32),
             alive=np.ones(agents, dtype=np.bool_),
             links=np.array(pairs, dtype=np.int32).reshape(-1, 2),
+            mission=np.zeros(agents, dtype=np.int64),
             packets=_packets(index),
         )
         step = np.minimum(1.0, SPEED_MPS / tick_hz / np.maximum(force, 1e-9))

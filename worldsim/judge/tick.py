@@ -21,8 +21,8 @@ class Tick:
     world frame], the target-on-queue, NaN for none; place (N, 2): queue and rank, -1 for none;
     force (N,): |u_i| of (28); turn_deg (N,): azimuth of the wanted velocity against the heading on
     moving steps, else NaN; alive (N,): whether the agent's process takes part; links (L, 2):
-    (hearer, heard). packets: the newest counters of the medium, as in summary.json; empty before
-    there are any.
+    (hearer, heard). mission (N,): the key of the mission that each flies. packets: the newest
+    counters of the medium, as in summary.json; empty before there are any.
     """
 
     index: int
@@ -35,4 +35,5 @@ class Tick:
     turn_deg: Singles
     alive: NDArray[np.bool_]
     links: NDArray[np.int32]
+    mission: NDArray[np.int64]
     packets: Packets = field(default_factory=dict)

@@ -1,26 +1,25 @@
 """The judge: sees every tick, and says in the end whether the expectations held.
 
-It knows the formation, and what was true; of an agent's telemetry it takes only the place the
-agent means to hold, and computes where that place is by itself.
+It sees ticks and is told events, in order; an event counts before the tick of its time. The same
+judge, fed from a recording, comes to the same verdict.
 """
 
-from collections import Counter
 from dataclasses import dataclass
-from math import degrees, inf, isfinite, remainder, tau
+from math import inf
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from agent.guidance.cone import cone_of
-from agent.messages import Place
-from agent.qstructure.formation import Formation, Slot
+from agent.qstructure.formation import Formation, FormationSpec
 from agent.qstructure.frame import Frame
 from worldsim.judge.metrics import Floats, conserved, swept_separation
+from worldsim.judge.phase import Phase
+from worldsim.judge.recovery import LOSSES, RETURNS, Recoveries, Recovery
 from worldsim.judge.tick import Packets, Tick
 from worldsim.scenario.tables import Scenario
 
-CONVERGED_M = 0.12
-CONVERGED_S = 2.0
 TURN_LIMIT_SLACK_DEG = 1e-6
 
 
@@ -46,96 +45,13 @@ class Expectation:
     held: bool
 
 
-class Phase:
-    """The time of one formation, and how the team came into it."""
-
-    def __init__(self, formation: Formation, from_s: float) -> None:
-        self.formation = formation
-        self.from_s = from_s
-        self.converge_s: float | None = None
-        self.residual_m: float | None = None
-        self._frame = Frame()
-        self._since_s: float | None = None
-        self._slots: dict[tuple[int, int, int], Slot | None] = {}
-        self._owned: dict[int, Slot] = {}
-        self._owned_by: tuple[bytes, bytes] | None = None
-
-    def slot_error(self, tick: Tick) -> Floats:
-        """Return each agent's distance to the slot it claims [m]; infinite without a valid one.
-
-        Two that claim the same slot have none: neither counts as arrived.
-        """
-        error = np.full(len(tick.place), np.inf)
-        slots = self._own_slots(tick)
-        if slots:
-            rows = list(slots)
-            stands = [self._frame.to_world(slot.point) for slot in slots.values()]
-            off = tick.position[rows].astype(np.float64) - np.array(stands)
-            error[rows] = np.sqrt(np.sum(off * off, axis=1))
-        error[np.isnan(tick.position[:, 0])] = np.nan
-        return error
-
-    def attitude_error_deg(self, tick: Tick) -> float | None:
-        """Return the largest angle by which an agent misses its slot's orientation [deg].
-
-        Angles that a queue leaves free do not count; None where all are free.
-        """
-        wanted = [
-            (angle + (self._frame.yaw if axis == 0 else 0.0), float(tick.attitude[row, axis]))
-            for row, slot in self._own_slots(tick).items()
-            for axis, angle in enumerate(slot.attitude)
-            if angle is not None and tick.alive[row]
-        ]
-        missed = [abs(remainder(angle - flown, tau)) for angle, flown in wanted]
-        return degrees(max(missed)) if missed else None
-
-    def _own_slots(self, tick: Tick) -> dict[int, Slot]:
-        """Return the slot of each agent that claims a valid one alone, by row.
-
-        What was found holds until a claim changes, or an agent goes.
-        """
-        claimed = tick.place.tobytes(), tick.alive.tobytes()
-        if claimed != self._owned_by:
-            self._owned_by, self._owned = claimed, self._find_slots(tick)
-        return self._owned
-
-    def _find_slots(self, tick: Tick) -> dict[int, Slot]:
-        claims = [(queue, rank) for queue, rank in tick.place.tolist()]
-        holders = Counter(claim for claim, alive in zip(claims, tick.alive, strict=True) if alive)
-        team = int(np.sum(tick.alive))
-        return {
-            row: slot
-            for row, claim in enumerate(claims)
-            if holders[claim] <= 1 and (slot := self._slot(*claim, team)) is not None
-        }
-
-    def _slot(self, queue: int, rank: int, team: int) -> Slot | None:
-        key = (queue, rank, team)
-        if key not in self._slots:
-            self._slots[key] = self.formation.slot(Place(queue, rank), team)
-        return self._slots[key]
-
-    def see(self, time_s: float, error: Floats) -> bool:
-        """Take the living agents' slot errors [m] at a tick; return whether all are in place."""
-        worst = float(np.fmax.reduce(error, initial=-np.inf))
-        self.residual_m = worst if isfinite(worst) else None
-        if not 0.0 <= worst <= CONVERGED_M:
-            self._since_s = None
-            return False
-        if self._since_s is None:
-            self._since_s = time_s
-        if self.converge_s is None and time_s - self._since_s >= CONVERGED_S - 1e-9:
-            self.converge_s = self._since_s - self.from_s
-        return True
-
-
 class Judge:
     """Sees every tick of a run under a scenario's expectations."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        self._formation = Formation(scenario.formation, scenario.control.spacing_m)
-        self.phases = [Phase(self._formation, 0.0)]
+        self.phases = [Phase(Formation(scenario.formation, scenario.control.spacing_m), 0.0)]
+        self._recoveries = Recoveries(scenario.control.spacing_m)
         self.ticks = 0
         self.min_separation_m: float | None = None
         self.separation_violations = 0
@@ -146,6 +62,14 @@ class Judge:
         self._turns = 0
         self._turns_over = 0
         self._before: Tick | None = None
+
+    def note(self, event: dict[str, Any]) -> None:
+        """Take an event of the run; of most kinds nothing follows for the judge."""
+        kind = event["kind"]
+        if "tables" in event:
+            self._open_phase(event)
+        elif kind in LOSSES | RETURNS and "nobody" not in event:
+            self._recoveries.change(event["t_s"], kind, event["agent"])
 
     def see(self, tick: Tick) -> Figures:
         """Judge one tick; ticks come in order."""
@@ -161,7 +85,13 @@ class Judge:
         phase = self.phases[-1]
         error = phase.slot_error(tick)
         in_place = phase.see(tick.time_s, np.where(tick.alive, error, np.nan))
+        self._recoveries.see(tick, phase, in_place)
         return Figures(separation, error, in_place)
+
+    @property
+    def recoveries(self) -> list[Recovery]:
+        """Every change of the team, and how long it took to re-form."""
+        return self._recoveries.all
 
     @property
     def attitude_error_deg(self) -> float | None:
@@ -193,6 +123,8 @@ class Judge:
             got = phase.converge_s
             held = got is not None and (within is None or got <= within)
             rows.append(Expectation(f"converge {phase.formation.name}", within, got, held))
+        if expect.reform_within_s is not None:
+            rows.append(self._reformed(expect.reform_within_s))
         return rows
 
     def invariants(self) -> dict[str, dict[str, int]]:
@@ -205,6 +137,20 @@ class Judge:
             "I1": {"ticks": self.ticks, "violations": self.separation_violations},
             "I8": {"ticks": self.packet_ticks, "violations": self.packet_violations},
         }
+
+    def _open_phase(self, event: dict[str, Any]) -> None:
+        spec = msgspec.convert(event["tables"], FormationSpec)
+        x, y, z, yaw = event["pose"]
+        formation = Formation(spec, self._scenario.control.spacing_m)
+        frame = Frame((x, y, z), yaw)
+        self.phases.append(Phase(formation, event["t_s"], frame, event["mission"]))
+
+    def _reformed(self, within_s: float) -> Expectation:
+        took = [recovery.reformed_s for recovery in self.recoveries]
+        known = [each for each in took if each is not None]
+        worst_s = max(known) if known and len(known) == len(took) else None
+        held = len(known) == len(took) and all(each <= within_s for each in known)
+        return Expectation("reform_within_s", within_s, worst_s, held)
 
     def _see_packets(self, packets: Packets) -> None:
         if "addressed" in packets:

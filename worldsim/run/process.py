@@ -19,8 +19,8 @@ from netem.wire.keys import Keys
 from netem.wire.post import Post
 from netem.wire.session import SessionError, open_client
 from netem.wire.stop import Stop
+from worldsim.judge.phase import CONVERGED_M
 from worldsim.judge.tick import Packets
-from worldsim.judge.verdict import CONVERGED_M
 from worldsim.run.admission import PROCESS_COMMAND_TICKS
 from worldsim.run.muster import Muster, MusterError, assemble
 from worldsim.run.notebook import notebook

@@ -1,20 +1,36 @@
 """The slot loop, the same under every clock: who takes part, in which order, and what is seen.
 
-A clock calls ``open`` at the start of a slot, brings the observations to the agents and their
-commands back to ``obey``, and calls ``close``. Nothing here knows how messages travel.
+Before a slot a clock does what is ``due`` and says so by ``take``. It calls ``open`` at the start
+of a slot, brings the observations to the agents and their commands back to ``obey``, and calls
+``close``. Nothing here knows how messages travel.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import atan2, degrees, hypot, nan, pi
 from typing import Any, NamedTuple, Protocol
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from agent.messages import Command, Observation, Vector
+from netem.messages import Conditions
 from worldsim.judge.tick import Packets, Tick
 from worldsim.judge.verdict import Figures, Judge
+from worldsim.run.faults import (
+    Action,
+    Change,
+    Heal,
+    Joining,
+    Order,
+    Partition,
+    Revival,
+    Strike,
+    Timeline,
+)
+from worldsim.run.orders import Orders
+from worldsim.run.team import Begin, Start, Stop, Team
 from worldsim.run.trace import Trace
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 from worldsim.truth.sensor import ProximitySensor
@@ -23,6 +39,8 @@ from worldsim.truth.world import Clock, World
 
 MOVING_MPS = 0.02
 Event = dict[str, Any]
+Deed = Stop | Start | Begin | Change | Partition | Heal | Order
+"""What a clock carries out between slots."""
 
 
 class Told(NamedTuple):
@@ -33,9 +51,10 @@ class Told(NamedTuple):
     force: float
     turn_deg: float
     heard: tuple[int, ...]
+    mission: int
 
 
-UNTOLD = Told((nan, nan, nan), (-1, -1), nan, nan, ())
+UNTOLD = Told((nan, nan, nan), (-1, -1), nan, nan, (), 0)
 NO_LINKS: NDArray[np.int32] = np.zeros((0, 2), dtype=np.int32)
 
 
@@ -51,7 +70,10 @@ class Recorder(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A slot as it begins: the truth for the medium, an observation for each agent that steps."""
+    """A slot as it begins: the truth for the medium, an observation for each agent that steps.
+
+    positions: where the radios are [m; world frame], None for an agent that takes no part.
+    """
 
     slot: int
     time_s: float
@@ -62,11 +84,12 @@ class Opened:
 def world_of(scenario: Scenario, command_ticks: int) -> World:
     """Return a scenario's world at its start. Raises StartError where there is no room."""
     position, yaw = starts(scenario.fleet.start, scenario.fleet.agents, scenario.seed)
+    later = scenario.rows - scenario.fleet.agents
     return World(
         clock=Clock(scenario.fleet.tick_hz, SLOTS_PER_TICK),
         limits=scenario.vehicles,
-        position=position,
-        yaw=yaw,
+        position=np.concatenate((position, np.full((later, 3), nan))),
+        yaw=np.concatenate((yaw, np.full(later, nan))),
         sensor=ProximitySensor(scenario.seed, scenario.sensor.proximity.noise_m),
         command_ticks=command_ticks,
     )
@@ -90,12 +113,52 @@ class SlotLoop:
         self.trace = Trace()
         self.events: list[Event] = []
         self.figures: Figures | None = None
-        self._alive = np.ones(scenario.fleet.agents, dtype=np.bool_)
+        self.team = Team(scenario)
+        self._timeline = Timeline(scenario)
+        self._formation = scenario.formation
+        self._orders = Orders()
         self._recorder = recorder
         self._packets = packets
-        self._places: list[tuple[int, int] | None] = [None] * scenario.fleet.agents
+        self._places: list[tuple[int, int] | None] = [None] * scenario.rows
         self._headings = world.fleet.yaw.tolist()
-        self._told = [UNTOLD] * scenario.fleet.agents
+        self._told = [UNTOLD] * scenario.rows
+
+    def due(self) -> Iterator[Deed]:
+        """Yield what is to happen before the present slot: do each, and ``take`` it, in turn."""
+        time_s = self.world.time_s
+        for action in self._timeline.due(time_s) if self._timeline.next_s <= time_s + 1e-9 else ():
+            yield self.deed(action)
+        if self.team.next_boot_s <= time_s + 1e-9:
+            yield self.team.booted(time_s)
+
+    def deed(self, action: Action) -> Deed:
+        """Find out whom an action means now; return what a clock has to do."""
+        if isinstance(action, Strike):
+            return self.team.struck(action, self._places, self._formation)
+        if isinstance(action, Revival):
+            return self.team.revived(action, self.world.fleet.position)
+        if isinstance(action, Joining):
+            return self.team.joined(action, self.world.fleet.position)
+        return action
+
+    def take(self, deed: Deed, planned: bool = True) -> None:
+        """Let a deed count that was done: participants and world change, and it is told."""
+        match deed:
+            case Stop():
+                self._stop(deed, planned)
+            case Start():
+                self._start(deed, planned)
+            case Begin():
+                self.team.take(deed, self.world.time_s)
+            case Change(change=change, undone=undone):
+                given = {"undone": _plain(change)} if undone else _plain(change)
+                self.event("netem", None, **given, planned=planned)
+            case Partition(groups=groups):
+                self.event("partition", None, groups=groups, planned=planned)
+            case Heal():
+                self.event("heal", None, planned=planned)
+            case Order():
+                self._order(deed, planned)
 
     def open(self) -> Opened:
         """Begin the present slot; at a tick, judge and record it first."""
@@ -103,19 +166,14 @@ class SlotLoop:
         self.trace.poses(world.slot, world.fleet)
         if world.slot % world.clock.slots_per_tick == 0:
             self._show()
-        group = [
-            agent
-            for agent in range(
-                world.slot % world.clock.slots_per_tick,
-                len(self._alive),
-                world.clock.slots_per_tick,
-            )
-            if self._alive[agent]
-        ]
+        slots, alive = world.clock.slots_per_tick, self.team.alive.tolist()
+        group = [agent for agent in range(world.slot % slots, len(alive), slots) if alive[agent]]
         observations = list(zip(group, world.observe(group), strict=True)) if group else []
         for agent, observation in observations:
             self._headings[agent] = observation.yaw
-        return Opened(world.slot, world.time_s, world.positions(), observations)
+        if self._orders.pending is not None:
+            observations = [self._ordered(*each) for each in observations]
+        return Opened(world.slot, world.time_s, self._radios(alive), observations)
 
     def obey(self, agent: int, command: Command, encoded: bytes) -> None:
         """Take one agent's command; under a barrier, in order of ids."""
@@ -128,7 +186,9 @@ class SlotLoop:
                 told.force,
                 _turn_deg(told.wanted, self._headings[agent]),
                 told.heard,
+                told.mission,
             )
+            self._orders.heard(told.mission)
             self._watch_place(agent, told.place)
 
     def close(self, verdicts: bytes) -> None:
@@ -143,15 +203,62 @@ class SlotLoop:
 
     def lost(self, agent: int, **details: Any) -> None:
         """Strike out an agent whose process is gone; its vehicle stops and hovers."""
-        self._alive[agent] = False
+        self.team.strike_out(agent)
         self.event("kill", agent, **details)
 
     def event(self, kind: str, agent: int | None, **details: Any) -> None:
         """Note an event now."""
         event = {"t_s": round(self.world.time_s, 6), "kind": kind, "agent": agent, **details}
         self.events.append(event)
+        self.judge.note(event)
         if self._recorder is not None:
             self._recorder.event(event)
+
+    def _stop(self, stop: Stop, planned: bool) -> None:
+        self.team.take(stop, self.world.time_s)
+        for agent in stop.agents:
+            if stop.kind == "leave":
+                self.world.leave(agent)
+            self.event(stop.kind, agent, planned=planned)
+        if not stop.agents:
+            self.event(stop.kind, None, planned=planned, nobody=stop.selectors)
+
+    def _start(self, start: Start, planned: bool) -> None:
+        self.team.take(start, self.world.time_s)
+        for agent, (position, yaw) in start.stands.items():
+            self.world.enter(agent, position, yaw)
+        for agent, incarnation in start.incarnations.items():
+            self._told[agent], self._places[agent] = UNTOLD, None
+            self.event(start.kind, agent, incarnation=incarnation, planned=planned)
+        if not start.incarnations:
+            refused = start.refused or "nobody to come back"
+            self.event(start.kind, None, planned=planned, refused=refused)
+
+    def _order(self, order: Order, planned: bool) -> None:
+        key = self._orders.issue(order, max(told.mission for told in self._told))
+        self._formation = order.formation
+        self.event(
+            order.kind,
+            self.team.first,
+            formation=order.formation.name,
+            mission=key,
+            pose=list(order.pose),
+            planned=planned,
+            tables=msgspec.to_builtins(order.formation),
+        )
+
+    def _ordered(self, agent: int, observation: Observation) -> tuple[int, Observation]:
+        """Add the pending mission where the lowest living id looks."""
+        mission = self._orders.pending
+        if mission is None or agent != self.team.first:
+            return agent, observation
+        return agent, msgspec.structs.replace(observation, orders=(mission,))
+
+    def _radios(self, alive: list[bool]) -> tuple[Vector | None, ...]:
+        positions = self.world.positions()
+        if self.team.whole:
+            return positions
+        return tuple(where if here else None for where, here in zip(positions, alive, strict=True))
 
     def _watch_place(self, agent: int, now: tuple[int, int] | None) -> None:
         before = self._places[agent]
@@ -174,7 +281,7 @@ class SlotLoop:
         fleet = self.world.fleet
         told = [
             row if alive else UNTOLD
-            for row, alive in zip(self._told, self._alive.tolist(), strict=True)
+            for row, alive in zip(self._told, self.team.alive.tolist(), strict=True)
         ]
         return Tick(
             index=self.world.slot // self.world.clock.slots_per_tick,
@@ -185,7 +292,8 @@ class SlotLoop:
             place=np.array([row.place for row in told], dtype=np.int16),
             force=np.array([row.force for row in told], dtype=np.float32),
             turn_deg=np.array([row.turn_deg for row in told], dtype=np.float32),
-            alive=self._alive.copy(),
+            alive=self.team.alive.copy(),
+            mission=np.array([row.mission for row in told], dtype=np.int64),
             links=self._links(told) if self._recorder is not None else NO_LINKS,
             packets=self._packets(),
         )
@@ -194,6 +302,12 @@ class SlotLoop:
     def _links(told: list[Told]) -> NDArray[np.int32]:
         pairs = [(row, other) for row, each in enumerate(told) for other in each.heard]
         return np.array(pairs, dtype=np.int32).reshape(-1, 2)
+
+
+def _plain(change: Conditions) -> dict[str, Any]:
+    """Return the keys that a change of conditions gives."""
+    given: dict[str, Any] = msgspec.to_builtins(change)
+    return given
 
 
 def _turn_deg(wanted: Vector, heading: float) -> float:

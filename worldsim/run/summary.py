@@ -1,5 +1,6 @@
 """summary.json: what a run showed, from the judge, the radio's counters and the clock."""
 
+from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
@@ -58,6 +59,7 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
         "min_separation_m": judge.min_separation_m,
         "min_obstacle_distance_m": None,
         "phases": _phases(judge),
+        "recoveries": [asdict(recovery) for recovery in judge.recoveries],
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "packets": _packets(verdicts, rejected),

@@ -15,7 +15,9 @@ from netem.medium import Medium
 from netem.messages import Verdicts
 from netem.wire.frame import Batch, Outgoing, Transmission, pack, unpack_batch, unpack_transmission
 from worldsim.judge.tick import Packets
-from worldsim.run.slots import Event, Opened, Recorder, SlotLoop, world_of
+from worldsim.run.faults import Change, Heal, Partition
+from worldsim.run.slots import Deed, Event, Opened, Recorder, SlotLoop, world_of
+from worldsim.run.team import Start, Stop
 from worldsim.scenario.tables import Scenario
 
 COMMAND_TICKS = 1
@@ -41,17 +43,16 @@ class VirtualFleet:
         decoders = Decoders(lru_cache(4096)(decode_beacon), lru_cache(4096)(decode_gossip))
         self._scenario = scenario
         self._medium = Medium(scenario.medium_setup())
-        self._agents = [
-            Agent(scenario.agent_setup(agent, 0, COMMAND_TICKS), decoders)
-            for agent in range(scenario.fleet.agents)
-        ]
+        self._decoders = decoders
+        self._agents = {agent: self._started(agent, 0) for agent in range(scenario.fleet.agents)}
+        self._rejected = 0
         self._batches: dict[int, bytes] = {}
         self.loop = SlotLoop(scenario, world_of(scenario, COMMAND_TICKS), recorder, self._packets)
 
     @property
     def rejected(self) -> int:
         """Messages that agents refused to believe."""
-        return sum(agent.rejected.total() for agent in self._agents)
+        return self._rejected + sum(agent.rejected.total() for agent in self._agents.values())
 
     @property
     def verdicts(self) -> Verdicts:
@@ -59,13 +60,37 @@ class VirtualFleet:
         return self._medium.verdicts(self.loop.world.slot)
 
     def slot(self) -> None:
-        """Run one slot: truth, batches, steps, verdicts, flight."""
+        """Run one slot: what is due before it, truth, batches, steps, verdicts, flight."""
+        for deed in self.loop.due():
+            self._do(deed)
+            self.loop.take(deed)
         opened = self.loop.open()
         self._medium.place(opened.positions)
         for agent, observation in opened.observations:
             self._step(agent, encode(observation), opened)
         self._deliver(opened.slot + 1)
         self.loop.close(self._medium.digest())
+
+    def _do(self, deed: Deed) -> None:
+        """Carry out what happens between slots."""
+        match deed:
+            case Stop(agents=agents):
+                for agent in agents:
+                    self._rejected += self._agents.pop(agent).rejected.total()
+                    self._batches.pop(agent, None)
+            case Start(incarnations=incarnations):
+                for agent, incarnation in incarnations.items():
+                    self._agents[agent] = self._started(agent, incarnation)
+            case Change(conditions=conditions):
+                self._medium.change(conditions)
+            case Partition(groups=groups):
+                self._medium.partition(groups)
+            case Heal():
+                self._medium.heal()
+
+    def _started(self, agent: int, incarnation: int) -> Agent:
+        setup = self._scenario.agent_setup(agent, incarnation, COMMAND_TICKS)
+        return Agent(setup, self._decoders)
 
     def _step(self, agent: int, observed: bytes, opened: Opened) -> None:
         core = self._agents[agent]
@@ -76,7 +101,7 @@ class VirtualFleet:
                 core.receive(frame.source, frame.channel, frame.payload, observation.time_s)
         outbox = core.step(observation)
         outgoing = tuple(Outgoing(channel, payload) for channel, payload in outbox.frames)
-        sent = pack(Transmission(opened.slot, 0, outgoing))
+        sent = pack(Transmission(opened.slot, outbox.command.incarnation, outgoing))
         self._medium.transmit(agent, opened.time_s, unpack_transmission(sent))
         command = encode(outbox.command)
         self.loop.obey(agent, decode_command(command), command)
@@ -84,7 +109,10 @@ class VirtualFleet:
     def _deliver(self, slot: int) -> None:
         """Hand what is due by a slot to the group that steps in it."""
         clock = self.loop.world.clock
-        for agent in range(slot % clock.slots_per_tick, len(self._agents), clock.slots_per_tick):
+        alive = self.loop.team.alive
+        for agent in range(slot % clock.slots_per_tick, len(alive), clock.slots_per_tick):
+            if not alive[agent]:
+                continue
             frames = self._medium.collect(agent, clock.time_s(slot))
             self._batches[agent] = pack(Batch(slot, frames))
 

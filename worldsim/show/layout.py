@@ -24,7 +24,8 @@ EVENTS = "/log/events"
 EVENT = "event"
 
 STATE = "/state/agents"
-PLACE, ALIVE, ATTITUDE = "place", "alive", "attitude"
+PLACE, ALIVE, ATTITUDE, MISSION = "place", "alive", "attitude", "mission"
+MISSIONS = "/state/missions"
 HEARD = "/state/links"
 HEARS = "hears"
 

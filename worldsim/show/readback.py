@@ -97,7 +97,15 @@ class _Columns:
 
 _POSITIONS = "Points3D:positions"
 _SCALARS = "Scalars:scalars"
-_READ = {_POSITIONS, _SCALARS, layout.PLACE, layout.ALIVE, layout.ATTITUDE, layout.HEARS}
+_READ = {
+    _POSITIONS,
+    _SCALARS,
+    layout.PLACE,
+    layout.ALIVE,
+    layout.ATTITUDE,
+    layout.HEARS,
+    layout.MISSION,
+}
 
 
 def _rows(lists: Any) -> list[NDArray[Any]]:
@@ -128,11 +136,12 @@ def _scenario(columns: _Columns, path: Path) -> Scenario:
 
 def _ticks(columns: _Columns, scenario: Scenario) -> list[Tick]:
     """Return the ticks of which every row is there."""
-    agents = scenario.fleet.agents
+    agents = scenario.rows
     always = [columns.of(*name) for name in _EVERY_TICK]
     position, target, force, turn, place, alive, attitude = always
     whole = sorted(set(position).intersection(*always))
     heard = _latest(columns.of(layout.HEARD, layout.HEARS), whole, _no_bits(agents))
+    flown = _latest(columns.of(layout.MISSIONS, layout.MISSION), whole, np.zeros(agents))
     packets = _packets(columns.counters(), whole)
     return [
         Tick(
@@ -146,6 +155,7 @@ def _ticks(columns: _Columns, scenario: Scenario) -> list[Tick]:
             turn_deg=turn[index].astype(np.float32),
             alive=alive[index].astype(np.bool_),
             links=_links(heard[row], agents),
+            mission=flown[row].astype(np.int64),
             packets=packets[row],
         )
         for row, index in enumerate(whole)

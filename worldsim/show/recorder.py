@@ -10,10 +10,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import rerun as rr
 
-from agent.qstructure.formation import Formation
+from agent.qstructure.formation import Formation, FormationSpec
+from agent.qstructure.frame import Frame
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
 from worldsim.scenario.tables import Scenario
@@ -25,6 +27,7 @@ from worldsim.show.spool import Spool
 
 Event = dict[str, Any]
 FLUSH_S = 5.0
+UNSPOKEN = frozenset({"t_s", "kind", "agent", "tables"})
 WARNINGS = frozenset({"kill", "leave", "partition", "jam"})
 
 
@@ -55,6 +58,7 @@ class RunRecorder:
         self._formation = Formation(scenario.formation, scenario.control.spacing_m)
         shared = np.array(self._formation.common, dtype=np.int16).reshape(-1, 2)
         self._sheets = Sheets(shared, scenario.fleet.tick_hz, limits(scenario))
+        self._team = scenario.fleet.agents
         self._every = max(1, round(scenario.fleet.tick_hz))
         self._ticks: list[Tick] = []
         self._figures: list[Figures] = []
@@ -91,7 +95,7 @@ class RunRecorder:
     def _open(self, path: Path, run_id: str, mode: str) -> None:
         rr.set_strict_mode(True)
         self._spool = Spool(path, self._say)
-        scenery = Scenery(self._scenario, self._formation)
+        scenery = Scenery(self._scenario, self._formation, self._scenario.fleet.agents)
         # Without an id of our own: a viewer takes two recordings of one id for one.
         self._stream = rr.RecordingStream(
             "qswarm",
@@ -127,11 +131,26 @@ class RunRecorder:
 
     def _flush(self) -> None:
         if self._ticks:
+            self._team = int(np.count_nonzero(self._ticks[-1].alive))
             for sheet in self._sheets.of(self._ticks, self._figures):
                 self._send(sheet)
         if self._events:
             self._send_events()
+        for event in self._events:
+            if "tables" in event:
+                self._show_phase(event)
         self._stream.flush(timeout_sec=FLUSH_S)
+
+    def _show_phase(self, event: Event) -> None:
+        """Draw the formation that a mission asks for, from its time on."""
+        spec = msgspec.convert(event["tables"], FormationSpec)
+        formation = Formation(spec, self._scenario.control.spacing_m)
+        x, y, z, yaw = event["pose"]
+        scenery = Scenery(self._scenario, formation, self._team, Frame((x, y, z), yaw))
+        self._stream.set_time(layout.SIM_TIME, duration=event["t_s"])
+        self._stream.set_time(layout.TICK, sequence=self._tick_at(event["t_s"]))
+        for entity, part in scenery.formation():
+            self._stream.log(entity, part)
 
     def _send(self, sheet: Sheet) -> None:
         ticks = [self._ticks[row] for row in sheet.rows]
@@ -141,7 +160,7 @@ class RunRecorder:
 
     def _send_events(self) -> None:
         times = [float(event["t_s"]) for event in self._events]
-        ticks = [int(t * self._scenario.fleet.tick_hz + 1e-6) for t in times]
+        ticks = [self._tick_at(t) for t in times]
         told = [json.dumps(event, default=str) for event in self._events]
         columns = [
             *rr.TextLog.columns(
@@ -152,6 +171,9 @@ class RunRecorder:
         ]
         rr.send_columns(layout.EVENTS, _indexes(times, ticks), columns, recording=self._stream)
 
+    def _tick_at(self, time_s: float) -> int:
+        return int(time_s * self._scenario.fleet.tick_hz + 1e-6)
+
     def _end(self) -> None:
         self._stream.disconnect()
         self._spool.wait()
@@ -161,7 +183,7 @@ def sentence(event: Event) -> str:
     """Return an event as a person reads it: its kind, the agent, and the rest as it stands."""
     agent = "" if event.get("agent") is None else f" a{event['agent']}"
     kind = event["kind"]
-    rest = {key: value for key, value in event.items() if key not in {"t_s", "kind", "agent"}}
+    rest = {key: value for key, value in event.items() if key not in UNSPOKEN}
     words = (f"{value}" if key == kind else f"{key} {value}" for key, value in rest.items())
     details = ", ".join(words)
     return f"{kind}{agent}" + (f": {details}" if details else "")

@@ -1,4 +1,4 @@
-"""What stands still in a recording: styles, names, the formation, the scenario's text."""
+"""What stands still in a recording: styles, names, a phase's formation, the scenario's text."""
 
 from collections.abc import Iterator
 from math import ceil
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from agent.messages import Vector
 from agent.qstructure.formation import Formation
 from agent.qstructure.frame import Frame
-from worldsim.judge.verdict import CONVERGED_M
+from worldsim.judge.phase import CONVERGED_M, HERE
 from worldsim.scenario.file import dump
 from worldsim.scenario.tables import Scenario
 from worldsim.show import layout, palette
@@ -22,16 +22,18 @@ TARGET_RADIUS_M = 0.035
 
 
 class Scenery:
-    """Everything of a recording that is known before the first tick.
+    """What holds for a whole run, or for a whole phase of it.
 
-    slots: (M, 3), where the formation's places are [m; world frame].
+    team: how many the formation is drawn for. slots: (M, 3), where its places are [m; world frame].
     """
 
-    def __init__(self, scenario: Scenario, formation: Formation) -> None:
+    def __init__(
+        self, scenario: Scenario, formation: Formation, team: int, frame: Frame = HERE
+    ) -> None:
         self._scenario = scenario
         self._formation = formation
-        self._frame = Frame()
-        filled = formation.layout(scenario.fleet.agents)
+        self._frame = frame
+        filled = formation.layout(team)
         self._places = filled.places
         self._stands = {place: slot.arc_length for place, slot in filled.slots.items()}
         self.slots: NDArray[np.float64] = np.array(
@@ -40,7 +42,7 @@ class Scenery:
 
     def lasting(self) -> Iterator[tuple[str, list[Any]]]:
         """Return what holds for the whole run, entity by entity."""
-        agents = self._scenario.fleet.agents
+        agents = self._scenario.rows
         names = [f"a{agent}" for agent in range(agents)]
         yield layout.AGENTS, [rr.Points3D.from_fields(radii=[TRAIL_RADIUS_M])]
         yield layout.TARGETS, [rr.Points3D.from_fields(radii=[TARGET_RADIUS_M])]

@@ -62,6 +62,7 @@ class Sheets:
         self._tick_hz = tick_hz
         self._colours = Latest()
         self._heard = Latest()
+        self._flown = Latest()
         self._counters: dict[str, Latest] = {}
         self._lines_due = 0
 
@@ -70,6 +71,7 @@ class Sheets:
         yield from _poses(ticks)
         yield from _metrics(ticks, figures)
         yield _state(ticks)
+        yield from self._missions(ticks)
         yield from self._coloured(ticks)
         yield from self._hearing(ticks)
         yield from self._lines(ticks)
@@ -101,6 +103,14 @@ class Sheets:
             bits = np.concatenate([series[row] for row in rows])
             counts = [len(series[0])] * len(rows)
             yield Sheet(layout.HEARD, rows, [_column(layout.HEARS, bits, counts)])
+
+    def _missions(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
+        series = [tick.mission for tick in ticks]
+        rows = self._flown.changes(series)
+        if rows:
+            keys = np.concatenate([series[row] for row in rows])
+            counts = [len(series[0])] * len(rows)
+            yield Sheet(layout.MISSIONS, rows, [_column(layout.MISSION, keys, counts)])
 
     def _lines(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
         rows, strips = [], []

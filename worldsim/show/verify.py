@@ -11,11 +11,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from worldsim.judge.recovery import Recovery
 from worldsim.judge.verdict import Expectation, Judge
-from worldsim.show.readback import RecordingError, read_run
+from worldsim.show.readback import Readback, RecordingError, read_run
 
 RECORDING = "run.rrd"
 SUMMARY = "summary.json"
+SAME_TIME_S = 1e-6
+"""Events tell their time to the microsecond."""
 HELD, NOT_HELD, NOTHING_TO_JUDGE = 0, 1, 2
 
 Figure = float | None
@@ -59,6 +62,7 @@ class Verification:
     min_separation_m: Figure = None
     turns_over_limit_fraction: Figure = None
     phases: tuple[PhaseFigures, ...] = ()
+    recoveries: tuple[Recovery, ...] = ()
     invariants: dict[str, dict[str, int]] = field(default_factory=dict)
     summary: bool = False
     differences: tuple[Difference, ...] = ()
@@ -99,9 +103,7 @@ def verify(run: Path) -> Verification:
 
 def _judged(run: Path, recording: Path) -> Verification:
     readback = read_run(recording)
-    judge = Judge(readback.scenario)
-    for tick in readback.ticks:
-        judge.see(tick)
+    judge = _seen(readback)
     return Verification(
         run=run,
         scenario=readback.scenario.name,
@@ -121,8 +123,21 @@ def _judged(run: Path, recording: Path) -> Verification:
             )
             for phase in judge.phases
         ),
+        recoveries=tuple(judge.recoveries),
         invariants=judge.invariants(),
     )
+
+
+def _seen(readback: Readback) -> Judge:
+    """Return a judge that saw the ticks, and heard before each of what had happened by then."""
+    judge, heard = Judge(readback.scenario), 0
+    events = sorted(readback.events, key=lambda event: float(event["t_s"]))
+    for tick in readback.ticks:
+        while heard < len(events) and events[heard]["t_s"] <= tick.time_s + SAME_TIME_S:
+            judge.note(events[heard])
+            heard += 1
+        judge.see(tick)
+    return judge
 
 
 def _compared(judged: Verification, summary: Path) -> Verification:
@@ -156,6 +171,9 @@ def _figures(judged: Verification) -> dict[str, Any]:
     for index, phase in enumerate(judged.phases):
         for key in ("formation", "from_s", "converged", "converge_s", "residual_m"):
             figures[f"phases.{index}.{key}"] = getattr(phase, key)
+    for index, recovery in enumerate(judged.recoveries):
+        for key in ("t_s", "kind", "agents", "reformed_s"):
+            figures[f"recoveries.{index}.{key}"] = getattr(recovery, key)
     for index, row in enumerate(judged.expectations):
         for key in ("name", "wanted", "got", "held"):
             figures[f"expectations.{index}.{key}"] = getattr(row, key)

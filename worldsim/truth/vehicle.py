@@ -42,6 +42,16 @@ class Fleet:
     def __len__(self) -> int:
         return len(self.yaw)
 
+    def place(self, row: int, position: Vector, yaw: float) -> None:
+        """Put a vehicle into the world [m; world frame, rad], at rest and level."""
+        self.position[row], self.velocity[row], self.tilt[row] = position, 0.0, 0.0
+        self.yaw[row] = yaw
+
+    def remove(self, row: int) -> None:
+        """Take a vehicle out of the world."""
+        self.position[row] = self.yaw[row] = np.nan
+        self.velocity[row] = self.tilt[row] = 0.0
+
     def integrate(self, velocity: Floats, yaw: Floats, tilt: Floats, dt: float) -> None:
         """Fly for ``dt`` [s] at velocities (N, 3) [m/s], towards yaws (N,) and tilts (N, 2) [rad].
 

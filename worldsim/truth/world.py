@@ -77,6 +77,16 @@ class World:
             for row in self.fleet.position.tolist()
         )
 
+    def enter(self, agent: int, position: Vector, yaw: float) -> None:
+        """Put an agent's vehicle into the world [m; world frame, rad]; it hovers."""
+        self.fleet.place(agent, position, yaw)
+        self._halt(agent)
+
+    def leave(self, agent: int) -> None:
+        """Take an agent's vehicle out of the world."""
+        self.fleet.remove(agent)
+        self._halt(agent)
+
     def observe(self, looking: list[int]) -> list[Observation]:
         """Return the present slot's observations of these agents, in their order."""
         read = self._sensor.read(self.fleet.position, looking, self.slot)
@@ -119,6 +129,11 @@ class World:
             self._hover(expired)
         self.fleet.integrate(self._velocity, self._yaw, self._tilt, 1.0 / self.clock.slot_hz)
         self.slot += 1
+
+    def _halt(self, agent: int) -> None:
+        self._expires[agent] = 0
+        self._velocity[agent] = self._tilt[agent] = 0.0
+        self._yaw[agent] = self.fleet.yaw[agent]
 
     def _hover(self, rows: NDArray[np.bool_]) -> None:
         self._velocity[rows] = 0.0

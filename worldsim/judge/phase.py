@@ -1,0 +1,118 @@
+"""A phase: one formation in one frame, from the mission that asked for it to the next.
+
+Of an agent's telemetry only the place that it means to hold is taken, and which mission it flies;
+where that place is, is computed here.
+"""
+
+from collections import Counter
+from math import degrees, isfinite, remainder, tau
+
+import numpy as np
+
+from agent.messages import Place
+from agent.qstructure.formation import Formation, Slot
+from agent.qstructure.frame import Frame
+from worldsim.judge.metrics import Floats
+from worldsim.judge.tick import Tick
+
+CONVERGED_M = 0.12
+CONVERGED_S = 2.0
+NO_CLAIM = (-1, -1)
+HERE = Frame()
+
+
+class Phase:
+    """The time of one formation in one frame, and how the team came into it.
+
+    mission: its key; an agent that flies an older one has no slot in this phase.
+    """
+
+    def __init__(
+        self, formation: Formation, from_s: float, frame: Frame = HERE, mission: int = 0
+    ) -> None:
+        self.formation = formation
+        self.from_s = from_s
+        self.frame = frame
+        self.mission = mission
+        self.converge_s: float | None = None
+        self.residual_m: float | None = None
+        self._since_s: float | None = None
+        self._slots: dict[tuple[int, int, int], Slot | None] = {}
+        self._owned: dict[int, Slot] = {}
+        self._owned_by: tuple[bytes, bytes, bytes] | None = None
+
+    def slot_error(self, tick: Tick) -> Floats:
+        """Return each agent's distance to the slot it claims [m]; infinite without a valid one.
+
+        Two that claim the same slot have none: neither counts as arrived.
+        """
+        error = np.full(len(tick.place), np.inf)
+        slots = self._own_slots(tick)
+        if slots:
+            rows = list(slots)
+            stands = [self.frame.to_world(slot.point) for slot in slots.values()]
+            off = tick.position[rows].astype(np.float64) - np.array(stands)
+            error[rows] = np.sqrt(np.sum(off * off, axis=1))
+        error[np.isnan(tick.position[:, 0])] = np.nan
+        return error
+
+    def attitude_error_deg(self, tick: Tick) -> float | None:
+        """Return the largest angle by which an agent misses its slot's orientation [deg].
+
+        Angles that a queue leaves free do not count; None where all are free.
+        """
+        wanted = [
+            (angle + (self.frame.yaw if axis == 0 else 0.0), float(tick.attitude[row, axis]))
+            for row, slot in self._own_slots(tick).items()
+            for axis, angle in enumerate(slot.attitude)
+            if angle is not None and tick.alive[row]
+        ]
+        missed = [abs(remainder(angle - flown, tau)) for angle, flown in wanted]
+        return degrees(max(missed)) if missed else None
+
+    def claims(self, tick: Tick) -> list[tuple[int, int]]:
+        """Return each agent's claim in this phase, queue and rank; (-1, -1) without one."""
+        flown = (tick.mission >= self.mission).tolist()
+        return [
+            (queue, rank) if flies else NO_CLAIM
+            for (queue, rank), flies in zip(tick.place.tolist(), flown, strict=True)
+        ]
+
+    def _own_slots(self, tick: Tick) -> dict[int, Slot]:
+        """Return the slot of each agent that claims a valid one alone, by row.
+
+        What was found holds until a claim changes, or an agent goes.
+        """
+        claimed = tick.place.tobytes(), tick.alive.tobytes(), tick.mission.tobytes()
+        if claimed != self._owned_by:
+            self._owned_by, self._owned = claimed, self._find_slots(tick)
+        return self._owned
+
+    def _find_slots(self, tick: Tick) -> dict[int, Slot]:
+        claims = self.claims(tick)
+        holders = Counter(claim for claim, alive in zip(claims, tick.alive, strict=True) if alive)
+        team = int(np.sum(tick.alive))
+        return {
+            row: slot
+            for row, claim in enumerate(claims)
+            if holders[claim] <= 1 and (slot := self._slot(*claim, team)) is not None
+        }
+
+    def _slot(self, queue: int, rank: int, team: int) -> Slot | None:
+        key = (queue, rank, team)
+        if key not in self._slots:
+            self._slots[key] = self.formation.slot(Place(queue, rank), team)
+        return self._slots[key]
+
+    def see(self, time_s: float, error: Floats) -> bool:
+        """Take the living agents' slot errors [m] at a tick; return whether all are in place."""
+        worst = float(np.fmax.reduce(error, initial=-np.inf))
+        self.residual_m = worst if isfinite(worst) else None
+        if not 0.0 <= worst <= CONVERGED_M:
+            self._since_s = None
+            return False
+        if self._since_s is None:
+            self._since_s = time_s
+        if self.converge_s is None and time_s - self._since_s >= CONVERGED_S - 1e-9:
+            self.converge_s = self._since_s - self.from_s
+        return True

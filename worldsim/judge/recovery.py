@@ -1,0 +1,97 @@
+"""Recoveries: how long a team that changed takes until it stands in a whole formation again.
+
+Whole: the living hold exactly the places that the formation has for so many, and those that a dead
+vehicle hovers in are not among them (E18). Standing: each within 0.12 m of its own, for 2 s.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from agent.controller import Flown
+from agent.guidance.target_on_queue import TargetOnQueue
+from agent.messages import Place
+from worldsim.judge.phase import CONVERGED_S, Phase
+from worldsim.judge.tick import Tick
+
+RETURNS = frozenset({"restart", "join"})
+LOSSES = frozenset({"kill", "leave"})
+
+
+@dataclass(slots=True)
+class Recovery:
+    """One change of the team: at ``t_s`` [s] these agents went, or came.
+
+    reformed_s: from then to the start of the 2 s [s]; None as long as there were none.
+    """
+
+    t_s: float
+    kind: str
+    agents: list[int]
+    reformed_s: float | None = None
+
+
+class Recoveries:
+    """Every change of the team in a run, and what became of it; spacing: d_ir [m]."""
+
+    def __init__(self, spacing: float) -> None:
+        self.all: list[Recovery] = []
+        self._open: list[Recovery] = []
+        self._since_s: float | None = None
+        self._targets = TargetOnQueue(-1, spacing)
+        self._seen: tuple[bytes, ...] = ()
+        self._whole = False
+
+    def change(self, t_s: float, kind: str, agent: int | None) -> None:
+        """Note that an agent went or came; None that somebody should have come, and did not."""
+        self._since_s = None
+        last = self.all[-1] if self.all else None
+        if last is None or (last.t_s, last.kind) != (t_s, kind):
+            last = Recovery(t_s, kind, [])
+            self.all.append(last)
+            self._open.append(last)
+        if agent is None:
+            self._open.remove(last)
+        else:
+            last.agents.append(agent)
+
+    def see(self, tick: Tick, phase: Phase, in_place: bool) -> None:
+        """Take a tick; in_place: whether all the living are in their places."""
+        if not self._open:
+            return
+        if not (in_place and self._all_back(tick) and self._is_whole(tick, phase)):
+            self._since_s = None
+            return
+        if self._since_s is None:
+            self._since_s = tick.time_s
+        if tick.time_s - self._since_s >= CONVERGED_S - 1e-9:
+            for recovery in self._open:
+                recovery.reformed_s = max(0.0, self._since_s - recovery.t_s)
+            self._open = []
+
+    def _all_back(self, tick: Tick) -> bool:
+        """Whether those who came, and did not go again, have booted."""
+        gone: set[int] = set()
+        for recovery in reversed(self.all):
+            if recovery.kind in LOSSES:
+                gone.update(recovery.agents)
+            elif any(agent not in gone and not tick.alive[agent] for agent in recovery.agents):
+                return False
+        return True
+
+    def _is_whole(self, tick: Tick, phase: Phase) -> bool:
+        seen = (tick.place.tobytes(), tick.alive.tobytes(), tick.mission.tobytes())
+        if seen != self._seen:
+            self._seen = seen
+            held = [claim for claim in phase.claims(tick) if claim[0] >= 0]
+            self._whole = set(held) == self._places(tick, phase)
+        return self._whole
+
+    def _places(self, tick: Tick, phase: Phase) -> set[Place]:
+        """Return the places that the living must hold."""
+        hovering = tick.position[~tick.alive & ~np.isnan(tick.position[:, 0])]
+        bodies = [(x, y, z) for x, y, z in hovering.tolist()]
+        team = int(np.count_nonzero(tick.alive))
+        flown = Flown(phase.mission, phase.formation, phase.frame)
+        blocked = frozenset(self._targets.blocked(flown, team, bodies))
+        return set(phase.formation.layout(team, blocked).places)

@@ -1,0 +1,147 @@
+"""The timeline: what is due when, as typed actions. Pure; the same for every clock.
+
+An action says what shall happen; whom it strikes is found when it happens (``team``), and becomes a
+deed that a clock carries out.
+"""
+
+from math import inf, radians
+from typing import NamedTuple
+
+from agent.messages import HOME, Pose
+from agent.qstructure.formation import FormationSpec
+from netem.messages import Conditions, Groups
+from netem.schedule import overlaid
+from worldsim.scenario.course import Step, steps
+from worldsim.scenario.events import FrameTable
+from worldsim.scenario.starting import BoxStart, ListStart
+from worldsim.scenario.tables import Scenario
+
+SLACK_S = 1e-9
+
+
+class Strike(NamedTuple):
+    """Agents are to go; ``kind``: kill leaves their vehicles hovering, leave takes them away."""
+
+    number: int
+    kind: str
+    selectors: tuple[int | str, ...]
+
+
+class Revival(NamedTuple):
+    """Agents are to come back: those selected, or with none selected those struck by ``number``."""
+
+    number: int
+    selectors: tuple[int | str, ...]
+
+
+class Joining(NamedTuple):
+    """New agents are to come."""
+
+    number: int
+    joiners: int
+    start: BoxStart | ListStart
+
+
+class Change(NamedTuple):
+    """The radio's conditions from now on; ``undone``: whether a change ends by it."""
+
+    conditions: Conditions
+    change: Conditions
+    undone: bool
+
+
+class Partition(NamedTuple):
+    """The radio's groups from now on."""
+
+    groups: Groups
+
+
+class Heal(NamedTuple):
+    """No groups from now on."""
+
+
+class Order(NamedTuple):
+    """What the team shall form from now on, and where; kind: formation or frame, what is new."""
+
+    kind: str
+    formation: FormationSpec
+    pose: Pose
+
+
+Action = Strike | Revival | Joining | Change | Partition | Heal | Order
+
+
+class Timeline:
+    """A scenario's events in order of their times; ``next_s``: when the next is due [s]."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._steps = steps(scenario)
+        self._next = 0
+        self._fleet_start = scenario.fleet.start
+        self._conditions = scenario.netem
+        self._changes: dict[int, Conditions] = {}
+        self._parted_by: int | None = None
+        self._formation = scenario.formation
+        self._pose = HOME
+
+    @property
+    def next_s(self) -> float:
+        """When the next action is due [s]; infinite after the last."""
+        return self._steps[self._next].at_s if self._next < len(self._steps) else inf
+
+    def due(self, time_s: float) -> list[Action]:
+        """Return what is due by a time [s] and was not returned before, in order."""
+        actions = []
+        while self.next_s <= time_s + SLACK_S:
+            action = self._action(self._steps[self._next])
+            self._next += 1
+            if action is not None:
+                actions.append(action)
+        return actions
+
+    def _action(self, step: Step) -> Action | None:
+        event, number = step.event, step.number
+        if event.netem is not None:
+            return self._change(step, event.netem)
+        if event.partition is not None or event.heal is not None:
+            return self._partition(step)
+        if event.formation is not None or event.frame is not None:
+            return self._order(event.formation, event.frame)
+        if event.joiners:
+            return Joining(number, event.joiners, event.start or self._fleet_start)
+        if event.restart is not None or step.undo:
+            return Revival(number, event.restart or ())
+        return Strike(number, event.kind, event.selectors)
+
+    def _change(self, step: Step, change: Conditions) -> Change:
+        """Lay the changes in force over the scenario's conditions, the later over the earlier."""
+        if step.undo:
+            del self._changes[step.number]
+        else:
+            self._changes[step.number] = change
+        conditions = self._conditions
+        for held in self._changes.values():
+            conditions = overlaid(conditions, held)
+        return Change(conditions, change, step.undo)
+
+    def _partition(self, step: Step) -> Partition | Heal | None:
+        """Let a partition take the place of the one before; only its own end heals it."""
+        if step.event.partition is not None and not step.undo:
+            self._parted_by = step.number
+            return Partition(step.event.partition)
+        if step.undo and self._parted_by != step.number:
+            return None
+        self._parted_by = None
+        return Heal()
+
+    def _order(self, formation: FormationSpec | None, frame: FrameTable | None) -> Order:
+        if formation is not None:
+            self._formation = formation
+        if frame is not None:
+            self._pose = _posed(self._pose, frame)
+        return Order("frame" if formation is None else "formation", self._formation, self._pose)
+
+
+def _posed(pose: Pose, frame: FrameTable) -> Pose:
+    x, y, z = frame.waypoints_m[0] if frame.waypoints_m is not None else pose[:3]
+    return Pose(x, y, z, pose.yaw if frame.yaw_deg is None else radians(frame.yaw_deg))
