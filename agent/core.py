@@ -174,8 +174,7 @@ class Agent:
     def _tidy(self, observation: Observation) -> None:
         """Look after what need not be looked at every tick: who is gone, and one's standing."""
         now_s = observation.time_s
-        self._neighbours.forget_silent(now_s)
-        self._table.forget_silent(now_s, self._neighbours.silences_s())
+        self._table.forget_silent(now_s, self._neighbours.forget_silent(now_s))
         heard = [beacon.position for beacon in self._neighbours.beacons()]
         here, told = observation.position, self._table.positions()
         self._silent = self._bodies.look(now_s, here, observation.vehicles, heard, told)

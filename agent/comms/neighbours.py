@@ -8,7 +8,7 @@ from math import log
 
 from agent.codec import RejectedError
 from agent.controller import Heard
-from agent.messages import Beacon, Place, Vector
+from agent.messages import Beacon, Place
 
 MAX_AGE_S = 5.0
 """A beacon older than this says nothing about now."""
@@ -24,12 +24,13 @@ MARGIN = 1.2
 class Neighbour:
     """One neighbour: its last beacon, and the radio's quality as its sequence numbers show it."""
 
-    __slots__ = ("beacon", "latency_s", "mean_gap")
+    __slots__ = ("beacon", "latency_s", "mean_gap", "place")
 
     def __init__(self, beacon: Beacon, latency_s: float) -> None:
         self.beacon = beacon
         self.latency_s = latency_s
         self.mean_gap = 1.0
+        self.place = _claim(beacon)
 
     def hear(self, beacon: Beacon, latency_s: float) -> None:
         """Take a newer beacon that was under way for ``latency_s`` [s]."""
@@ -37,6 +38,8 @@ class Neighbour:
             gap = beacon.sequence - self.beacon.sequence
             self.mean_gap += SMOOTHING * (gap - self.mean_gap)
         self.latency_s += SMOOTHING * (latency_s - self.latency_s)
+        if (beacon.queue, beacon.rank) != (self.beacon.queue, self.beacon.rank):
+            self.place = _claim(beacon)
         self.beacon = beacon
 
     def silence_s(self, beacon_hz: float) -> float:
@@ -61,6 +64,7 @@ class Neighbours:
         self._beacon_hz = beacon_hz
         self._slack_s = slack_s
         self._known: dict[int, Neighbour] = {}
+        self._in_order: list[Neighbour] = []
         self._last: dict[int, tuple[int, int]] = {}
 
     def hear(self, beacon: Beacon, now_s: float, own_sent_s: dict[int, float]) -> None:
@@ -86,31 +90,37 @@ class Neighbours:
         known = self._known.get(beacon.id)
         if known is None:
             self._known[beacon.id] = Neighbour(beacon, max(0.0, age_s))
+            self._put_in_order()
         else:
             known.hear(beacon, max(0.0, age_s))
 
-    def forget_silent(self, now_s: float) -> None:
-        """Drop those who have been silent for longer than chance explains."""
+    def forget_silent(self, now_s: float) -> dict[int, float]:
+        """Drop those who have been silent for longer than chance explains.
+
+        Returns for each of the others how long it may be silent [s].
+        """
+        silences_s = self.silences_s()
         gone = [
             who
-            for who, known in self._known.items()
-            if now_s - known.beacon.stamp_s > known.silence_s(self._beacon_hz)
+            for who, silence_s in silences_s.items()
+            if now_s - self._known[who].beacon.stamp_s > silence_s
         ]
         for who in gone:
-            del self._known[who]
+            del self._known[who], silences_s[who]
+        if gone:
+            self._put_in_order()
+        return silences_s
 
     def silences_s(self) -> dict[int, float]:
         """Return for each neighbour how long it may be silent [s]."""
-        return {who: known.silence_s(self._beacon_hz) for who, known in self._known.items()}
+        return {who: each.silence_s(self._beacon_hz) for who, each in self._known.items()}
 
     def heard(self, now_s: float, mission: int = 0) -> tuple[Heard, ...]:
         """Return all neighbours, brought forward to now, sorted by id.
 
         A place claimed in another mission than ``mission`` is none.
         """
-        return tuple(
-            _forward(self._known[who].beacon, now_s, mission) for who in sorted(self._known)
-        )
+        return tuple([_forward(each, now_s, mission) for each in self._in_order])
 
     def behind(self, mission: int) -> bool:
         """Whether somebody who is heard flies an older mission."""
@@ -118,11 +128,14 @@ class Neighbours:
 
     def beacons(self) -> list[Beacon]:
         """Return each neighbour's last beacon, sorted by id."""
-        return [self._known[who].beacon for who in sorted(self._known)]
+        return [each.beacon for each in self._in_order]
 
     def echoes(self) -> tuple[tuple[int, int], ...]:
         """Return (id, last sequence heard) of each neighbour, sorted by id."""
-        return tuple((who, self._known[who].beacon.sequence) for who in sorted(self._known))
+        return tuple([(each.beacon.id, each.beacon.sequence) for each in self._in_order])
+
+    def _put_in_order(self) -> None:
+        self._in_order = [self._known[who] for who in sorted(self._known)]
 
     def _echoed_s(self, beacon: Beacon, own_sent_s: dict[int, float]) -> float | None:
         for who, sequence in beacon.echoes:
@@ -131,11 +144,15 @@ class Neighbours:
         return None
 
 
-def _forward(beacon: Beacon, now_s: float, mission: int) -> Heard:
+def _claim(beacon: Beacon) -> Place | None:
+    return Place(beacon.queue, beacon.rank) if beacon.queue >= 0 else None
+
+
+def _forward(neighbour: Neighbour, now_s: float, mission: int) -> Heard:
+    beacon = neighbour.beacon
     age_s = max(0.0, now_s - beacon.stamp_s)
-    along = min(age_s, FORWARD_S)
-    p, v = beacon.position, beacon.velocity
-    position: Vector = (p[0] + along * v[0], p[1] + along * v[1], p[2] + along * v[2])
-    placed = beacon.queue >= 0 and beacon.mission == mission
-    place = Place(beacon.queue, beacon.rank) if placed else None
-    return Heard(beacon.id, age_s, position, v, beacon.target, place)
+    along = age_s if age_s < FORWARD_S else FORWARD_S
+    (x, y, z), (u, v, w) = beacon.position, beacon.velocity
+    position = (x + along * u, y + along * v, z + along * w)
+    place = neighbour.place if beacon.mission == mission else None
+    return Heard(beacon.id, age_s, position, beacon.velocity, beacon.target, place)

@@ -37,11 +37,14 @@ class Dodge:
 
     def direction(self, senses: Senses, target: Vector) -> Vector | None:
         """Return the unit vector to dodge along [world axes]; None where nothing holds one."""
-        body = _ahead(senses.position, target, senses.vehicles)
-        if self._moves_on(senses, target) or body is None:
+        if self._moves_on(senses, target):
             self._side = None
             return None
         if senses.now_s - self._since_s < PATIENCE_S:
+            return None
+        body = _ahead(senses.position, target, senses.vehicles)
+        if body is None:
+            self._side = None
             return None
         if self._side is None:
             self._side = self._choose_side(senses, body)
