@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agent.controller import Flown
-from agent.guidance.target_on_queue import TargetOnQueue
 from agent.messages import Place
+from worldsim.judge.bodies import Bodies
 from worldsim.judge.phase import CONVERGED_S, Phase
 from worldsim.judge.tick import Tick
 
@@ -38,7 +37,7 @@ class Recoveries:
         self.all: list[Recovery] = []
         self._open: list[Recovery] = []
         self._since_s: float | None = None
-        self._targets = TargetOnQueue(-1, spacing)
+        self._bodies = Bodies(spacing)
         self._seen: tuple[bytes, ...] = ()
         self._whole = False
 
@@ -89,9 +88,5 @@ class Recoveries:
 
     def _places(self, tick: Tick, phase: Phase) -> set[Place]:
         """Return the places that the living must hold."""
-        hovering = tick.position[~tick.alive & ~np.isnan(tick.position[:, 0])]
-        bodies = [(x, y, z) for x, y, z in hovering.tolist()]
-        team = int(np.count_nonzero(tick.alive))
-        flown = Flown(phase.mission, phase.formation, phase.frame)
-        blocked = frozenset(self._targets.blocked(flown, team, bodies))
-        return set(phase.formation.layout(team, blocked).places)
+        team = np.flatnonzero(tick.alive).tolist()
+        return set(self._bodies.layout(tick, phase, team).places)

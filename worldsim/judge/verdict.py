@@ -4,7 +4,7 @@ It sees ticks and is told events, in order; an event counts before the tick of i
 judge, fed from a recording, comes to the same verdict.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import inf
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from agent.guidance.cone import cone_of
 from agent.qstructure.formation import Formation, FormationSpec
 from agent.qstructure.frame import Frame
+from worldsim.judge.invariants import Invariants
 from worldsim.judge.metrics import Floats, conserved, swept_separation
 from worldsim.judge.phase import Phase
 from worldsim.judge.recovery import LOSSES, RETURNS, Recoveries, Recovery
@@ -52,6 +53,7 @@ class Judge:
         self._scenario = scenario
         self.phases = [Phase(Formation(scenario.formation, scenario.control.spacing_m), 0.0)]
         self._recoveries = Recoveries(scenario.control.spacing_m)
+        self._allocation = Invariants(scenario) if scenario.expect.converge else None
         self.ticks = 0
         self.min_separation_m: float | None = None
         self.separation_violations = 0
@@ -66,6 +68,8 @@ class Judge:
     def note(self, event: dict[str, Any]) -> None:
         """Take an event of the run; of most kinds nothing follows for the judge."""
         kind = event["kind"]
+        if self._allocation is not None:
+            self._allocation.note(event)
         if "tables" in event:
             self._open_phase(event)
         elif kind in LOSSES | RETURNS and "nobody" not in event:
@@ -86,6 +90,8 @@ class Judge:
         error = phase.slot_error(tick)
         in_place = phase.see(tick.time_s, np.where(tick.alive, error, np.nan))
         self._recoveries.see(tick, phase, in_place)
+        if self._allocation is not None:
+            self._allocation.see(tick, phase, in_place)
         return Figures(separation, error, in_place)
 
     @property
@@ -131,10 +137,14 @@ class Judge:
         """Return each invariant checked at every tick: ticks evaluated, violations.
 
         I8 is evaluated wherever the medium's counters are known: in virtual time at every tick, in
-        processes from netem's first report on.
+        processes from netem's first report on. One of allocation whose premise never held is
+        absent, as are all of them where no formation is to be formed.
         """
+        tallies = self._allocation.tallies if self._allocation is not None else {}
+        allocation = {name: asdict(tally) for name, tally in tallies.items() if tally.ticks}
         return {
             "I1": {"ticks": self.ticks, "violations": self.separation_violations},
+            **allocation,
             "I8": {"ticks": self.packet_ticks, "violations": self.packet_violations},
         }
 

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agent.messages import Command, Observation, Vector
-from netem.messages import Conditions
 from worldsim.judge.tick import Packets, Tick
 from worldsim.judge.verdict import Figures, Judge
 from worldsim.run.faults import (
@@ -141,24 +140,23 @@ class SlotLoop:
             return self.team.joined(action, self.world.fleet.position)
         return action
 
-    def take(self, deed: Deed, planned: bool = True) -> None:
+    def take(self, deed: Deed) -> None:
         """Let a deed count that was done: participants and world change, and it is told."""
         match deed:
             case Stop():
-                self._stop(deed, planned)
+                self._stop(deed)
             case Start():
-                self._start(deed, planned)
+                self._start(deed)
             case Begin():
                 self.team.take(deed, self.world.time_s)
-            case Change(change=change, undone=undone):
-                given = {"undone": _plain(change)} if undone else _plain(change)
-                self.event("netem", None, **given, planned=planned)
+            case Change():
+                self._change(deed)
             case Partition(groups=groups):
-                self.event("partition", None, groups=groups, planned=planned)
+                self.event("partition", None, groups=groups, planned=True)
             case Heal():
-                self.event("heal", None, planned=planned)
+                self.event("heal", None, planned=True)
             case Order():
-                self._order(deed, planned)
+                self._order(deed)
 
     def open(self) -> Opened:
         """Begin the present slot; at a tick, judge and record it first."""
@@ -214,27 +212,33 @@ class SlotLoop:
         if self._recorder is not None:
             self._recorder.event(event)
 
-    def _stop(self, stop: Stop, planned: bool) -> None:
+    def _stop(self, stop: Stop) -> None:
         self.team.take(stop, self.world.time_s)
         for agent in stop.agents:
             if stop.kind == "leave":
                 self.world.leave(agent)
-            self.event(stop.kind, agent, planned=planned)
+            self.event(stop.kind, agent, planned=True)
         if not stop.agents:
-            self.event(stop.kind, None, planned=planned, nobody=stop.selectors)
+            self.event(stop.kind, None, planned=True, nobody=stop.selectors)
 
-    def _start(self, start: Start, planned: bool) -> None:
+    def _start(self, start: Start) -> None:
         self.team.take(start, self.world.time_s)
         for agent, (position, yaw) in start.stands.items():
             self.world.enter(agent, position, yaw)
         for agent, incarnation in start.incarnations.items():
             self._told[agent], self._places[agent] = UNTOLD, None
-            self.event(start.kind, agent, incarnation=incarnation, planned=planned)
+            self.event(start.kind, agent, incarnation=incarnation, planned=True)
         if not start.incarnations:
             refused = start.refused or "nobody to come back"
-            self.event(start.kind, None, planned=planned, refused=refused)
+            self.event(start.kind, None, planned=True, refused=refused)
 
-    def _order(self, order: Order, planned: bool) -> None:
+    def _change(self, deed: Change) -> None:
+        change = msgspec.to_builtins(deed.change)
+        given = {"undone": change} if deed.undone else change
+        conditions = msgspec.to_builtins(deed.conditions)
+        self.event("netem", None, **given, planned=True, conditions=conditions)
+
+    def _order(self, order: Order) -> None:
         key = self._orders.issue(order, max(told.mission for told in self._told))
         self._formation = order.formation
         self.event(
@@ -243,7 +247,7 @@ class SlotLoop:
             formation=order.formation.name,
             mission=key,
             pose=list(order.pose),
-            planned=planned,
+            planned=True,
             tables=msgspec.to_builtins(order.formation),
         )
 
@@ -302,12 +306,6 @@ class SlotLoop:
     def _links(told: list[Told]) -> NDArray[np.int32]:
         pairs = [(row, other) for row, each in enumerate(told) for other in each.heard]
         return np.array(pairs, dtype=np.int32).reshape(-1, 2)
-
-
-def _plain(change: Conditions) -> dict[str, Any]:
-    """Return the keys that a change of conditions gives."""
-    given: dict[str, Any] = msgspec.to_builtins(change)
-    return given
 
 
 def _turn_deg(wanted: Vector, heading: float) -> float:

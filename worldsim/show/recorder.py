@@ -27,7 +27,7 @@ from worldsim.show.spool import Spool
 
 Event = dict[str, Any]
 FLUSH_S = 5.0
-UNSPOKEN = frozenset({"t_s", "kind", "agent", "tables"})
+UNSPOKEN = frozenset({"t_s", "kind", "agent", "tables", "conditions"})
 WARNINGS = frozenset({"kill", "leave", "partition", "jam"})
 
 
