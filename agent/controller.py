@@ -46,12 +46,13 @@ class Heard(NamedTuple):
 class Peer(NamedTuple):
     """A member of the team as far as known, oneself included; told directly or passed on.
 
-    position [m; world frame]: where it last said it was.
+    position [m; world frame]: where it last said it was; direct: whether to oneself, or passed on.
     """
 
     id: int
     position: Vector
     place: Place | None
+    direct: bool = True
 
 
 class Flown(NamedTuple):

@@ -37,9 +37,7 @@ def allot(
     nowhere = [UNPLACED_M2] * (len(team) - len(places))
     squares = [[_square(peer.position, slot) for slot in slots] + nowhere for peer in team]
     column_of = {place: column for column, place in enumerate(places)}
-    claims = _undisputed(
-        [column_of.get(peer.place) if peer.place else None for peer in team], squares
-    )
+    claims = _undisputed(team, column_of, squares)
     for row, column in enumerate(claims):
         if column is not None:
             squares[row][column] -= hysteresis_m2
@@ -95,16 +93,24 @@ def _gains(
     return False
 
 
-def _undisputed(claims: list[int | None], squares: list[list[float]]) -> list[int | None]:
-    """Return the claims with at most one row to a column: the nearer's, else the lower id's."""
+def _undisputed(
+    team: Sequence[Peer], column_of: dict[Place, int], squares: list[list[float]]
+) -> list[int | None]:
+    """Return each row's claim, with at most one row to a column.
+
+    The nearer keeps a claim, if by more than noise, else the lower id. What was passed on is old,
+    and each of two in flight would find itself the nearer: there the lower id keeps it.
+    """
     holder: dict[int, int] = {}
-    kept: list[int | None] = [None] * len(claims)
-    for row, column in enumerate(claims):
+    kept: list[int | None] = [None] * len(team)
+    for row, peer in enumerate(team):
+        column = column_of.get(peer.place) if peer.place is not None else None
         if column is None:
             continue
         rival = holder.get(column)
         if rival is not None:
-            if sqrt(squares[row][column]) >= sqrt(squares[rival][column]) - CONFLICT_M:
+            nearer = sqrt(squares[row][column]) < sqrt(squares[rival][column]) - CONFLICT_M
+            if not (nearer and peer.direct and team[rival].direct):
                 continue
             kept[rival] = None
         holder[column] = row

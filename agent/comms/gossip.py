@@ -83,7 +83,7 @@ class Table:
         for who, newest in self._newest.items():
             placed = newest.queue >= 0 and newest.mission == mission
             place = Place(newest.queue, newest.rank) if placed else None
-            peers.append(Peer(who, newest.position, place))
+            peers.append(Peer(who, newest.position, place, isinstance(newest, Beacon)))
         peers.sort()
         return tuple(peers)
 
