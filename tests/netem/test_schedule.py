@@ -4,9 +4,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netem.link import LinkModel
-from netem.messages import Conditions, DirectedLink, LinkKeys
-from netem.schedule import Schedule
-from netem.wire.frame import LOCAL, MULTIHOP
+from netem.medium import Medium
+from netem.messages import Conditions, DirectedLink, LinkKeys, MediumSetup
+from netem.schedule import Schedule, overlaid
+from netem.wire.frame import LOCAL, MULTIHOP, Outgoing, Transmission
 
 FIELDS = LinkKeys.__struct_fields__
 tables = st.fixed_dictionaries(
@@ -38,3 +39,74 @@ def test_a_value_of_nothing_is_a_value():
     schedule = Schedule(conditions({"loss_percent": 50.0}, {"loss_percent": 0.0}, {}))
     assert schedule.model(LOCAL, 0, 1).loss_percent == 0.0
     assert schedule.model(MULTIHOP, 0, 1).loss_percent == 50.0
+
+
+@settings(derandomize=True, deadline=None)
+@given(tables, tables, tables, tables)
+def test_a_change_lies_over_what_was_table_by_table_and_key_by_key(both, own, change, other):
+    before = conditions(both, {}, own, (DirectedLink(source=0, to=1, **own),))
+    links = tuple(DirectedLink(source=a, to=b, **other) for a, b in ((0, 1), (1, 2)))
+    after = overlaid(before, conditions(change, {}, other, links))
+    assert after == conditions(
+        both | change,
+        {},
+        own | other,
+        (DirectedLink(source=0, to=1, **(own | other)), links[1]),
+    )
+    assert overlaid(before, Conditions()) == before
+
+
+def test_agents_that_no_group_names_are_one_group_more():
+    schedule = Schedule(Conditions())
+    assert not schedule.parted
+    schedule.partition(((0, 1), (2,)))
+    groups = [{0, 1}, {2}, {3, 4}]
+    for a in range(5):
+        for b in range(5):
+            together = any({a, b} <= group for group in groups)
+            assert schedule.cut(a, b) is not together
+    schedule.heal()
+    assert not schedule.parted
+    assert not schedule.cut(0, 2)
+
+
+def radio(**keys):
+    made = Medium(MediumSetup(1, 3, 4, 80.0, Conditions(**keys)))
+    made.place(((0.0, 0.0, 0.0),) * 3)
+    return made
+
+
+def say(made, sent_s):
+    made.transmit(0, sent_s, Transmission(0, 0, (Outgoing(LOCAL, b"x"),)))
+
+
+def test_a_change_meets_later_frames_and_not_those_in_flight():
+    made = radio(delay_ms=100.0)
+    say(made, 0.0)
+    made.change(Conditions(loss_percent=100.0))
+    say(made, 0.05)
+    assert [len(made.collect(who, 1.0)) for who in (1, 2)] == [1, 1]
+    assert made.verdicts(0).fates["dropped_loss"] == 2
+
+
+def test_a_partition_cuts_later_frames_and_a_heal_ends_it():
+    made = radio(delay_ms=100.0)
+    say(made, 0.0)
+    made.partition(((0, 1),))
+    say(made, 0.05)
+    made.heal()
+    say(made, 0.06)
+    assert [len(made.collect(who, 1.0)) for who in (1, 2)] == [3, 2]
+    fates = made.verdicts(0).fates
+    assert (fates["dropped_partition"], fates["delivered"]) == (1, 5)
+
+
+def test_what_is_in_flight_to_a_radio_that_goes_is_dropped_by_the_medium():
+    made = radio(delay_ms=100.0)
+    say(made, 0.0)
+    made.place(((0.0, 0.0, 0.0), None, (0.0, 0.0, 0.0)))
+    say(made, 0.05)
+    assert [len(made.collect(who, 1.0)) for who in (1, 2)] == [0, 2]
+    told = made.verdicts(0)
+    assert (told.fates["dropped_medium"], told.fates["dropped_range"]) == (1, 1)
+    assert told.addressed == sum(told.fates.values()) + told.in_flight

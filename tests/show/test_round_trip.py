@@ -47,6 +47,7 @@ def _wild_tick(generator: np.random.Generator, index: int) -> Tick:
         turn_deg=turn,
         alive=generator.random(AGENTS) < 0.8,
         links=np.vstack([links, [[0, SPOOFED]]]).astype(np.int32),
+        mission=generator.integers(0, 2**40, AGENTS),
         packets={"sent": int(generator.integers(0, 2**40))},
     )
 

@@ -1,0 +1,138 @@
+"""A timeline is checked against the fleet that each event will meet; the key at fault is named."""
+
+from pathlib import Path
+
+import pytest
+
+from worldsim.scenario.file import dump, load, parse
+from worldsim.scenario.tables import Scenario
+from worldsim.scenario.toml import ScenarioError
+
+WEDGE = Path("deploy/scenarios/wedge-9.toml")
+LINES = "'../formations/three-horizontal-lines.toml'"
+PAIR = (
+    "{ name = 'pair', vertices = { V1 = [0, 0, 0], V2 = [3, 0, 0] },"
+    " queue = [{ name = 'Q', vertices = ['V1', 'V2'] }] }"
+)
+
+
+def timeline(*events: str) -> Scenario:
+    return load(WEDGE, {"event": f"[{', '.join(f'{{ {event} }}' for event in events)}]"})
+
+
+SOUND = [
+    ["at_s = 5, kill = [2, 'vertex:V1', 'queue:Q1', 'random:2', 'all'], for_s = 3"],
+    ["at_s = 5, join = 2", "at_s = 6, kill = [10]", "at_s = 7, restart = ['all', 10]"],
+    ["at_s = 5, join = { count = 1, start = { kind = 'box', centre_m = [9, 9, 9] } }"],
+    ["at_s = 5, partition = [[0, 1], [2]]", "at_s = 7, heal = true"],
+    ["at_s = 5, for_s = 1, netem = { loss_percent = 50, multihop = { delay_ms = 9 } }"],
+    [f"at_s = 5, formation = {LINES}", "at_s = 6, kill = ['vertex:V3']"],
+    ["at_s = 5, frame = { yaw_deg = 90, waypoints_m = [[1, 2, 3]] }"],
+]
+
+
+@pytest.mark.parametrize("events", SOUND)
+def test_what_is_sound_reads_back(events: list[str]) -> None:
+    scenario = timeline(*events)
+    assert parse(dump(scenario)) == scenario
+
+
+def test_rows_are_those_at_the_start_and_all_that_join() -> None:
+    assert timeline("at_s = 5, join = 2", "at_s = 1, join = { count = 3 }").rows == 14
+
+
+BROKEN = [
+    (["at_s = 5"], "event[0]", "no action; one of kill, leave"),
+    (["at_s = 5, kill = [1], leave = [2]"], "event[0].leave", "not beside kill"),
+    (["kill = [1]"], "event[0].at_s", "is missing"),
+    (["at_s = -1, kill = [1]"], "event[0].at_s", "from 0"),
+    (["at_s = 20, kill = [1]"], "event[0].at_s", "duration_s = 20"),
+    (["at_s = 5, join = 1, for_s = 2"], "event[0].for_s", "join is not undone"),
+    (["at_s = 5, kill = [9]"], "event[0].kill[0]", "no agent 9; 0 to 8"),
+    (["at_s = 6, join = 1", "at_s = 5, kill = [0, 9]"], "event[1].kill[1]", "no agent 9"),
+    (["at_s = 5, leave = ['vertex:V2']"], "event[0].leave[0]", "no vertex 'V2'"),
+    (["at_s = 5, leave = ['queue:Q9']"], "event[0].leave[0]", "there are Q1, Q2, Q3, Q4"),
+    (["at_s = 5, kill = ['random:0']"], "event[0].kill[0]", "'random:2' or 'all'"),
+    (["at_s = 5, kill = ['vertex:']"], "event[0].kill[0]", "an id, 'vertex:V1'"),
+    (["at_s = 5, restart = ['vertex:V1']"], "event[0].restart[0]", "an id, 'random:2'"),
+    (["at_s = 5, kill = [2.5]"], "event[0].kill[0]", "an id"),
+    (["at_s = 5, kill = []"], "event[0].kill", "1 to 1000"),
+    (["at_s = 5, heal = true"], "event[0].heal", "no partition"),
+    (["at_s = 5, heal = false"], "event[0].heal", "true"),
+    (
+        ["at_s = 5, partition = [[1]], for_s = 2", "at_s = 8, heal = true"],
+        "event[1].heal",
+        "no partition",
+    ),
+    (["at_s = 5, partition = [[0, 1], [1]]"], "event[0].partition[1]", "1 is named twice"),
+    (["at_s = 5, partition = [[9]]"], "event[0].partition[0]", "no agent 9; 0 to 8"),
+    (["at_s = 5, netem = { loss_percent = 101 }"], "event[0].netem.loss_percent", "to 100"),
+    (["at_s = 5, netem = { los_percent = 1 }"], "event[0].netem.los_percent", "did you mean"),
+    (
+        ["at_s = 5, netem = { link = [{ from = 0, to = 9 }] }"],
+        "event[0].netem.link[0].to",
+        "no agent 9",
+    ),
+    (["at_s = 5, formation = 'nope.toml'"], "event[0].formation", "no such file"),
+    (
+        ["at_s = 5, formation = { name = 'x', vertices = {}, queue = [] }"],
+        "event[0].formation.vertices",
+        "",
+    ),
+    ([f"at_s = 5, formation = {PAIR}"], "event[0].formation.queue", "full"),
+    (
+        ["at_s = 5, leave = [0, 1, 2, 'random:4']", f"at_s = 6, formation = {LINES}"],
+        "event[1].formation",
+        "2 agents by then, for 3 vertices",
+    ),
+    (["at_s = 5, frame = {}"], "event[0].frame", "yaw_deg"),
+    (
+        ["at_s = 5, frame = { waypoints_m = [[0, 0, 0], [1, 0, 0]] }"],
+        "event[0].frame.waypoints_m",
+        "one point",
+    ),
+    (["at_s = 5, join = 0"], "event[0].join", "from 1"),
+    (["at_s = 5, join = { coun = 2 }"], "event[0].join.coun", "did you mean 'count'"),
+    (
+        ["at_s = 5, join = { count = 2, start = { kind = 'list', positions_m = [[0, 0, 0]] } }"],
+        "event[0].join.start.positions_m",
+        "1 for 2",
+    ),
+    (
+        ["at_s = 5, join = { count = 2, start = { kind = 'box', spacing_m = 0.1 } }"],
+        "event[0].join.start.spacing_m",
+        "at least",
+    ),
+    (["at_s = 5, join = 992"], "event", "at most 1000"),
+]
+
+
+@pytest.mark.parametrize(("events", "key", "says"), BROKEN)
+def test_the_key_at_fault_is_named(events: list[str], key: str, says: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        timeline(*events)
+    assert str(caught.value).startswith(f"{WEDGE}: {key}")
+    assert says in str(caught.value)
+
+
+def test_more_joiners_than_a_formation_holds_are_refused() -> None:
+    text = f"formation = {PAIR.replace('[3, 0, 0]', '[2, 0, 0]')}\n[fleet]\nagents = 3\n"
+    assert parse(text + "[[event]]\nat_s = 1\nkill = [0]\n").rows == 3
+    with pytest.raises(ScenarioError) as caught:
+        parse(text + "[[event]]\nat_s = 1\njoin = 1\n")
+    assert "event[0].join: 'pair' has no room for them" in str(caught.value)
+
+
+def test_a_listed_start_has_no_places_for_more() -> None:
+    text = f"formation = {PAIR}\n[fleet]\nagents = 2\n[fleet.start]\nkind = 'list'\n"
+    with pytest.raises(ScenarioError) as caught:
+        parse(text + "positions_m = [[0, 0, 0], [1, 0, 0]]\n[[event]]\nat_s = 1\njoin = 1\n")
+    assert "event[0].join.start: is missing" in str(caught.value)
+
+
+def test_a_file_of_a_later_formation_is_named_itself(tmp_path: Path) -> None:
+    formation = tmp_path / "f.toml"
+    formation.write_text("name = 'f'\nvertices = { V1 = [0, 'a', 0] }\nqueue = []\n")
+    with pytest.raises(ScenarioError) as caught:
+        timeline(f"at_s = 5, formation = '{formation}'")
+    assert str(caught.value).startswith(f"{formation}: vertices.V1[1]: ")
