@@ -1,0 +1,203 @@
+"""The timeline in the air: missions, departures, arrivals, partitions; for a few seeds each."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from worldsim.judge.tick import Tick
+from worldsim.judge.verdict import Figures
+from worldsim.run.slots import Event
+from worldsim.run.virtual import Flight, fly
+from worldsim.scenario.file import load
+from worldsim.scenario.tables import Scenario
+
+WEDGE = Path(__file__).parents[2] / "deploy" / "scenarios" / "wedge-9.toml"
+HORIZONTAL = "'../formations/three-horizontal-lines.toml'"
+VERTICAL = "'../formations/three-vertical-lines.toml'"
+BAD = {"netem.loss_percent": "50", "netem.delay_ms": "200"}
+WORST = {"netem.loss_percent": "80", "netem.delay_ms": "500"}
+SEEDS = range(3)
+
+
+class Watcher:
+    """Keeps every tick."""
+
+    def __init__(self) -> None:
+        self.ticks: list[Tick] = []
+
+    def tick(self, tick: Tick, figures: Figures) -> None:
+        self.ticks.append(tick)
+
+    def event(self, event: Event) -> None:
+        """Events are kept by the loop itself."""
+
+
+def scenario(seed: int, duration_s: float, *events: str, **overrides: str) -> Scenario:
+    told = f"[{', '.join(f'{{ {event} }}' for event in events)}]"
+    told_s = str(duration_s)
+    return load(WEDGE, {"seed": str(seed), "duration_s": told_s, "event": told, **overrides})
+
+
+def flown(seed: int, duration_s: float, *events: str, **overrides: str) -> Flight:
+    flight = fly(scenario(seed, duration_s, *events, **overrides))
+    nobody_met(flight)
+    return flight
+
+
+def nobody_met(flight: Flight) -> None:
+    """No collision and no packet unaccounted for, whatever happened."""
+    found = flight.loop.judge.invariants()
+    for name in ("I1", "I8"):
+        assert found[name]["ticks"] == flight.loop.judge.ticks
+        assert found[name]["violations"] == 0
+
+
+def violated(flight: Flight) -> list[str]:
+    found = flight.loop.judge.invariants()
+    assert {"I2", "I3", "I4", "I6", "I7"} <= set(found)
+    return [name for name, counts in found.items() if counts["violations"]]
+
+
+def kinds(flight: Flight, *wanted: str) -> list[tuple[float, str, int | None]]:
+    events = flight.loop.events
+    return [(e["t_s"], e["kind"], e["agent"]) for e in events if e["kind"] in wanted]
+
+
+def reformed_s(flight: Flight) -> list[float]:
+    took = [recovery.reformed_s for recovery in flight.loop.judge.recoveries]
+    assert None not in took
+    return [each for each in took if each is not None]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_six_agents_switch_between_three_formations(seed: int) -> None:
+    flight = flown(
+        seed,
+        60,
+        f"at_s = 20, formation = {HORIZONTAL}",
+        f"at_s = 40, formation = {VERTICAL}",
+        **{"fleet.agents": "6"},
+    )
+    phases = flight.loop.judge.phases
+    assert [(phase.formation.name, phase.from_s) for phase in phases] == [
+        ("pyramidal-wedge", 0.0),
+        ("three-horizontal-lines", 20.0),
+        ("three-vertical-lines", 40.0),
+    ]
+    assert all(phase.converge_s is not None and phase.converge_s <= 8.0 for phase in phases)
+    assert all(phase.residual_m is not None and phase.residual_m < 0.01 for phase in phases)
+    assert violated(flight) == []
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_frame_turned_by_90_degrees_takes_the_team_along(seed: int) -> None:
+    flight = flown(seed, 40, "at_s = 15, frame = { yaw_deg = 90, waypoints_m = [[1, 0, 0.5]] }")
+    before, after = flight.loop.judge.phases
+    assert before.formation.name == after.formation.name
+    assert after.converge_s is not None
+    assert after.converge_s <= 10.0
+    apex = flight.loop.world.fleet.position - np.array([1.0, 0.0, 0.5])
+    assert np.min(np.linalg.norm(apex, axis=1)) < 0.01
+    assert violated(flight) == []
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("radio", [{}, BAD], ids=["clean", "half lost"])
+def test_the_apex_leaves_and_has_a_successor(seed: int, radio: dict[str, str]) -> None:
+    flight = flown(seed, 60, "at_s = 15, leave = ['vertex:V1']", **radio)
+    ((t_s, _, gone),) = kinds(flight, "leave")
+    assert t_s == 15.0
+    assert max(reformed_s(flight)) <= 10.0
+    assert violated(flight) == []
+    assert np.isnan(flight.loop.world.fleet.position[gone]).all()
+    assert flight.verdicts.fates["dropped_medium"] > 0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_nobody_meets_where_four_of_five_frames_are_lost(seed: int) -> None:
+    assert flown(seed, 50, "at_s = 15, leave = ['vertex:V1']", **WORST).loop.judge.ticks == 1001
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_apex_dies_and_hovers_in_its_slot(seed: int) -> None:
+    flight = flown(seed, 45, "at_s = 15, kill = ['vertex:V1']")
+    ((_, _, dead),) = kinds(flight, "kill")
+    assert dead is not None
+    assert np.linalg.norm(flight.loop.world.fleet.position[dead]) < 0.12
+    assert max(reformed_s(flight)) <= 15.0
+    assert violated(flight) == []
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_team_grows_and_shrinks(seed: int) -> None:
+    flight = flown(seed, 70, "at_s = 15, join = 3", "at_s = 40, leave = ['random:4']")
+    assert [agent for _, _, agent in kinds(flight, "join")] == [9, 10, 11]
+    assert [len(each.agents) for each in flight.loop.judge.recoveries] == [3, 4]
+    assert None not in [each.reformed_s for each in flight.loop.judge.recoveries]
+    assert violated(flight) == []
+
+
+@pytest.mark.parametrize("loss", ["0", "20"])
+def test_a_partition_cuts_and_a_heal_joins(loss: str) -> None:
+    events = ["at_s = 15, for_s = 20, partition = [[0, 1, 2, 3]]"]
+    flight = flown(1, 60, *events, **{"netem.loss_percent": loss})
+    assert kinds(flight, "partition", "heal") == [(15.0, "partition", None), (35.0, "heal", None)]
+    assert flight.verdicts.fates["dropped_partition"] > 5000
+    heard = {agent: flight.loop.world.latest[agent].telemetry.heard for agent in range(9)}  # type: ignore[union-attr]
+    assert any(other >= 4 for agent in range(4) for other in heard[agent])
+
+
+def test_conditions_change_for_a_while() -> None:
+    flight = flown(1, 20, "at_s = 5, for_s = 5, netem = { loss_percent = 100 }")
+    lost = flight.verdicts.fates["dropped_loss"]
+    sent_a_second = flight.verdicts.addressed / 20.0
+    assert 0.9 * 5.0 * sent_a_second < lost < 1.1 * 5.0 * sent_a_second
+    assert len(kinds(flight, "netem")) == 2
+
+
+def test_rows_are_empty_before_a_join_and_a_body_waits_for_its_first_step() -> None:
+    watcher = Watcher()
+    fly(scenario(1, 12, "at_s = 5, join = 1", "at_s = 9, leave = [9]"), watcher)
+    there = {tick.time_s: not np.isnan(tick.position[9, 0]) for tick in watcher.ticks}
+    alive = {tick.time_s: bool(tick.alive[9]) for tick in watcher.ticks}
+    assert [t_s for t_s in there if there[t_s]] == [t_s for t_s in there if 5.0 <= t_s < 9.0]
+    assert [t_s for t_s in alive if alive[t_s]] == [t_s for t_s in alive if 6.0 <= t_s < 9.0]
+    still = [tick.position[9] for tick in watcher.ticks if 5.0 <= tick.time_s <= 6.0]
+    assert np.ptp(still, axis=0).max() == 0.0
+
+
+def test_the_dead_come_back_with_a_higher_incarnation() -> None:
+    flight = flown(1, 30, "at_s = 15, for_s = 3, kill = ['all']")
+    assert [t_s for t_s, _, _ in kinds(flight, "kill")] == [15.0] * 9
+    assert [t_s for t_s, _, _ in kinds(flight, "restart")] == [18.0] * 9
+    assert {command.incarnation for command in flight.loop.world.latest if command} == {1}
+
+
+def test_an_order_outlives_the_agent_that_it_was_for() -> None:
+    flight = flown(
+        1,
+        30,
+        f"at_s = 15, formation = {HORIZONTAL}",
+        "at_s = 15, kill = [0]",
+        "at_s = 15, leave = [1]",
+    )
+    living = [flight.loop.world.latest[agent] for agent in range(2, 9)]
+    assert {command.telemetry.mission for command in living if command} == {65536}
+
+
+def test_the_same_seed_has_the_same_faults_and_the_same_trace() -> None:
+    events = (
+        "at_s = 3, kill = ['random:2']",
+        "at_s = 4, join = 2",
+        "at_s = 5, leave = ['random:1']",
+    )
+    first, again, other = (
+        fly(scenario(seed, 9, *events, **{"netem.loss_percent": "20"})) for seed in (3, 3, 4)
+    )
+    assert first.loop.trace.sha256 == again.loop.trace.sha256
+    assert first.loop.events == again.loop.events
+    assert first.loop.trace.sha256 != other.loop.trace.sha256
+    struck = [kinds(flight, "kill", "join", "leave") for flight in (first, other)]
+    assert len(struck[0]) == 5
+    assert struck[0] != struck[1]
