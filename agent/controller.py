@@ -46,13 +46,14 @@ class Heard(NamedTuple):
 class Peer(NamedTuple):
     """A member of the team as far as known, oneself included; told directly or passed on.
 
-    position [m; world frame]: where it last said it was; direct: whether to oneself, or passed on.
+    position [m; world frame]: where it last said it was; cost_m: how far from its place it was when
+    it first claimed it, as it says.
     """
 
     id: int
     position: Vector
     place: Place | None
-    direct: bool = True
+    cost_m: float | None = None
 
 
 class Flown(NamedTuple):
@@ -90,7 +91,8 @@ class Intent(NamedTuple):
     wanted [m/s; world frame]: the velocity it would like, whatever its heading; velocity: what it
     asks for now, given that a vehicle may have to turn first; yaw [rad]: the heading it asks for;
     force: |u_i| of (28) before saturation; heading_for: its immediate target q_tg [m];
-    target: its target-on-queue [m] and ``place`` its place in the formation, if it has any; tilt:
+    target: its target-on-queue [m] and ``place`` its place in the formation, if it has any; cost_m:
+    how far it was from there when it first claimed it, which decides a contest; tilt:
     pitch and roll it asks for [rad]; vertex: whether it is a queue-vertex agent there; blocked: the
     places that it sees taken by a silent body.
     """
@@ -103,6 +105,7 @@ class Intent(NamedTuple):
     target: Vector | None = None
     place: Place | None = None
     tilt: tuple[float, float] = (0.0, 0.0)
+    cost_m: float = 0.0
     vertex: bool = False
     blocked: tuple[Place, ...] = ()
 

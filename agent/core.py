@@ -32,6 +32,7 @@ from agent.messages import (
 from agent.pilot import Pilot
 from agent.setup import AgentSetup
 
+MAX_COST_MM = 2**31 - 1
 TIDY_S = 0.2
 """How often those who fell silent are looked for."""
 MAX_TOLD = 256
@@ -125,6 +126,7 @@ class Agent:
             missions.pose,
             self._standing,
             intent.blocked,
+            min(round(1000.0 * intent.cost_m), MAX_COST_MM),
         )
 
     def _obey(self, mission: Mission) -> None:
@@ -157,7 +159,8 @@ class Agent:
             self._tidy_at_s = now_s + TIDY_S
             self._tidy(observation)
         place = self._intent.place if self._intent is not None else None
-        own = Peer(self.id, observation.position, place)
+        cost_m = self._intent.cost_m if self._intent is not None else None
+        own = Peer(self.id, observation.position, place, cost_m)
         return Senses(
             now_s,
             observation.position,

@@ -21,6 +21,7 @@ AgentId = Annotated[int, Meta(ge=0, lt=2**16)]
 Index = Annotated[int, Meta(ge=-1, lt=2**15)]
 
 Position = tuple[Metres, Metres, Metres]
+Cost = Annotated[int, Meta(ge=0, lt=2**31)]
 Places = Annotated[tuple[tuple[Index, Index], ...], Meta(max_length=8)]
 Velocity = tuple[Speed, Speed, Speed]
 
@@ -126,7 +127,8 @@ class Beacon(Message, frozen=True):
     """The local channel's broadcast (E22): heard directly, never forwarded.
 
     stamp_s: the sender's Observation time. target: where it is heading right now, q_tg of the
-    paper, which the potential of (22) needs. queue, rank: the place it claims, -1 for none.
+    paper, which the potential of (22) needs. queue, rank: the place it claims, -1 for none;
+    cost_mm: how far from there it was when it first claimed it, by which a contest is decided.
     speed_cap: it promises to stay below this speed for the next 3 s [m/s].
     echoes: for each neighbour the last sequence heard of it.
     mission: the key of the one it flies; frame: where the target's frame stands, by the mission of
@@ -144,6 +146,7 @@ class Beacon(Message, frozen=True):
     target: Position
     queue: Index
     rank: Index
+    cost_mm: Cost
     speed_cap: Annotated[float, Meta(ge=0, le=100)]
     echoes: Annotated[tuple[tuple[AgentId, Count], ...], Meta(max_length=128)]
     mission: Count
@@ -159,8 +162,9 @@ class Record(Message, frozen=True):
     """What one agent last said of itself, passed on over the multihop channel (E24).
 
     Only its subject writes it; ``version`` grows with each writing. stamp_s is the subject's
-    Observation time at the writing. queue, rank: the place it claims, -1 for none; mission: the
-    mission in which that is a place. blocked: places that it sees taken by a silent body (E18).
+    Observation time at the writing. queue, rank, cost_mm: the place it claims, as in Beacon;
+    mission: the mission in which that is a place. blocked: places that it sees taken by a silent
+    body (E18).
     """
 
     id: AgentId
@@ -170,6 +174,7 @@ class Record(Message, frozen=True):
     position: Position
     queue: Index
     rank: Index
+    cost_mm: Cost
     mission: Count
     blocked: Places
 

@@ -98,8 +98,9 @@ def _undisputed(
 ) -> list[int | None]:
     """Return each row's claim, with at most one row to a column.
 
-    The nearer keeps a claim, if by more than noise, else the lower id. What was passed on is old,
-    and each of two in flight would find itself the nearer: there the lower id keeps it.
+    The nearer keeps a claim, if by more than noise, else the lower id. How near is what each says
+    of the moment it claimed: what is known of the other's present position is old, and each of
+    two in flight would find itself the nearer.
     """
     holder: dict[int, int] = {}
     kept: list[int | None] = [None] * len(team)
@@ -109,13 +110,17 @@ def _undisputed(
             continue
         rival = holder.get(column)
         if rival is not None:
-            nearer = sqrt(squares[row][column]) < sqrt(squares[rival][column]) - CONFLICT_M
-            if not (nearer and peer.direct and team[rival].direct):
+            theirs = _cost_m(team[rival], squares[rival][column])
+            if _cost_m(peer, squares[row][column]) >= theirs - CONFLICT_M:
                 continue
             kept[rival] = None
         holder[column] = row
         kept[row] = column
     return kept
+
+
+def _cost_m(peer: Peer, square: float) -> float:
+    return sqrt(square) if peer.cost_m is None else peer.cost_m
 
 
 def _filled(claims: list[int | None], squares: list[list[float]]) -> list[int]:

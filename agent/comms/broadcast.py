@@ -16,8 +16,8 @@ LOCAL, MULTIHOP = 0, 1
 """Channels of the radio."""
 MEMORY = 200
 """So many of the own beacons are remembered, for the echoes that may come."""
-MAX_ECHOES = 72
-"""So many fit beside the greatest numbers that a Beacon may hold: 260 B and 13 B for each echo."""
+MAX_ECHOES = 71
+"""So many fit beside the greatest numbers that a Beacon may hold: 265 B and 13 B for each echo."""
 
 
 class OwnState(NamedTuple):
@@ -33,11 +33,12 @@ class OwnState(NamedTuple):
     frame: Pose = HOME
     standing: Standing = ALONE
     blocked: tuple[Place, ...] = ()
+    cost_mm: int = 0
 
     @property
-    def claim(self) -> tuple[int, int]:
-        """Queue and rank claimed, -1 for none."""
-        return self.place if self.place is not None else (-1, -1)
+    def claim(self) -> tuple[int, int, int]:
+        """Queue and rank claimed, -1 for none, and the claim's cost [mm]."""
+        return (*self.place, self.cost_mm) if self.place is not None else (-1, -1, 0)
 
 
 class Broadcast:

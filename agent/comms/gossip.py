@@ -83,7 +83,7 @@ class Table:
         for who, newest in self._newest.items():
             placed = newest.queue >= 0 and newest.mission == mission
             place = Place(newest.queue, newest.rank) if placed else None
-            peers.append(Peer(who, newest.position, place, isinstance(newest, Beacon)))
+            peers.append(Peer(who, newest.position, place, newest.cost_mm / 1000.0))
         peers.sort()
         return tuple(peers)
 
@@ -136,6 +136,7 @@ def _record(newest: Beacon | Record) -> Record:
         newest.position,
         newest.queue,
         newest.rank,
+        newest.cost_mm,
         newest.mission,
         newest.blocked,
     )

@@ -42,6 +42,7 @@ class QStructure:
         self._targets = TargetOnQueue(setup.id, control.spacing_m)
         self._dodge = Dodge(setup.id)
         self._mine: OwnTarget | None = None
+        self._cost_m = 0.0
         self._blocked: tuple[Place, ...] = ()
         self._chosen_for = -1
         self._choose_at_s = -1.0
@@ -69,6 +70,7 @@ class QStructure:
             target=q_toq if mine is not None else None,
             place=mine.place if mine is not None else None,
             tilt=tilt,
+            cost_m=self._cost_m,
             vertex=mine is not None and mine.vertex,
             blocked=self._blocked,
         )
@@ -86,10 +88,14 @@ class QStructure:
     def _choose(self, senses: Senses) -> None:
         """Choose the own place anew: at 5 Hz (Algorithm 1), and at once in a new mission."""
         mission = senses.mission
-        if senses.now_s >= self._choose_at_s or mission.key != self._chosen_for:
+        new = mission.key != self._chosen_for
+        if senses.now_s >= self._choose_at_s or new:
             self._choose_at_s = senses.now_s + 1.0 / CHOICE_HZ - 1e-9
             self._chosen_for = mission.key
             team = senses.team()
             self._blocked = self._targets.blocked(mission, len(team), senses.silent)
             blocked = senses.blocked.union(self._blocked)
+            before = self._mine.place if self._mine is not None else None
             self._mine = self._targets.choose(mission, team, blocked)
+            if self._mine is not None and (before != self._mine.place or new):
+                self._cost_m = dist(senses.position, mission.frame.to_world(self._mine.slot.point))

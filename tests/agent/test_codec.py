@@ -35,7 +35,7 @@ MANY = 15_000
 VECTOR = (1.0, -2.5, 0.25)
 POSE = Pose(1.0, 2.0, 3.0, 0.5)
 TELEMETRY = Telemetry(VECTOR, 1.0, VECTOR, (1, 2), (3, 4), 5, 6, 1, 3, 0)
-RECORD = Record(4, 0, 77, 1.25, VECTOR, -1, -1, 7, ((0, 0),))
+RECORD = Record(4, 0, 77, 1.25, VECTOR, -1, -1, 0, 7, ((0, 0),))
 GOOD = {
     Observation: Observation(
         7, 1.5, VECTOR, VECTOR, 0.5, (VECTOR, VECTOR), (Mission(0, POSE, b""),)
@@ -59,6 +59,7 @@ GOOD = {
         VECTOR,
         1,
         2,
+        850,
         0.5,
         ((1, 900), (2, 901)),
         7,
@@ -72,7 +73,7 @@ GOOD = {
     Gossip: Gossip(
         3,
         1.5,
-        (Record(4, 0, 77, 1.25, VECTOR, -1, -1, 7, ((0, 0),)),) * 3,
+        (RECORD,) * 3,
         Piece(7, POSE, 0, 1, b"x"),
     ),
 }
@@ -101,6 +102,7 @@ speeds = st.floats(-100.0, 100.0)
 velocities = st.tuples(speeds, speeds, speeds)
 angles = st.floats(-100.0, 100.0)
 parents = st.integers(-1, 2**16 - 1)
+costs = st.integers(0, 2**31 - 1)
 poses = st.builds(Pose, metres, metres, metres, angles)
 blocked = st.lists(st.tuples(indices, indices), max_size=8).map(tuple)
 missions = st.builds(Mission, counts, poses, st.binary(max_size=900))
@@ -108,7 +110,7 @@ pieces = st.builds(
     Piece, counts, poses, st.integers(0, 15), st.integers(1, 16), st.binary(max_size=900)
 )
 records = st.builds(
-    Record, ids, counts, counts, seconds, positions, indices, indices, counts, blocked
+    Record, ids, counts, counts, seconds, positions, indices, indices, costs, counts, blocked
 )
 telemetries = st.builds(
     Telemetry,
@@ -148,6 +150,7 @@ messages = st.one_of(
         positions,
         indices,
         indices,
+        costs,
         st.floats(0.0, 100.0),
         st.lists(st.tuples(ids, counts), max_size=20).map(tuple),
         counts,

@@ -141,9 +141,8 @@ def test_a_neighbour_may_say_it_is_anywhere(at, sensors):
     core = agent(sensors=sensors)
     for tick in range(60):
         now_s = tick * TICK_S
-        odd = Beacon(
-            1, 0, tick, now_s, at, (100.0,) * 3, at, 2**15 - 1, 2**15 - 1, 100.0, (), *UNLED
-        )
+        claim = (2**15 - 1, 2**15 - 1, 2**31 - 1)
+        odd = Beacon(1, 0, tick, now_s, at, (100.0,) * 3, at, *claim, 100.0, (), *UNLED)
         hear(core, odd, now_s)
         airworthy(core.step(seen(tick, vehicles=[ORIGIN] if sensors else ())), tick)
     assert core.rejected.total() == 0

@@ -72,7 +72,7 @@ def what_was_heard_bounds_what_is() -> None:
             clock, now = fleet.loop.world.clock, track[-1]
             if (len(track) - 1) % clock.slots_per_tick:
                 continue
-            for i, agent in enumerate(fleet._agents):
+            for i, agent in fleet._agents.items():
                 for beacon in agent._neighbours.beacons():
                     then = track[round(beacon.stamp_s * clock.slot_hz)]
                     age_s = clock.time_s(len(track) - 1) - beacon.stamp_s

@@ -14,20 +14,21 @@ UNLED = (0, 0, HOME, -1, -1, 0, ())
 
 def beacon(who, sequence, stamp_s, *, incarnation=0, at=ORIGIN, velocity=AT_REST, echoes=()):
     """Return a beacon of an agent at rest at the origin that claims no place."""
-    told = (at, velocity, ORIGIN, -1, -1, 0.5, tuple(echoes), *UNLED)
+    told = (at, velocity, ORIGIN, -1, -1, 0, 0.5, tuple(echoes), *UNLED)
     return Beacon(who, incarnation, sequence, stamp_s, *told)
 
 
 def record(who, version, stamp_s=0.0, *, incarnation=0, at=ORIGIN, queue=-1, rank=-1):
     """Return a record of an agent at the origin that claims no place."""
-    return Record(who, incarnation, version, stamp_s, at, queue, rank, 0, ())
+    return Record(who, incarnation, version, stamp_s, at, queue, rank, 0, 0, ())
 
 
 def greatest_record(who):
     """Return a record whose numbers take as many bytes as numbers of their type can."""
     at = (FAR, FAR, FAR)
     blocked = (Place(2**15 - 1, 2**15 - 1),) * 8
-    return Record(who, GREATEST, GREATEST, LATE_S, at, 2**15 - 1, 2**15 - 1, GREATEST, blocked)
+    claim = (2**15 - 1, 2**15 - 1, 2**31 - 1)
+    return Record(who, GREATEST, GREATEST, LATE_S, at, *claim, GREATEST, blocked)
 
 
 def peer(who, at=ORIGIN, place=None):
