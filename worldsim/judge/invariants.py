@@ -31,15 +31,15 @@ Claims = list[tuple[int, int]]
 
 @dataclass(slots=True)
 class Tally:
-    """How often an invariant was looked at, and how often it did not hold."""
+    """At how many ticks an invariant was looked at, and at how many it did not hold."""
 
     ticks: int = 0
     violations: int = 0
 
-    def count(self, violations: int = 0) -> None:
-        """Count a tick, and what was broken at it."""
+    def count(self, broken: int) -> None:
+        """Count a tick, and whether anything was broken at it."""
         self.ticks += 1
-        self.violations += violations
+        self.violations += broken > 0
 
 
 class Invariants:
