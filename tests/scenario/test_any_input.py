@@ -21,9 +21,11 @@ EVERYTHING = load(
         "netem.link": "[{ from = 2, to = 5, loss_percent = 90 }]",
         "netem.multihop.loss_percent": "20",
         "control.cast_far_m": "0.5",
-        "event": "[{ at_s = 1, kill = [2, 'random:1'], for_s = 2 }, { at_s = 2, join = { count = 2 } },"
+        "event": "[{ at_s = 1, kill = [2, 'random:1'], for_s = 2 },"
+        " { at_s = 2, join = { count = 2 } },"
         " { at_s = 3, partition = [[0, 1]] }, { at_s = 4, heal = true },"
-        " { at_s = 5, netem = { multihop = { delay_ms = 9 } } }, { at_s = 6, frame = { yaw_deg = 9 } },"
+        " { at_s = 5, netem = { multihop = { delay_ms = 9 } } },"
+        " { at_s = 6, frame = { yaw_deg = 9 } },"
         " { at_s = 7, formation = '../formations/three-horizontal-lines.toml' }]",
     },
 )

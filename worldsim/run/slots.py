@@ -7,8 +7,8 @@ of a slot, brings the observations to the agents and their commands back to ``ob
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from math import atan2, degrees, hypot, nan, pi
-from typing import Any, NamedTuple, Protocol
+from math import nan
+from typing import Any, Protocol
 
 import msgspec
 import numpy as np
@@ -30,30 +30,18 @@ from worldsim.run.faults import (
 )
 from worldsim.run.orders import Orders
 from worldsim.run.team import Begin, Start, Stop, Team
+from worldsim.run.told import UNTOLD, Told, told_by
 from worldsim.run.trace import Trace
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 from worldsim.truth.sensor import ProximitySensor
 from worldsim.truth.start import starts
 from worldsim.truth.world import Clock, World
 
-MOVING_MPS = 0.02
 Event = dict[str, Any]
 Deed = Stop | Start | Begin | Change | Partition | Heal | Order
 """What a clock carries out between slots."""
 
 
-class Told(NamedTuple):
-    """What an agent last told of its reasons, as a row of a tick; see Telemetry and Tick."""
-
-    target: Vector
-    place: tuple[int, int]
-    force: float
-    turn_deg: float
-    heard: tuple[int, ...]
-    mission: int
-
-
-UNTOLD = Told((nan, nan, nan), (-1, -1), nan, nan, (), 0)
 NO_LINKS: NDArray[np.int32] = np.zeros((0, 2), dtype=np.int32)
 
 
@@ -178,14 +166,7 @@ class SlotLoop:
         if self.world.obey(agent, command):
             self.trace.command(agent, encoded)
             told = command.telemetry
-            self._told[agent] = Told(
-                told.target or UNTOLD.target,
-                told.place or UNTOLD.place,
-                told.force,
-                _turn_deg(told.wanted, self._headings[agent]),
-                told.heard,
-                told.mission,
-            )
+            self._told[agent] = told_by(told, self._headings[agent])
             self._orders.heard(told.mission)
             self._watch_place(agent, told.place)
 
@@ -306,11 +287,3 @@ class SlotLoop:
     def _links(told: list[Told]) -> NDArray[np.int32]:
         pairs = [(row, other) for row, each in enumerate(told) for other in each.heard]
         return np.array(pairs, dtype=np.int32).reshape(-1, 2)
-
-
-def _turn_deg(wanted: Vector, heading: float) -> float:
-    """Return the wanted turn [deg] in (-180, 180]; NaN for a step too slow to have an azimuth."""
-    if hypot(wanted[0], wanted[1]) <= MOVING_MPS:
-        return float("nan")
-    turn = atan2(wanted[1], wanted[0]) - heading
-    return degrees(turn - 2.0 * pi * round(turn / (2.0 * pi)))
