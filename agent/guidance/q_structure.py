@@ -20,6 +20,7 @@ GAIN = 2.0
 """c of (28) [1/s]."""
 CHOICE_HZ = 5.0
 CAST_FAR_M = 0.5
+LISTEN_S = 0.4
 AT_SLOT_M = 0.02
 """So near its slot an agent takes up the queue's orientation."""
 
@@ -43,6 +44,7 @@ class QStructure:
         self._dodge = Dodge(setup.id)
         self._mine: OwnTarget | None = None
         self._cost_m = 0.0
+        self._listening, self._known, self._new_at_s = True, 0, 0.0
         self._blocked: tuple[Place, ...] = ()
         self._chosen_for = -1
         self._choose_at_s = -1.0
@@ -90,12 +92,26 @@ class QStructure:
         mission = senses.mission
         new = mission.key != self._chosen_for
         if senses.now_s >= self._choose_at_s or new:
+            team = senses.team()
+            if self._listens(senses.now_s, len(team)):
+                return
             self._choose_at_s = senses.now_s + 1.0 / CHOICE_HZ - 1e-9
             self._chosen_for = mission.key
-            team = senses.team()
             self._blocked = self._targets.blocked(mission, len(team), senses.silent)
             blocked = senses.blocked.union(self._blocked)
             before = self._mine.place if self._mine is not None else None
             self._mine = self._targets.choose(mission, team, blocked)
             if self._mine is not None and (before != self._mine.place or new):
                 self._cost_m = dist(senses.position, mission.frame.to_world(self._mine.slot.point))
+
+    def _listens(self, now_s: float, known: int) -> bool:
+        """Whether an agent that just began still hears of members it did not know.
+
+        Until nobody new turns up it claims nothing (E24): a claim made knowing nobody is a vertex.
+        """
+        if not self._listening:
+            return False
+        if known > self._known:
+            self._known, self._new_at_s = known, now_s
+        self._listening = now_s - self._new_at_s < LISTEN_S - 1e-6
+        return self._listening

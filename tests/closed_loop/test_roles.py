@@ -61,7 +61,7 @@ def test_remark_5_a_line_whose_radio_reaches_the_next_only():
 def test_fig_4_five_agents_on_one_queue():
     """r1 is heard by r2 and r3, r4 by r3, r5 by r4: r3 and r4 are sub-vertices of tiers 1 and 2."""
     fleet = line((0.0, 0.9, 1.8, 3.2, 4.6), 1.9)
-    fly(fleet, 1.0)
+    fly(fleet, 1.5)
     assert [(each.tier, each.parent, each.role) for each in told(fleet)] == [
         (0, -1, VERTEX),
         (1, 0, MEMBER),
@@ -71,14 +71,13 @@ def test_fig_4_five_agents_on_one_queue():
     ]
 
 
-def test_a_tail_that_hears_nobody_is_in_distress():
+def test_who_hears_nobody_makes_for_the_vertex():
     fleet = line((0.0, 1.0, 30.0), 2.5)
-    fly(fleet, 0.5)
-    assert [each.role for each in told(fleet)][:2] == [VERTEX, MEMBER]
-    alone = told(fleet)[2]
-    assert alone.role == VERTEX, "alone in its world, it makes for the vertex"
-    assert alone.target == (0.0, 0.0, 0.0)
-    assert DISTRESS not in (alone.role,)
+    fly(fleet, 0.3)
+    assert [each.role for each in told(fleet)] == [DISTRESS] * 3, "they listen first"
+    fly(fleet, 1.2)
+    assert [each.role for each in told(fleet)] == [VERTEX, MEMBER, VERTEX]
+    assert told(fleet)[2].target == (0.0, 0.0, 0.0), "in its own world it is the vertex agent"
 
 
 def wedge_without(place, seed, **overrides):

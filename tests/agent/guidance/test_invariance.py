@@ -76,7 +76,9 @@ def decided(controller, seed, move=STAY, names=tuple(range(TEAM))):
         lambda: team,
         Flown(0, formation, Frame(move.shift, move.yaw)),
     )
-    return load(controller)(setup(names[0])).decide(senses)
+    mind = load(controller)(setup(names[0]))
+    mind.decide(senses._replace(now_s=0.0))  # it listens first
+    return mind.decide(senses)
 
 
 def setup(own_id):
