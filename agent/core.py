@@ -82,7 +82,7 @@ class Agent:
         self._missions = Missions(setup.id, setup.formation, setup.control.spacing_m)
         self._hierarchy = Hierarchy(setup.id)
         self._standing = ALONE
-        self._bodies = SilentBodies()
+        self._bodies = SilentBodies(setup.fleet_max_speed_mps)
         self._silent: tuple[Vector, ...] = ()
         self._blocked: frozenset[Place] = frozenset()
         self._intent: Intent | None = None
@@ -179,8 +179,8 @@ class Agent:
         now_s = observation.time_s
         self._table.forget_silent(now_s, self._neighbours.forget_silent(now_s))
         heard = [beacon.position for beacon in self._neighbours.beacons()]
-        here, told = observation.position, self._table.positions()
-        self._silent = self._bodies.look(now_s, here, observation.vehicles, heard, told)
+        here, team = observation.position, self._table.members(now_s)
+        self._silent = self._bodies.look(now_s, here, observation.vehicles, heard, team)
         self._lagging = self._neighbours.behind(self._missions.flown.key)
         self._blocked = self._table.blocked(self._missions.flown.key)
         vertex = self._intent is not None and self._intent.vertex

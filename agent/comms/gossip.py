@@ -8,8 +8,9 @@ version of a record is its subject's beacon sequence, so a beacon heard directly
 from collections.abc import Iterator, Sequence
 
 from agent.codec import encode
+from agent.comms.silent import Member
 from agent.controller import Peer
-from agent.messages import Beacon, Gossip, Piece, Place, Record, Vector
+from agent.messages import Beacon, Gossip, Piece, Place, Record
 
 RELAYED_SILENCE_ROUNDS = 12
 """T_d = (2 D + 10) / (1 - loss) rounds: what of it is the same at any distance. The rest, for D
@@ -87,9 +88,12 @@ class Table:
         peers.sort()
         return tuple(peers)
 
-    def positions(self) -> list[Vector]:
-        """Return where each member last said it was [m; world frame]."""
-        return [newest.position for newest in self._newest.values()]
+    def members(self, now_s: float) -> list[Member]:
+        """Return where each member last said it was, and how long ago."""
+        return [
+            Member(newest.position, max(0.0, now_s - newest.stamp_s))
+            for newest in self._newest.values()
+        ]
 
     def blocked(self, mission: int) -> frozenset[Place]:
         """Return the places that others see taken by a silent body (E18)."""

@@ -5,23 +5,48 @@ there takes it for what it is, and remembers it while out of the sensor's range.
 farther than a radio hears: a body is silent only if others as far away are heard.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from math import dist
+from typing import NamedTuple
 
 from agent.messages import Vector
 
 SAME_BODY_M = 0.2
 NEIGHBOUR_M = 0.4
 SILENCE_S = 1.5
+MEMORY_S = 10.0
+"""So long a body is remembered out of sight; whoever comes near will see it again."""
 SURE_RANGE_M = 1.8
 """Nearer than this a body would be sensed if it were still there."""
 
 
-class SilentBodies:
-    """The silent bodies that one agent knows of."""
+class _Body(NamedTuple):
+    """A body without a name: where it stands [m; world frame], since when, and when last seen."""
 
-    def __init__(self) -> None:
-        self._since: list[tuple[Vector, float]] = []
+    position: Vector
+    since_s: float
+    seen_s: float
+
+    def seen_again(self, now_s: float, sensed: Sequence[Vector]) -> _Body:
+        near = any(dist(self.position, each) < SAME_BODY_M for each in sensed)
+        return self._replace(seen_s=now_s) if near else self
+
+
+class Member(NamedTuple):
+    """A member of the team as last told of: where it was [m; world frame], and how long ago [s]."""
+
+    position: Vector
+    age_s: float
+
+
+class SilentBodies:
+    """The silent bodies that one agent knows of. max_speed: the fastest vehicle's limit [m/s]."""
+
+    def __init__(self, max_speed: float) -> None:
+        self._max_speed = max_speed
+        self._bodies: list[_Body] = []
 
     def look(
         self,
@@ -29,33 +54,46 @@ class SilentBodies:
         position: Vector,
         sensed: Sequence[Vector],
         heard: Sequence[Vector],
-        told: Sequence[Vector],
+        team: Sequence[Member],
     ) -> tuple[Vector, ...]:
         """Return where silent bodies stand [m; world frame].
 
-        sensed: bodies relative to ``position`` [m; world axes]; heard, told: where members of the
-        team are, by their own words and by what others pass on [m; world frame].
+        sensed: bodies relative to ``position`` [m; world axes]; heard: where those are who are
+        heard directly [m; world frame]; team: all members known.
         """
         reach = max((dist(position, other) for other in heard), default=0.0)
         unknown = [
             body
             for body in _in_world(position, sensed)
-            if dist(position, body) <= reach + SAME_BODY_M
-            and all(dist(body, other) >= NEIGHBOUR_M for other in (*heard, *told))
+            if dist(position, body) <= reach + SAME_BODY_M and not self._explained(body, team)
         ]
         kept = [
-            (body, since_s)
-            for body, since_s in self._since
-            if any(dist(body, seen) < SAME_BODY_M for seen in unknown)
-            or dist(body, position) > SURE_RANGE_M
+            body
+            for body in (each.seen_again(now_s, unknown) for each in self._bodies)
+            if body.seen_s == now_s or self._remembered(body, now_s, position, team)
         ]
         new = [
-            (seen, now_s)
+            _Body(seen, now_s, now_s)
             for seen in unknown
-            if all(dist(body, seen) >= SAME_BODY_M for body, _ in kept)
+            if all(dist(body.position, seen) >= SAME_BODY_M for body in kept)
         ]
-        self._since = kept + new
-        return tuple(body for body, since_s in self._since if now_s - since_s >= SILENCE_S)
+        self._bodies = kept + new
+        return tuple(body.position for body in kept if now_s - body.since_s >= SILENCE_S)
+
+    def _remembered(
+        self, body: _Body, now_s: float, position: Vector, team: Sequence[Member]
+    ) -> bool:
+        """Whether a body that is not sensed now may still be there."""
+        out_of_sight = dist(body.position, position) > SURE_RANGE_M
+        recent = now_s - body.seen_s <= MEMORY_S
+        return out_of_sight and recent and not self._explained(body.position, team)
+
+    def _explained(self, body: Vector, team: Sequence[Member]) -> bool:
+        """Whether a member may be there by now: told of long ago, it may have moved on."""
+        return any(
+            dist(body, member.position) < NEIGHBOUR_M + self._max_speed * member.age_s
+            for member in team
+        )
 
 
 def _in_world(position: Vector, sensed: Sequence[Vector]) -> list[Vector]:

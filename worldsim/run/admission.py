@@ -20,9 +20,21 @@ PROCESS_COMMAND_TICKS = 2
 
 def admit(scenario: Scenario, file: str | Path, command_ticks: int) -> None:
     """Raise ScenarioError if a scenario cannot be flown where a command lives that long."""
-    broken = too_fast(scenario, command_ticks) or _controller(scenario) or _room(scenario)
+    broken = (
+        too_fast(scenario, command_ticks)
+        or _events(scenario, command_ticks)
+        or _controller(scenario)
+        or _room(scenario)
+    )
     if broken is not None:
         raise ScenarioError(file, *broken)
+
+
+def _events(scenario: Scenario, command_ticks: int) -> Finding | None:
+    """Say which event a fleet of processes cannot meet yet."""
+    if command_ticks == VIRTUAL_COMMAND_TICKS or not scenario.event:
+        return None
+    return Finding("event[0]", "a timeline flies on virtual time only so far: qswarm sim")
 
 
 def _controller(scenario: Scenario) -> Finding | None:
