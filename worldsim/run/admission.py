@@ -16,6 +16,8 @@ from worldsim.truth.start import StartError, starts
 VIRTUAL_COMMAND_TICKS = 1
 PROCESS_COMMAND_TICKS = 2
 """For how many ticks a command lives under each clock: H of docs/method.md."""
+PROCESS_EVENTS = ("formation", "frame")
+"""Events that a fleet of processes meets: missions, which travel in observations."""
 
 
 def admit(scenario: Scenario, file: str | Path, command_ticks: int) -> None:
@@ -32,9 +34,16 @@ def admit(scenario: Scenario, file: str | Path, command_ticks: int) -> None:
 
 def _events(scenario: Scenario, command_ticks: int) -> Finding | None:
     """Say which event a fleet of processes cannot meet yet."""
-    if command_ticks == VIRTUAL_COMMAND_TICKS or not scenario.event:
+    if command_ticks == VIRTUAL_COMMAND_TICKS:
         return None
-    return Finding("event[0]", "a timeline flies on virtual time only so far: qswarm sim")
+    for index, event in enumerate(scenario.event):
+        if event.kind not in PROCESS_EVENTS:
+            return Finding(
+                f"event[{index}].{event.kind}",
+                f"happens on virtual time only so far (qswarm sim); to processes, "
+                f"{' and '.join(PROCESS_EVENTS)}",
+            )
+    return None
 
 
 def _controller(scenario: Scenario) -> Finding | None:

@@ -111,6 +111,8 @@ class Flight:
     def _slot(self, unwanted: Callable[[], bool]) -> None:
         slot = self.loop.world.slot
         self._pacer.begin(slot)
+        for deed in self.loop.due():
+            self.loop.take(deed)  # orders alone are admitted here: they travel in observations
         self._send(self.loop.open())
         self._strike_out()
         while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not unwanted():
