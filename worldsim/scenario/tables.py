@@ -18,6 +18,8 @@ from worldsim.scenario.starting import BoxStart, ListStart
 
 SLOTS_PER_TICK = 4
 MAX_AGENTS = 1000
+CAST_FAR_M = 0.5
+"""d_c2 where the range allows it; the paper's value."""
 
 RunName = Annotated[
     str,
@@ -136,6 +138,17 @@ class Scenario(Table, frozen=True, omit_defaults=False):
         """Every agent's vehicle, by id."""
         return [self.vehicle_of(agent) for agent in range(self.rows)]
 
+    def _control(self) -> Control:
+        """Return [control] with the bobber's reach that the radio's range allows (Lemma 7, E20)."""
+        if self.control.cast_far_m is not None:
+            return self.control
+        reach = CAST_FAR_M
+        range_m = self.netem.local.range_m or self.netem.range_m
+        if range_m is not None:
+            reach = min(reach, 0.25 * (range_m - self.control.spacing_m))
+        reach = max(reach, 2.0 * self.control.cast_near_m)
+        return msgspec.structs.replace(self.control, cast_far_m=reach)
+
     def medium_setup(self) -> MediumSetup:
         """Return what the medium is told."""
         return MediumSetup(self.seed, self.rows, SLOTS_PER_TICK, self.slot_hz, self.netem)
@@ -150,7 +163,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
             command_ticks=command_ticks,
             vehicle=self.vehicle_of(agent),
             fleet_max_speed_mps=max(vehicle.max_speed_mps for vehicle in self.vehicles),
-            control=self.control,
+            control=self._control(),
             comms=self.comms,
             formation=self.formation,
         )
