@@ -85,7 +85,7 @@ def _place_events(data: Data, file: Path) -> dict[int, Whose]:
 def _formation_file(file: Path, key: str, named: str) -> tuple[Path, Data]:
     """Return the path and the tables of the formation's file that a key names."""
     path = file.parent / named
-    if "\0" in named or not path.exists():
+    if "\0" in named or not path.is_file():
         raise ScenarioError(file, key, f"no such file: {path}")
     formation = tables(read(path), path)
     decode(formation, FormationSpec, path)
