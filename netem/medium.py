@@ -12,7 +12,17 @@ from math import nan, sqrt
 from struct import Struct as Layout
 
 from netem.link import LOST_TO_PARTITION, Cause, draw, verdict
-from netem.messages import Conditions, Groups, MediumSetup, Position, Verdicts
+from netem.messages import (
+    Changed,
+    Conditions,
+    Groups,
+    Healed,
+    MediumSetup,
+    Parted,
+    Position,
+    RadioOrder,
+    Verdicts,
+)
 from netem.schedule import Schedule
 from netem.wire.frame import (
     BATCH_HEAD_B,
@@ -61,6 +71,16 @@ class Medium:
             for receiver, where in enumerate(positions):
                 if where is None and self._queues[receiver]:
                     self.discard(receiver)
+
+    def obey(self, order: RadioOrder) -> None:
+        """Carry out an order, between slots."""
+        match order:
+            case Changed(conditions=conditions):
+                self.change(conditions)
+            case Parted(groups=groups):
+                self.partition(groups)
+            case Healed():
+                self.heal()
 
     def change(self, conditions: Conditions) -> None:
         """Judge later frames under other conditions; what is in flight has its verdict."""

@@ -1,4 +1,4 @@
-"""What the world tells the medium: the conditions, and each slot the true positions."""
+"""What the world tells the medium: the conditions, each slot the true positions, and orders."""
 
 from typing import Annotated
 
@@ -12,6 +12,7 @@ Position = tuple[Metres, Metres, Metres]
 
 MAX_TRUTH_B = 256 * 1024
 MAX_CONDITIONS_B = 1024 * 1024
+MAX_ORDERS_B = 1024 * 1024
 
 
 class LinkKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -40,6 +41,33 @@ class Conditions(LinkKeys, frozen=True):
 
 Groups = tuple[tuple[AgentId, ...], ...]
 """Who hears whom in a partition; the agents that no group names form one more."""
+
+
+class Changed(msgspec.Struct, frozen=True, tag="change", forbid_unknown_fields=True):
+    """From now on the radio is under other conditions, all of them given anew."""
+
+    conditions: Conditions
+
+
+class Parted(msgspec.Struct, frozen=True, tag="partition", forbid_unknown_fields=True):
+    """From now on agents hear only those of their own group."""
+
+    groups: Groups
+
+
+class Healed(msgspec.Struct, frozen=True, tag="heal", forbid_unknown_fields=True):
+    """From now on there are no groups."""
+
+
+RadioOrder = Changed | Parted | Healed
+"""What the medium does between slots."""
+
+
+class Orders(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Orders to carry out, one after the other, before a slot."""
+
+    slot: Count
+    orders: tuple[RadioOrder, ...]
 
 
 class MediumSetup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

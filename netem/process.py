@@ -15,6 +15,7 @@ from zenoh.handlers import RingChannel
 
 from netem.medium import Medium
 from netem.messages import MAX_CONDITIONS_B, MAX_TRUTH_B, MediumSetup, Truth, Verdicts
+from netem.orders import OrderBook
 from netem.wire.frame import Batch, Transmission, WireError, pack, unpack, unpack_transmission
 from netem.wire.keys import Keys
 from netem.wire.post import Post, Waiting, drained, receive
@@ -24,6 +25,7 @@ from netem.wire.stop import Stop
 WAIT_S = 0.2
 SILENCE_S = 30.0
 TRUTH_RING = 16
+ORDERS_RING = 256
 SENDER_RING = 4
 SENDER_QUOTA = 2
 """How many of one sender's messages are taken a slot: a flooder evicts only its own."""
@@ -149,6 +151,8 @@ class Radio:
         agents = range(setup.agents)
         self._senders = [post.ring("tx", agent, SENDER_RING) for agent in agents]
         self._receivers = [post.putter("rx", agent) for agent in agents]
+        self._orders = post.ring("orders", size=ORDERS_RING)
+        self._book = OrderBook()
         self._report = post.putter("verdicts")
         self._report_every = max(1, round(setup.slot_hz))
         self._slot = 0
@@ -181,12 +185,23 @@ class Radio:
         return truth
 
     def _play(self, truth: Truth, newest_s: float, read_at: float) -> None:
+        self._obey(truth.slot)
         self._medium.place(truth.positions)
         self._ingest(truth.slot)
         self._deliver(truth.slot + 1, newest_s, read_at)
         self._slot = truth.slot + 1
         if self._slot % self._report_every == 0:
             self.report()
+
+    def _obey(self, slot: int) -> None:
+        """Carry out what was ordered for slots up to this one."""
+        for data in self._orders.drain(ORDERS_RING):
+            try:
+                self._book.take(data)
+            except WireError:
+                self._intake.rejected["orders"] += 1
+        for order in self._book.due(slot):
+            self._medium.obey(order)
 
     def _ingest(self, slot: int) -> None:
         for sender, ring in enumerate(self._senders):

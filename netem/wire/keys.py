@@ -28,6 +28,8 @@ class Topic(NamedTuple):
 TOPICS = {
     "setup": Topic("setup/{id}", "world", "agent", "query, once a start", True, "agent's setup"),
     "medium": Topic("medium", "netem", "world", "query, once a start", True, "seed, conditions"),
+    "orders": Topic("orders", "world", "netem", "at an event", True, "changes, partitions"),
+    "control": Topic("control", "world", "operator", "query, at will", True, "missions, faults"),
     "truth": Topic("truth", "world", "netem", "each slot", False, "true positions"),
     "observation": Topic("obs/{id}", "world", "agent", "tick_hz", False, "own pose and sensors"),
     "command": Topic("cmd/{id}", "agent", "world", "tick_hz", False, "velocity and telemetry"),
