@@ -4,6 +4,7 @@ Decoding is a pure function of the bytes: :func:`decode_radio` may be memoised b
 several agents in one process.
 """
 
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import msgpack
@@ -62,16 +63,6 @@ def decode(data: bytes, kind: type[_T], max_bytes: int = MAX_MESSAGE_B, max_text
         raise RejectedError("invalid", f"{kind.__name__}: {error}") from error
 
 
-def decode_beacon(payload: bytes) -> Beacon:
-    """Decode a frame of the local channel, or raise :class:`RejectedError`."""
-    return decode(payload, Beacon, MAX_RADIO_B)
-
-
-def decode_gossip(payload: bytes) -> Gossip:
-    """Decode a frame of the multihop channel, or raise :class:`RejectedError`."""
-    return decode(payload, Gossip, MAX_RADIO_B)
-
-
 def encode_formation(formation: FormationSpec) -> bytes:
     """Encode a formation's tables as msgpack."""
     return _encode(formation)
@@ -82,11 +73,39 @@ def decode_formation(data: bytes) -> FormationSpec:
     return decode(data, FormationSpec, MAX_FORMATION_B, max_text=MAX_EXPRESSION)
 
 
+_beacon = msgspec.msgpack.Decoder(Beacon).decode
+_gossip = msgspec.msgpack.Decoder(Gossip).decode
+_observation = msgspec.msgpack.Decoder(Observation).decode
+_command = msgspec.msgpack.Decoder(Command).decode
+
+
+def decode_beacon(payload: bytes) -> Beacon:
+    """Decode a frame of the local channel, or raise :class:`RejectedError`."""
+    return _typed(payload, _beacon, MAX_RADIO_B)
+
+
+def decode_gossip(payload: bytes) -> Gossip:
+    """Decode a frame of the multihop channel, or raise :class:`RejectedError`."""
+    return _typed(payload, _gossip, MAX_RADIO_B)
+
+
 def decode_observation(data: bytes) -> Observation:
     """Decode what the world tells a vehicle, or raise :class:`RejectedError`."""
-    return decode(data, Observation)
+    return _typed(data, _observation, MAX_MESSAGE_B)
 
 
 def decode_command(data: bytes) -> Command:
     """Decode what an agent commands, or raise :class:`RejectedError`."""
-    return decode(data, Command)
+    return _typed(data, _command, MAX_MESSAGE_B)
+
+
+def _typed(data: bytes, decode_typed: Callable[[bytes], _T], max_bytes: int) -> _T:
+    """Decode arrays of fixed shape: the type alone bounds depth, lengths and extension types."""
+    if len(data) > max_bytes:
+        raise RejectedError("oversize", f"{len(data)} B where {max_bytes} B are allowed")
+    try:
+        return decode_typed(data)
+    except msgspec.ValidationError as error:
+        raise RejectedError("invalid", str(error)) from error
+    except msgspec.DecodeError as error:
+        raise RejectedError("garbage", str(error)) from error

@@ -11,6 +11,8 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from typing import NamedTuple, Protocol
 
+import msgspec
+
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation
 from agent.qstructure.frame import Frame
@@ -28,7 +30,7 @@ class ControllerError(ValueError):
     """A controller that cannot be had; the text says why."""
 
 
-class Heard(NamedTuple):
+class Heard(msgspec.Struct, frozen=True, gc=False, order=True):
     """A neighbour heard directly, brought forward to now.
 
     position [m; world frame]: as told plus velocity times age; target [m; world frame]: where it
@@ -43,7 +45,7 @@ class Heard(NamedTuple):
     place: Place | None
 
 
-class Peer(NamedTuple):
+class Peer(msgspec.Struct, frozen=True, gc=False, order=True):
     """A member of the team as far as known, oneself included; told directly or passed on.
 
     position [m; world frame]: where it last said it was; cost_m: how far from its place it was when

@@ -82,7 +82,7 @@ class Observation(Message, frozen=True):
     position: Position
     velocity: Velocity
     yaw: Radians
-    vehicles: tuple[Position, ...]
+    vehicles: Annotated[tuple[Position, ...], Meta(max_length=256)]
     orders: Annotated[tuple[Mission, ...], Meta(max_length=4)]
 
 
@@ -99,7 +99,7 @@ class Telemetry(Message, frozen=True):
     force: Annotated[float, Meta(ge=0, le=1e9)]
     target: Position | None
     place: tuple[Index, Index] | None
-    heard: tuple[AgentId, ...]
+    heard: Annotated[tuple[AgentId, ...], Meta(max_length=256)]
     rejected: Count
     mission: Count
     tier: Index

@@ -5,7 +5,7 @@ subject, and that number outlives the record; otherwise the departed would circu
 version of a record is its subject's beacon sequence, so a beacon heard directly is a record too.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from agent.codec import encode
 from agent.comms.silent import Member
@@ -59,18 +59,21 @@ class Table:
                 age_s = max(0.0, now_s - record.stamp_s)
                 self._lag_s[record.id] = lag_s + LAG_SMOOTHING * (age_s - lag_s)
 
-    def forget_silent(self, now_s: float, silence_s: dict[int, float]) -> None:
+    def forget_silent(self, now_s: float, heard: Collection[int]) -> None:
         """Drop the records of those who are gone.
 
-        silence_s: for each direct neighbour how long it may be silent [s]. One whose last word
-        was passed on may be silent for as long as relays take.
+        heard: the direct neighbours who are not. One whose last word was passed on may be silent
+        for as long as relays take.
         """
-        gone = []
-        for who, newest in self._newest.items():
-            direct = isinstance(newest, Beacon)
-            limit = silence_s.get(who, 0.0) if direct else self._may_be_silent_s(who)
-            if now_s - newest.stamp_s > limit:
-                gone.append(who)
+        gone = [
+            who
+            for who, newest in self._newest.items()
+            if (
+                who not in heard
+                if isinstance(newest, Beacon)
+                else now_s - newest.stamp_s > self._may_be_silent_s(who)
+            )
+        ]
         for who in gone:
             del self._newest[who]
             self._lag_s.pop(who, None)

@@ -4,6 +4,7 @@ Everything here is in the Observation's time, which all vehicles share (as GPS g
 clock is never read.
 """
 
+from collections.abc import Collection
 from math import log
 
 from agent.codec import RejectedError
@@ -15,6 +16,7 @@ MAX_AGE_S = 5.0
 FORWARD_S = 1.0
 """A position is carried forward along its velocity for this long at most."""
 LEAST_SILENCE_S = 1.5
+NONE_YET = (-1, -1)
 FALSE_ALARM = log(1e-6)
 SMOOTHING = 0.05
 MARGIN = 1.2
@@ -34,11 +36,12 @@ class Neighbour:
 
     def hear(self, beacon: Beacon, latency_s: float) -> None:
         """Take a newer beacon that was under way for ``latency_s`` [s]."""
-        if beacon.incarnation == self.beacon.incarnation:
-            gap = beacon.sequence - self.beacon.sequence
+        before = self.beacon
+        if beacon.incarnation == before.incarnation:
+            gap = beacon.sequence - before.sequence
             self.mean_gap += SMOOTHING * (gap - self.mean_gap)
         self.latency_s += SMOOTHING * (latency_s - self.latency_s)
-        if (beacon.queue, beacon.rank) != (self.beacon.queue, self.beacon.rank):
+        if beacon.rank != before.rank or beacon.queue != before.queue:
             self.place = _claim(beacon)
         self.beacon = beacon
 
@@ -73,11 +76,11 @@ class Neighbours:
         own_sent_s: when each of the own recent sequences was sent [s]; a beacon that echoes one
         was sent after it (E22), whatever its stamp says.
         """
-        key = (beacon.incarnation, beacon.sequence)
-        if beacon.id == self._own_id:
+        who, key = beacon.id, (beacon.incarnation, beacon.sequence)
+        if who == self._own_id:
             raise RejectedError("spoofed", "a beacon under one's own id")
-        if key <= self._last.get(beacon.id, (-1, -1)):
-            raise RejectedError("replay", f"sequence {key} of {beacon.id} is not new")
+        if key <= self._last.get(who, NONE_YET):
+            raise RejectedError("replay", f"sequence {key} of {who} is not new")
         age_s = now_s - beacon.stamp_s
         if age_s < -self._slack_s:
             raise RejectedError("future", f"a stamp {-age_s:.3f} s ahead")
@@ -86,30 +89,28 @@ class Neighbours:
         echoed_s = self._echoed_s(beacon, own_sent_s)
         if echoed_s is not None and beacon.stamp_s + self._slack_s < echoed_s:
             raise RejectedError("offset", "older than a beacon it has heard")
-        self._last[beacon.id] = key
-        known = self._known.get(beacon.id)
+        self._last[who] = key
+        latency_s = age_s if age_s > 0.0 else 0.0
+        known = self._known.get(who)
         if known is None:
-            self._known[beacon.id] = Neighbour(beacon, max(0.0, age_s))
+            self._known[who] = Neighbour(beacon, latency_s)
             self._put_in_order()
         else:
-            known.hear(beacon, max(0.0, age_s))
+            known.hear(beacon, latency_s)
 
-    def forget_silent(self, now_s: float) -> dict[int, float]:
-        """Drop those who have been silent for longer than chance explains.
-
-        Returns for each of the others how long it may be silent [s].
-        """
-        silences_s = self.silences_s()
+    def forget_silent(self, now_s: float) -> Collection[int]:
+        """Drop those who have been silent for longer than chance explains; return who stay."""
         gone = [
             who
-            for who, silence_s in silences_s.items()
-            if now_s - self._known[who].beacon.stamp_s > silence_s
+            for who, known in self._known.items()
+            if (age_s := now_s - known.beacon.stamp_s) > LEAST_SILENCE_S
+            and age_s > known.silence_s(self._beacon_hz)
         ]
         for who in gone:
-            del self._known[who], silences_s[who]
+            del self._known[who]
         if gone:
             self._put_in_order()
-        return silences_s
+        return self._known.keys()
 
     def silences_s(self) -> dict[int, float]:
         """Return for each neighbour how long it may be silent [s]."""
@@ -150,7 +151,8 @@ def _claim(beacon: Beacon) -> Place | None:
 
 def _forward(neighbour: Neighbour, now_s: float, mission: int) -> Heard:
     beacon = neighbour.beacon
-    age_s = max(0.0, now_s - beacon.stamp_s)
+    age_s = now_s - beacon.stamp_s
+    age_s = max(age_s, 0.0)
     along = age_s if age_s < FORWARD_S else FORWARD_S
     (x, y, z), (u, v, w) = beacon.position, beacon.velocity
     position = (x + along * u, y + along * v, z + along * w)

@@ -61,12 +61,12 @@ class SilentBodies:
         sensed: bodies relative to ``position`` [m; world axes]; heard: where those are who are
         heard directly [m; world frame]; team: all members known.
         """
-        reach = max((dist(position, other) for other in heard), default=0.0)
-        unknown = [
-            body
-            for body in _in_world(position, sensed)
-            if dist(position, body) <= reach + SAME_BODY_M and not self._explained(body, team)
-        ]
+        unknown = [body for body in _in_world(position, sensed) if not self._explained(body, team)]
+        if unknown:
+            reach = max((dist(position, other) for other in heard), default=0.0) + SAME_BODY_M
+            unknown = [body for body in unknown if dist(position, body) <= reach]
+        if not unknown and not self._bodies:
+            return ()
         kept = [
             body
             for body in (each.seen_again(now_s, unknown) for each in self._bodies)
@@ -90,10 +90,10 @@ class SilentBodies:
 
     def _explained(self, body: Vector, team: Sequence[Member]) -> bool:
         """Whether a member may be there by now: told of long ago, it may have moved on."""
-        return any(
-            dist(body, member.position) < NEIGHBOUR_M + self._max_speed * member.age_s
-            for member in team
-        )
+        for there, age_s in team:
+            if dist(body, there) < NEIGHBOUR_M + self._max_speed * age_s:
+                return True
+        return False
 
 
 def _in_world(position: Vector, sensed: Sequence[Vector]) -> list[Vector]:

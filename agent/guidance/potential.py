@@ -83,23 +83,22 @@ class Potential:
 
         q, q_tg: own position and immediate target [m]; others: the same of each neighbour.
         """
-        x, y, z = q[0] - q_tg[0], q[1] - q_tg[1], q[2] - q_tg[2]
+        qx, qy, qz = q
+        tx, ty, tz = q_tg
+        x, y, z = qx - tx, qy - ty, qz - tz
         for other in others:
-            push = self._push(q, q_tg, other.position, other.target)
+            jx, jy, jz = other.position
+            dx, dy, dz = qx - jx, qy - jy, qz - jz
+            ux, uy, uz = other.target
+            ux, uy, uz = tx - ux, ty - uy, tz - uz
+            push = self._push(sqrt(dx * dx + dy * dy + dz * dz), sqrt(ux * ux + uy * uy + uz * uz))
             if push != 0.0:
-                q_j = other.position
-                x += push * (q[0] - q_j[0])
-                y += push * (q[1] - q_j[1])
-                z += push * (q[2] - q_j[2])
+                x, y, z = x + push * dx, y + push * dy, z + push * dz
         return (x, y, z)
 
-    def _push(self, q: Vector, q_tg: Vector, q_j: Vector, q_tg_j: Vector) -> float:
+    def _push(self, r: float, between_targets: float) -> float:
         """Return the factor of q_ij in Omega_i: k_ob U'_ob g / r, its size capped."""
-        dx, dy, dz = q[0] - q_j[0], q[1] - q_j[1], q[2] - q_j[2]
-        tx, ty, tz = q_tg[0] - q_tg_j[0], q_tg[1] - q_tg_j[1], q_tg[2] - q_tg_j[2]
-        r = sqrt(dx * dx + dy * dy + dz * dz)
-        g = r - self.d_ob
-        gap = self.gap_at_targets(sqrt(tx * tx + ty * ty + tz * tz))
+        g, gap = r - self.d_ob, self.gap_at_targets(between_targets)
         if g >= gap or r == 0.0:
             return 0.0
         g = max(g, LEAST_GAP_M)

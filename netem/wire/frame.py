@@ -4,6 +4,7 @@ An agent's slot ends with one :class:`Transmission`; a slot begins with one :cla
 payload of a frame is opaque here: the radio never decodes what it carries.
 """
 
+from collections.abc import Callable
 from typing import Annotated, Any, TypeVar
 
 import msgpack
@@ -66,7 +67,7 @@ class Batch(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unkno
     """All that one agent hears at the start of one slot, in the order it came due."""
 
     slot: Count
-    frames: tuple[Frame, ...]
+    frames: Annotated[tuple[Frame, ...], Meta(max_length=MAX_FRAMES)]
 
 
 _T = TypeVar("_T")
@@ -103,11 +104,25 @@ def unpack(data: bytes, kind: type[_T], max_bytes: int, max_items: int = MAX_FRA
         raise WireError(f"malformed {kind.__name__}: {error}") from error
 
 
+_transmission = msgspec.msgpack.Decoder(Transmission).decode
+_batch = msgspec.msgpack.Decoder(Batch).decode
+
+
 def unpack_transmission(data: bytes) -> Transmission:
     """Decode what an agent sent, or raise :class:`WireError`."""
-    return unpack(data, Transmission, MAX_TRANSMISSION_B)
+    return _typed(data, _transmission, MAX_TRANSMISSION_B)
 
 
 def unpack_batch(data: bytes) -> Batch:
     """Decode what the medium delivered, or raise :class:`WireError`."""
-    return unpack(data, Batch, MAX_BATCH_B)
+    return _typed(data, _batch, MAX_BATCH_B)
+
+
+def _typed(data: bytes, decode: Callable[[bytes], _T], max_bytes: int) -> _T:
+    """Decode where it happens most: the type alone bounds depth, lengths and extension types."""
+    if len(data) > max_bytes:
+        raise WireError(f"oversize: {len(data)} B where {max_bytes} B are allowed")
+    try:
+        return decode(data)
+    except msgspec.MsgspecError as error:
+        raise WireError(f"malformed: {error}") from error

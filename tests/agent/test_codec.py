@@ -294,7 +294,7 @@ def test_a_wrong_value_is_refused_wherever_it_stands(kind, wrong):
         if isinstance(value, bytes) and isinstance(wrong, bytes):
             continue
         refused_as = cause(kind, msgpack.packb(replaced(good, path, wrong)))
-        assert refused_as == ("garbage" if isinstance(wrong, msgpack.Timestamp) else "invalid")
+        assert refused_as == "invalid"
 
 
 @KINDS
@@ -347,7 +347,7 @@ def test_lists_longer_than_allowed_are_refused():
     assert cause(Beacon, encode(many)) == "invalid"
     told = msgspec.structs.replace(GOOD[Command].telemetry, heard=(1,) * 257)
     assert cause(Command, encode(msgspec.structs.replace(GOOD[Command], telemetry=told))) == (
-        "garbage"
+        "invalid"
     )
 
 

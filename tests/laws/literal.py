@@ -53,11 +53,10 @@ def slope_two_sided(self, u, u_tg):
     return sigma * h_slope - 3.0 * self.a_t * d * d * sigma * (1.0 - sigma) * h
 
 
-def push_two_sided(self, q, q_tg, q_j, q_tg_j):
+def push_two_sided(self, r, between_targets):
     """The factor of q_ij for (23) on both sides."""
-    r = dist(q, q_j)
     gap = max(r - self.d_ob, 1e-3)
-    slope = slope_two_sided(self, 0.5 * gap * gap, self.at_targets(dist(q_tg, q_tg_j)))
+    slope = slope_two_sided(self, 0.5 * gap * gap, self.at_targets(between_targets))
     return self.k_ob * slope * gap / r
 
 

@@ -268,15 +268,20 @@ class SlotLoop:
             row if alive else UNTOLD
             for row, alive in zip(self._told, self.team.alive.tolist(), strict=True)
         ]
+        reasons = np.array(
+            [(*row.target, row.force, row.turn_deg) for row in told], dtype=np.float32
+        )
+        attitude = np.empty((len(told), 3), dtype=np.float32)
+        attitude[:, 0], attitude[:, 1:] = fleet.yaw, fleet.tilt
         return Tick(
             index=self.world.slot // self.world.clock.slots_per_tick,
             time_s=self.world.time_s,
             position=fleet.position.astype(np.float32),
-            attitude=np.column_stack((fleet.yaw, fleet.tilt)).astype(np.float32),
-            target=np.array([row.target for row in told], dtype=np.float32),
+            attitude=attitude,
+            target=reasons[:, :3],
             place=np.array([row.place for row in told], dtype=np.int16),
-            force=np.array([row.force for row in told], dtype=np.float32),
-            turn_deg=np.array([row.turn_deg for row in told], dtype=np.float32),
+            force=reasons[:, 3],
+            turn_deg=reasons[:, 4],
             alive=self.team.alive.copy(),
             mission=np.array([row.mission for row in told], dtype=np.int64),
             links=self._links(told) if self._recorder is not None else NO_LINKS,
