@@ -70,6 +70,7 @@ class Senses(NamedTuple):
     """What a controller decides on: own pose, what is heard, who is known, what is near.
 
     vehicles: bodies within the proximity sensor, relative to the own centre [m; world axes].
+    obstacles: nearest points of what else is near, relative likewise.
     team(): all members known, sorted by id; gathered when it is asked for. mission: what the team
     shall form. silent: where bodies stand from which nothing is heard [m; world frame]; blocked:
     places that others see taken by such a body (E18).
@@ -85,6 +86,7 @@ class Senses(NamedTuple):
     mission: Flown
     silent: tuple[Vector, ...] = ()
     blocked: frozenset[Place] = frozenset()
+    obstacles: tuple[Vector, ...] = ()
 
 
 class Intent(NamedTuple):

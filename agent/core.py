@@ -18,7 +18,14 @@ from agent.comms.neighbours import Neighbours
 from agent.comms.silent import SilentBodies
 from agent.controller import Intent, Peer, Senses
 from agent.guidance.cone import cone_of
-from agent.guidance.safety import PromiseFilter, RangingFilter, Told, limited, shortened
+from agent.guidance.safety import (
+    STATIC,
+    PromiseFilter,
+    RangingFilter,
+    Told,
+    limited,
+    shortened,
+)
 from agent.messages import (
     Beacon,
     Command,
@@ -77,6 +84,9 @@ class Agent:
             setup.command_ticks * tick_s,
         )
         self._ranging = RangingFilter(*filtered) if "proximity" in limits.sensors else None
+        self._clearing = RangingFilter(
+            setup.control.clearance_m, limits.max_speed_mps, setup.command_ticks * tick_s, STATIC
+        )
         self._promises = PromiseFilter(*filtered)
         self._speed_cap = limits.max_speed_mps
         self._missions = Missions(setup.id, setup.formation, setup.control.spacing_m)
@@ -172,6 +182,7 @@ class Agent:
             mission,
             self._silent,
             self._blocked,
+            observation.obstacles,
         )
 
     def _tidy(self, observation: Observation) -> None:
@@ -207,6 +218,8 @@ class Agent:
         """Return the velocity that is safe to fly [m/s]: the filter has the last word."""
         if self._ranging is not None:
             bounds = self._ranging.bounds(senses.vehicles)
+            if senses.obstacles:
+                bounds += self._clearing.bounds(senses.obstacles)
             return limited(intent.velocity, bounds, senses.yaw, self._cone)
         told = self._told(senses)
         self._promises.promise(senses.now_s, told)

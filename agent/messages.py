@@ -74,6 +74,8 @@ class Observation(Message, frozen=True):
     position [m], velocity [m/s], yaw [rad] are the vehicle's own.
     vehicles: other vehicles within the proximity sensor's 2 m, as positions relative to this
     vehicle's centre [m; axes of the world frame]. A body has no name.
+    obstacles: of each obstacle within the sensor's 2 m the nearest point of its surface, relative
+    likewise; of more than 32, the nearest.
     orders: missions that an operator gives to this agent, for the whole team.
     """
 
@@ -83,6 +85,7 @@ class Observation(Message, frozen=True):
     velocity: Velocity
     yaw: Radians
     vehicles: Annotated[tuple[Position, ...], Meta(max_length=256)]
+    obstacles: Annotated[tuple[Position, ...], Meta(max_length=32)]
     orders: Annotated[tuple[Mission, ...], Meta(max_length=4)]
 
 

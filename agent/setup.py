@@ -37,6 +37,8 @@ class Vehicle(Table, frozen=True):
 class Control(Table, frozen=True):
     """The controller and the paper's distances [m]: d_ir, d_ob, d_s, d_c1, d_c2.
 
+    clearance_m: from a vehicle's centre to an obstacle's surface, what the safety filter keeps.
+
     ``cast_far_m`` left out follows from the range (Lemma 7, E20).
     """
 
@@ -44,6 +46,7 @@ class Control(Table, frozen=True):
     spacing_m: Positive = 1.0
     separation_m: Positive = 0.25
     safety_m: Positive = 0.6
+    clearance_m: Positive = 0.5
     cast_near_m: Positive = 0.05
     cast_far_m: Positive | None = None
 

@@ -21,6 +21,8 @@ from agent.messages import Vector
 
 SHARE = 0.18
 """Share of the gap that one vehicle of a pair may close within H: 2 * SHARE <= 1/e."""
+STATIC = 2.0 * SHARE
+"""Share for what stands still: nobody else closes the gap."""
 PROMISE_S = 3.0
 LEAST_CAP_MPS = 0.05
 PASSES = 3
@@ -42,15 +44,18 @@ class Bound(NamedTuple):
 class RangingFilter:
     """Limits approach by the gap to each body sensed.
 
-    d_ob: least distance between centres [m]; max_speed [m/s]; horizon_s: H.
+    d_ob: least distance between centres [m]; max_speed [m/s]; horizon_s: H. share: of the gap, what
+    may be closed within H; STATIC for what does not move itself.
     """
 
-    def __init__(self, d_ob: float, max_speed: float, horizon_s: float) -> None:
+    def __init__(
+        self, d_ob: float, max_speed: float, horizon_s: float, share: float = SHARE
+    ) -> None:
         reach = max_speed * horizon_s
         self._d_ob = d_ob
         self._stop_m = d_ob + reach * reach / d_ob
         self._turning_hz = max_speed / (self._stop_m - d_ob)
-        self._rate = SHARE / horizon_s
+        self._rate = share / horizon_s
         self._ignore_m = self._stop_m + max_speed / self._rate
 
     def bounds(self, vehicles: Sequence[Vector]) -> list[Bound]:

@@ -38,7 +38,7 @@ TELEMETRY = Telemetry(VECTOR, 1.0, VECTOR, (1, 2), (3, 4), 5, 6, 1, 3, 0)
 RECORD = Record(4, 0, 77, 1.25, VECTOR, -1, -1, 0, 7, ((0, 0),))
 GOOD = {
     Observation: Observation(
-        7, 1.5, VECTOR, VECTOR, 0.5, (VECTOR, VECTOR), (Mission(0, POSE, b""),)
+        7, 1.5, VECTOR, VECTOR, 0.5, (VECTOR, VECTOR), (VECTOR,), (Mission(0, POSE, b""),)
     ),
     Command: Command(
         7,
@@ -134,6 +134,7 @@ messages = st.one_of(
         velocities,
         angles,
         st.lists(positions, max_size=9).map(tuple),
+        st.lists(positions, max_size=4).map(tuple),
         st.lists(missions, max_size=1).map(tuple),
     ),
     st.builds(

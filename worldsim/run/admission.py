@@ -11,7 +11,8 @@ from agent.controller import load as load_controller
 from worldsim.scenario.rules import Finding, too_fast
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
-from worldsim.truth.start import StartError, starts
+from worldsim.truth.obstacle import Obstacles
+from worldsim.truth.start import StartError, starts_of
 
 VIRTUAL_COMMAND_TICKS = 1
 PROCESS_COMMAND_TICKS = 2
@@ -61,7 +62,7 @@ def _controller(scenario: Scenario) -> Finding | None:
 
 def _room(scenario: Scenario) -> Finding | None:
     try:
-        starts(scenario.fleet.start, scenario.fleet.agents, scenario.seed)
+        starts_of(scenario, Obstacles(scenario.obstacle))
     except StartError as error:
         return Finding("fleet.start", str(error))
     return None

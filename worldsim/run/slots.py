@@ -33,8 +33,9 @@ from worldsim.run.team import Begin, Start, Stop, Team
 from worldsim.run.told import UNTOLD, Told, told_by
 from worldsim.run.trace import Trace
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
+from worldsim.truth.obstacle import Obstacles
 from worldsim.truth.sensor import ProximitySensor
-from worldsim.truth.start import starts
+from worldsim.truth.start import starts_of
 from worldsim.truth.world import Clock, World
 
 Event = dict[str, Any]
@@ -70,14 +71,15 @@ class Opened:
 
 def world_of(scenario: Scenario, command_ticks: int) -> World:
     """Return a scenario's world at its start. Raises StartError where there is no room."""
-    position, yaw = starts(scenario.fleet.start, scenario.fleet.agents, scenario.seed)
+    obstacles = Obstacles(scenario.obstacle)
+    position, yaw = starts_of(scenario, obstacles)
     later = scenario.rows - scenario.fleet.agents
     return World(
         clock=Clock(scenario.fleet.tick_hz, SLOTS_PER_TICK),
         limits=scenario.vehicles,
         position=np.concatenate((position, np.full((later, 3), nan))),
         yaw=np.concatenate((yaw, np.full(later, nan))),
-        sensor=ProximitySensor(scenario.seed, scenario.sensor.proximity.noise_m),
+        sensor=ProximitySensor(scenario.seed, scenario.sensor.proximity.noise_m, obstacles),
         command_ticks=command_ticks,
     )
 
@@ -123,9 +125,9 @@ class SlotLoop:
         if isinstance(action, Strike):
             return self.team.struck(action, self._places, self._formation)
         if isinstance(action, Revival):
-            return self.team.revived(action, self.world.fleet.position)
+            return self.team.revived(action, self.world.fleet.position, self.world.time_s)
         if isinstance(action, Joining):
-            return self.team.joined(action, self.world.fleet.position)
+            return self.team.joined(action, self.world.fleet.position, self.world.time_s)
         return action
 
     def take(self, deed: Deed) -> None:

@@ -12,7 +12,8 @@ from agent.qstructure.formation import Formation, FormationSpec
 from worldsim.run.faults import Joining, Revival, Strike
 from worldsim.scenario.starting import BoxStart, ListStart
 from worldsim.scenario.tables import Scenario
-from worldsim.truth.start import StartError, starts
+from worldsim.truth.obstacle import Obstacles
+from worldsim.truth.start import StartError, room_of, starts
 from worldsim.truth.vehicle import Floats
 
 RANDOM_KEY = 0xFA17
@@ -53,6 +54,7 @@ class Team:
     def __init__(self, scenario: Scenario) -> None:
         agents, rows = scenario.fleet.agents, scenario.rows
         self._scenario = scenario
+        self._obstacles = Obstacles(scenario.obstacle)
         self.alive = np.arange(rows) < agents
         self.incarnations = [0] * rows
         self.known = agents
@@ -84,8 +86,11 @@ class Team:
         agents = self._selected(action.number, action.selectors, among, places, formation)
         return Stop(action.number, action.kind, agents, action.selectors)
 
-    def revived(self, action: Revival, position: Floats) -> Start:
-        """Find who comes back, and where; position (N, 3): of all vehicles [m; world frame]."""
+    def revived(self, action: Revival, position: Floats, time_s: float = 0.0) -> Start:
+        """Find who comes back at a time [s], and where.
+
+        position (N, 3): of all vehicles [m; world frame].
+        """
         among = [a for a in range(self.known) if not self.alive[a] and a not in self._boots]
         agents: tuple[int, ...] = tuple(
             a for a in self._struck.get(action.number, ()) if a in among
@@ -95,16 +100,16 @@ class Team:
         incarnations = {agent: self.incarnations[agent] + 1 for agent in agents}
         away = [agent for agent in agents if np.isnan(position[agent, 0])]
         try:
-            stands = self._stands_again(action.number, away, position)
+            stands = self._stands_again(action.number, away, position, time_s)
         except StartError as error:
             return Start(action.number, "restart", {}, {}, str(error))
         return Start(action.number, "restart", incarnations, stands)
 
-    def joined(self, action: Joining, position: Floats) -> Start:
-        """Return the next ids, and where they are put."""
+    def joined(self, action: Joining, position: Floats, time_s: float = 0.0) -> Start:
+        """Return the next ids, and where they are put at a time [s]."""
         agents = range(self.known, self.known + action.joiners)
         try:
-            where = self._drawn(action.number, action.start, action.joiners, position)
+            where = self._drawn(action.number, action.start, action.joiners, position, time_s)
         except StartError as error:
             return Start(action.number, "join", {}, {}, str(error))
         self._origin += [(action.start, index) for index in range(action.joiners)]
@@ -164,7 +169,7 @@ class Team:
         return drawn
 
     def _stands_again(
-        self, number: int, away: list[int], position: Floats
+        self, number: int, away: list[int], position: Floats, time_s: float
     ) -> dict[int, tuple[Vector, float]]:
         """Put those who had left where they came from: their listed place, or a new draw."""
         stands: dict[int, tuple[Vector, float]] = {}
@@ -175,16 +180,27 @@ class Team:
                 start = ListStart(positions_m=start.positions_m[index : index + 1], yaws_deg=yaws)
             taken = np.array([where for where, _ in stands.values()]).reshape(-1, 3)
             there = np.concatenate((position, taken))
-            stands[agent] = self._drawn((number << 10) + agent, start, 1, there)[0]
+            stands[agent] = self._drawn((number << 10) + agent, start, 1, there, time_s)[0]
         return stands
 
     def _drawn(
-        self, number: int, start: BoxStart | ListStart, count: int, position: Floats
+        self,
+        number: int,
+        start: BoxStart | ListStart,
+        count: int,
+        position: Floats,
+        time_s: float,
     ) -> list[tuple[Vector, float]]:
         present = position[~np.isnan(position[:, 0])]
         apart_m = self._scenario.control.separation_m
         where, yaws = starts(
-            start, count, self._scenario.seed, event=number + 1, present=present, apart_m=apart_m
+            start,
+            count,
+            self._scenario.seed,
+            event=number + 1,
+            present=present,
+            apart_m=apart_m,
+            room=room_of(self._scenario, self._obstacles, time_s),
         )
         return [
             ((x, y, z), yaw) for (x, y, z), yaw in zip(where.tolist(), yaws.tolist(), strict=True)

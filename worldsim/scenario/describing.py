@@ -70,7 +70,7 @@ def _nested(info: inspect.Type) -> str:
 def _union(info: inspect.UnionType) -> str:
     kinds = _tags(info.types)
     if kinds:
-        return f"a table with kind = {' or '.join(kinds)}"
+        return f"a table with {_tag_field(info.types)} = {' or '.join(kinds)}"
     options = [option for option in info.types if not isinstance(option, inspect.NoneType)]
     return " or ".join(allowed_by(option) for option in options)
 
@@ -107,6 +107,13 @@ def _tags(options: Iterable[inspect.Type]) -> list[str]:
         for option in options
         if isinstance(option, inspect.StructType) and option.tag is not None
     ]
+
+
+def _tag_field(options: Iterable[inspect.Type]) -> str:
+    """Return the key by which the kinds of a table are told apart."""
+    return next(
+        str(option.tag_field) for option in options if isinstance(option, inspect.StructType)
+    )
 
 
 def _short(text: str) -> str:

@@ -15,6 +15,7 @@ import tomli_w
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from worldsim.scenario.course import Whose, check_course
 from worldsim.scenario.decoding import decode
+from worldsim.scenario.obstacles import resolved
 from worldsim.scenario.rules import TARGET_FLOOR_M, check, tilts_where_asked
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import Data, ScenarioError, override, read, tables
@@ -40,7 +41,7 @@ def parse(
         override(data, overrides, name)
         whose = _place_formation(data, Path(name))
         later = _place_events(data, Path(name))
-        scenario = decode(data, Scenario, name)
+        scenario = _with_field(decode(data, Scenario, name), name)
         check(scenario, name)
         _check_formation(scenario, Path(name), *whose)
         check_course(scenario, Path(name), later)
@@ -90,6 +91,19 @@ def _formation_file(file: Path, key: str, named: str) -> tuple[Path, Data]:
     formation = tables(read(path), path)
     decode(formation, FormationSpec, path)
     return path, formation
+
+
+def _with_field(scenario: Scenario, file: str | Path) -> Scenario:
+    """Return a scenario whose random field of obstacles, if it has one, is drawn."""
+    field = scenario.obstacle_field
+    if field is None:
+        return scenario
+    found, broken = resolved(field, scenario.fleet.start, scenario.seed)
+    if broken is not None:
+        key, detail = broken
+        raise ScenarioError(file, f"obstacle_field.{key}", detail)
+    obstacles = (*scenario.obstacle, *found)
+    return msgspec.structs.replace(scenario, obstacle=obstacles, obstacle_field=None)
 
 
 def _check_formation(scenario: Scenario, file: Path, whose: Path, prefix: str) -> None:

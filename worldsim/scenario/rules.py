@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from agent.qstructure.formation import Formation
+from worldsim.scenario.obstacles import obstacle_problem
 from worldsim.scenario.starting import BoxStart
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 from worldsim.scenario.toml import ScenarioError
@@ -206,6 +207,15 @@ def _long_enough_to_converge(scenario: Scenario) -> Finding | None:
     )
 
 
+def _obstacles_sound(scenario: Scenario) -> Finding | None:
+    for index, obstacle in enumerate(scenario.obstacle):
+        broken = obstacle_problem(obstacle)
+        if broken is not None:
+            key, detail = broken
+            return Finding(f"obstacle[{index}].{key}", detail)
+    return None
+
+
 def _local_range_m(scenario: Scenario) -> float | None:
     own = scenario.netem.local.range_m
     return own if own is not None else scenario.netem.range_m
@@ -221,5 +231,6 @@ RULES = (
     _links_of_the_fleet,
     _cast_zone_open,
     _sent_by_the_tick,
+    _obstacles_sound,
 )
 CAUTIONS = (_cast_within_range, _neighbours_in_range, _long_enough_to_converge)

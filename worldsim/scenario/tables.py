@@ -14,6 +14,7 @@ from agent.qstructure.formation import FormationSpec
 from agent.setup import AgentSetup, Comms, Control, Hertz, Positive, Table, Vehicle
 from netem.messages import Conditions, MediumSetup
 from worldsim.scenario.events import EventTable
+from worldsim.scenario.obstacles import ObstacleField, Obstacles
 from worldsim.scenario.starting import BoxStart, ListStart
 
 SLOTS_PER_TICK = 4
@@ -44,7 +45,10 @@ class Fleet(Table, frozen=True):
 
 
 class ProximitySensor(Table, frozen=True):
-    """Relative positions of vehicles within 2 m; noise is normal, per axis [m]."""
+    """Relative positions of vehicles and of obstacles' nearest points within 2 m.
+
+    The noise is normal, per axis [m].
+    """
 
     noise_m: Annotated[float, Meta(ge=0, le=1)] = 0.0
 
@@ -80,6 +84,7 @@ class AgentTable(Table, frozen=True):
 class Expectations(Table, frozen=True):
     """What a run must show; ``converge_within_s`` counts from each formation's start.
 
+    min_obstacle_distance_m: from a vehicle's centre to a surface; left out: control.clearance_m.
     reform_within_s: from each change of the team until all stand in a whole formation again.
     converge: false where no formation is to be formed, as with a controller that knows none.
     """
@@ -88,6 +93,7 @@ class Expectations(Table, frozen=True):
     reform_within_s: Positive | None = None
     converge: bool = True
     min_separation_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
+    min_obstacle_distance_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
 
 
 class Scenario(Table, frozen=True, omit_defaults=False):
@@ -105,6 +111,8 @@ class Scenario(Table, frozen=True, omit_defaults=False):
     control: Control = Control()
     comms: Comms = Comms()
     netem: Conditions = Conditions()
+    obstacle: Obstacles = ()
+    obstacle_field: ObstacleField | None = None
     event: tuple[EventTable, ...] = ()
     expect: Expectations = Expectations()
 
@@ -117,6 +125,12 @@ class Scenario(Table, frozen=True, omit_defaults=False):
     def slots(self) -> int:
         """How many slots the run lasts."""
         return round(self.duration_s * self.slot_hz)
+
+    @property
+    def obstacle_bound_m(self) -> float:
+        """How near a vehicle's centre may come to a surface [m]."""
+        wanted = self.expect.min_obstacle_distance_m
+        return self.control.clearance_m if wanted is None else wanted
 
     @property
     def rows(self) -> int:

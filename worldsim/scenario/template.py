@@ -53,6 +53,7 @@ EXAMPLES: Given = {
     "event.kill": [4],
     "expect.reform_within_s": 10.0,
     "expect.min_separation_m": 0.25,
+    "expect.min_obstacle_distance_m": 0.4,
     "formation.queue.capacity": 0.5,
     "formation.queue.orientation.yaw_deg": "10*d",
     "netem.delay_ms": 20.0,
@@ -63,6 +64,10 @@ EXAMPLES: Given = {
     "netem.link.from": 0,
     "netem.link.to": 1,
     "netem.link.loss_percent": 90.0,
+    "obstacle": [{"shape": "sphere", "centre_m": [9, 0, 0], "radius_m": 0.5}],
+    "obstacle_field.centre_m": [9.0, 9.0, 0.0],
+    "obstacle_field.size_m": [6.0, 6.0, 2.0],
+    "obstacle_field.count": 3,
     "vehicle.max_turn_left_deg": 45.0,
     "vehicle.max_turn_right_deg": 45.0,
 }
@@ -73,6 +78,15 @@ BRIEF: Mapping[str, tuple[str, ...]] = {
     "netem.local": ("loss_percent",),
     "netem.multihop": ("loss_percent",),
     "netem.link": ("from", "to", "loss_percent"),
+    "obstacle_field": (
+        "centre_m",
+        "size_m",
+        "count",
+        "shape",
+        "radius_m",
+        "corridor_m",
+        "clear_of_start_m",
+    ),
 }
 """Tables that are told elsewhere: of these only some keys, for an example."""
 

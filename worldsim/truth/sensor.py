@@ -1,39 +1,80 @@
-"""What vehicles sense of one another, for all that look at once."""
+"""What vehicles sense of one another and of obstacles near by, for all that look at once."""
+
+from typing import NamedTuple
 
 import numpy as np
 
 from agent.messages import Vector
+from worldsim.truth.obstacle import Obstacles
 from worldsim.truth.vehicle import Floats
 
 PROXIMITY_RANGE_M = 2.0
+MAX_POINTS = 32
+"""Of so many obstacles the nearest points are told at most: what an Observation holds."""
+
+
+class Sensed(NamedTuple):
+    """Bodies and nearest points of obstacles, relative to the own centre [m; world axes]."""
+
+    vehicles: tuple[Vector, ...]
+    obstacles: tuple[Vector, ...] = ()
 
 
 class ProximitySensor:
-    """True relative positions of the vehicles within 2 m, with normal noise per axis [m].
+    """True relative positions of what is within 2 m, with normal noise per axis [m].
+
+    Of each vehicle it gives the centre, of each obstacle the nearest point of the surface.
 
     The noise of one reading is keyed by (seed, agent, slot): it does not depend on who else looks.
     """
 
-    def __init__(self, seed: int, noise_m: float) -> None:
+    def __init__(self, seed: int, noise_m: float, obstacles: Obstacles) -> None:
         self._seed = seed
         self._noise_m = noise_m
+        self._obstacles = obstacles
 
-    def read(self, position: Floats, looking: list[int], slot: int) -> list[tuple[Vector, ...]]:
-        """Return for each agent in ``looking`` the vehicles it senses [m; world axes, relative].
+    def read(self, position: Floats, looking: list[int], slot: int, time_s: float) -> list[Sensed]:
+        """Return what each agent in ``looking`` senses.
 
-        position: (N, 3) [m; world frame], NaN for no vehicle. Order of bodies: by agent's row.
+        position: (N, 3) [m; world frame], NaN for no vehicle. Order of bodies: by agent's row; of
+        obstacles: as in the scenario.
         """
+        bodies = self._bodies(position, looking)
+        points = self._points(position, looking, time_s) if len(self._obstacles) else None
+        return [
+            self._sensed(body, points[row] if points is not None else None, looking[row], slot)
+            for row, body in enumerate(bodies)
+        ]
+
+    def _bodies(self, position: Floats, looking: list[int]) -> list[Floats]:
+        """Return the vehicles near each who looks, (K, 3) [m; relative]."""
         relative = position - position.take(looking, axis=0)[:, None]
         square = relative * relative
         near = square[:, :, 0] + square[:, :, 1] + square[:, :, 2] <= PROXIMITY_RANGE_M**2
         for row, agent in enumerate(looking):
             near[row, agent] = False
-        return [
-            self._sensed(relative[row, near[row]], agent, slot) for row, agent in enumerate(looking)
-        ]
+        return [relative[row, near[row]] for row in range(len(looking))]
 
-    def _sensed(self, bodies: Floats, agent: int, slot: int) -> tuple[Vector, ...]:
-        if self._noise_m > 0.0 and len(bodies):
+    def _points(self, position: Floats, looking: list[int], time_s: float) -> list[Floats]:
+        """Return the nearest points of obstacles near each who looks, (K, 3) [m; relative]."""
+        distance, away = self._obstacles.nearest(position.take(looking, axis=0), time_s)
+        found = []
+        for row in range(len(looking)):
+            near = np.flatnonzero(distance[row] <= PROXIMITY_RANGE_M)
+            if len(near) > MAX_POINTS:
+                order = np.argsort(distance[row, near], kind="stable")
+                near = np.sort(near[order[:MAX_POINTS]])
+            found.append(-distance[row, near, None] * away[row, near])
+        return found
+
+    def _sensed(self, bodies: Floats, points: Floats | None, agent: int, slot: int) -> Sensed:
+        if points is None:
+            return Sensed(self._told(bodies, agent, slot))
+        told = self._told(np.concatenate((bodies, points)), agent, slot)
+        return Sensed(told[: len(bodies)], told[len(bodies) :])
+
+    def _told(self, sensed: Floats, agent: int, slot: int) -> tuple[Vector, ...]:
+        if self._noise_m > 0.0 and len(sensed):
             generator = np.random.Generator(np.random.Philox(key=[self._seed, agent << 40 | slot]))
-            bodies = bodies + self._noise_m * generator.standard_normal(bodies.shape)
-        return tuple(map(tuple, bodies.tolist()))
+            sensed = sensed + self._noise_m * generator.standard_normal(sensed.shape)
+        return tuple(map(tuple, sensed.tolist()))

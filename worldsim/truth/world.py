@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from agent.messages import Command, Observation, Vector
 from agent.setup import Vehicle
-from worldsim.truth.sensor import ProximitySensor
+from worldsim.truth.sensor import ProximitySensor, Sensed
 from worldsim.truth.vehicle import Fleet, Floats
+
+NOTHING = Sensed(())
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,16 +91,17 @@ class World:
 
     def observe(self, looking: list[int]) -> list[Observation]:
         """Return the present slot's observations of these agents, in their order."""
-        read = self._sensor.read(self.fleet.position, looking, self.slot)
+        read = self._sensor.read(self.fleet.position, looking, self.slot, self.time_s)
         sensed = [
-            each if self._senses[agent] else () for agent, each in zip(looking, read, strict=True)
+            each if self._senses[agent] else NOTHING
+            for agent, each in zip(looking, read, strict=True)
         ]
         position = self.fleet.position.take(looking, axis=0).tolist()
         velocity = self.fleet.velocity.take(looking, axis=0).tolist()
         yaw = self.fleet.yaw.take(looking).tolist()
         return [
-            Observation(self.slot, self.time_s, tuple(p), tuple(v), heading, bodies, ())
-            for p, v, heading, bodies in zip(position, velocity, yaw, sensed, strict=True)
+            Observation(self.slot, self.time_s, tuple(p), tuple(v), heading, *each, ())
+            for p, v, heading, each in zip(position, velocity, yaw, sensed, strict=True)
         ]
 
     def obey(self, agent: int, command: Command) -> bool:
