@@ -14,7 +14,14 @@ from agent.controller import ControllerError
 from agent.core import Agent
 from agent.messages import Observation
 from agent.setup import AgentSetup
-from netem.wire.frame import Outgoing, Transmission, WireError, pack, unpack_batch
+from netem.wire.frame import (
+    BATCH_RING,
+    Outgoing,
+    Transmission,
+    WireError,
+    pack,
+    unpack_batch,
+)
 from netem.wire.keys import Keys
 from netem.wire.post import Post, RefusedError
 from netem.wire.session import SessionError, open_client
@@ -25,7 +32,6 @@ SILENCE_S = 30.0
 SETUP_WITHIN_S = 30.0
 ASK_EVERY_S = 0.1
 MAX_SETUP_B = 256 * 1024
-BATCH_RING = 8
 
 
 class GoneError(RuntimeError):

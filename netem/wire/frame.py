@@ -21,6 +21,8 @@ MAX_PAYLOAD_B = 1200
 MAX_OUTGOING = 160
 MAX_TRANSMISSION_B = MAX_OUTGOING * (MAX_PAYLOAD_B + 5) + 22
 MAX_BATCH_B = 256 * 1024
+BATCH_RING = 8
+"""How many batches wait at an agent that does not read; newer ones push out the oldest."""
 MAX_FRAMES = 4096
 FRAME_HEAD_B = 26
 BATCH_HEAD_B = 13

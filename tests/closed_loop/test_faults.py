@@ -201,3 +201,20 @@ def test_the_same_seed_has_the_same_faults_and_the_same_trace() -> None:
     struck = [kinds(flight, "kill", "join", "leave") for flight in (first, other)]
     assert len(struck[0]) == 5
     assert struck[0] != struck[1]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_apex_is_paused_hovers_and_takes_its_part_again(seed: int) -> None:
+    flight = flown(seed, 45, "at_s = 12, pause = ['vertex:V1'], for_s = 15")
+    (paused,) = kinds(flight, "pause")
+    assert kinds(flight, "resume") == [(27.0, "resume", paused[2])]
+    assert all(took <= 10.0 for took in reformed_s(flight))
+    assert violated(flight) == []
+
+
+def test_a_blink_of_a_process_changes_no_role() -> None:
+    flight = flown(0, 25, "at_s = 12, pause = ['vertex:V1', 2], for_s = 0.1")
+    assert kinds(flight, "slot", "role") == [
+        each for each in kinds(flight, "slot", "role") if each[0] < 12.0
+    ]
+    assert violated(flight) == []

@@ -5,7 +5,17 @@ from math import inf, pi
 import pytest
 
 from netem.messages import Conditions
-from worldsim.run.faults import Change, Heal, Joining, Order, Partition, Revival, Strike, Timeline
+from worldsim.run.faults import (
+    Change,
+    Heal,
+    Holding,
+    Joining,
+    Order,
+    Partition,
+    Revival,
+    Strike,
+    Timeline,
+)
 from worldsim.scenario.file import parse
 from worldsim.scenario.starting import BoxStart
 from worldsim.scenario.tables import Scenario
@@ -47,6 +57,15 @@ def test_what_was_slept_through_comes_at_once_in_order() -> None:
         Strike(0, "kill", (0,)),
         Joining(1, 2, BoxStart()),
         Revival(0, ()),
+    ]
+
+
+def test_who_is_paused_resumes_by_itself_or_when_told() -> None:
+    first, second = "at_s = 1\npause = ['vertex:V1']\nfor_s = 2", "at_s = 5\nresume = ['all']"
+    assert played(first, second) == [
+        (1.0, Holding(0, "pause", ("vertex:V1",))),
+        (3.0, Holding(0, "resume", ())),
+        (5.0, Holding(1, "resume", ("all",))),
     ]
 
 

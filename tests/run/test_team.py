@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from worldsim.run.faults import Joining, Revival, Strike
+from worldsim.run.faults import Holding, Joining, Revival, Strike
 from worldsim.run.team import Team
 from worldsim.scenario.file import load
 from worldsim.scenario.starting import BoxStart, ListStart
@@ -67,6 +67,23 @@ def test_the_dead_are_not_struck_again_and_come_back_with_a_higher_incarnation()
     team.take(team.booted(21.0), 21.0)
     assert team.alive[[2, 5]].all()
     assert team.incarnations[2] == 1
+
+
+def test_the_paused_take_part_but_do_not_step_until_they_resume() -> None:
+    team = Team(scenario())
+    places = [*PLACES, None, None, None]
+    formation = scenario().formation
+    team.take(team.held(Holding(0, "pause", ("vertex:V1", 4)), places, formation), 10.0)
+    assert team.alive[[0, 4]].all()
+    assert not team.awake[[0, 4]].any()
+    assert team.first == 1
+    assert struck(team, "vertex:V1") == ()  # it is not where it was found last
+    assert struck(team, 4) == (4,)
+    assert team.held(Holding(0, "pause", (4,)), places, formation).agents == ()
+    team.take(team.held(Holding(1, "resume", (4,)), places, formation), 11.0)
+    assert team.held(Holding(0, "resume", ()), places, formation).agents == (0,)
+    team.take(team.struck(Strike(2, "kill", (0,)), places, formation), 12.0)
+    assert team.held(Holding(0, "resume", ()), places, formation).agents == ()
 
 
 def test_joiners_get_the_next_ids_and_keep_clear_of_who_is_there() -> None:

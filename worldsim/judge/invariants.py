@@ -18,12 +18,11 @@ from agent.messages import Place
 from worldsim.judge.bodies import Bodies
 from worldsim.judge.phase import CONVERGED_S, Phase
 from worldsim.judge.reach import Components, Reach
+from worldsim.judge.recovery import LOSSES, RETURNS
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
 
-FAULTS = frozenset(
-    {"kill", "leave", "restart", "join", "partition", "heal", "netem", "formation", "frame"}
-)
+FAULTS = LOSSES | RETURNS | {"partition", "heal", "netem", "formation", "frame"}
 LOOK_EVERY_S = 1.0
 MAX_ROLE_CHANGES = 3
 Claims = list[tuple[int, int]]

@@ -13,8 +13,8 @@ from worldsim.judge.bodies import Bodies
 from worldsim.judge.phase import CONVERGED_S, Phase
 from worldsim.judge.tick import Tick
 
-RETURNS = frozenset({"restart", "join"})
-LOSSES = frozenset({"kill", "leave"})
+RETURNS = frozenset({"restart", "join", "resume"})
+LOSSES = frozenset({"kill", "leave", "pause"})
 
 
 @dataclass(slots=True)

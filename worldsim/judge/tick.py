@@ -20,9 +20,9 @@ class Tick:
     position (N, 3) [m; world frame]; attitude (N, 3): yaw, pitch, roll [rad]; target (N, 3) [m;
     world frame], the target-on-queue, NaN for none; place (N, 2): queue and rank, -1 for none;
     force (N,): |u_i| of (28); turn_deg (N,): azimuth of the wanted velocity against the heading on
-    moving steps, else NaN; alive (N,): whether the agent's process takes part; links (L, 2):
-    (hearer, heard). mission (N,): the key of the mission that each flies. packets: the newest
-    counters of the medium, as in summary.json; empty before there are any.
+    moving steps, else NaN; alive (N,): whether the agent's process takes part, and is not paused;
+    links (L, 2): (hearer, heard). mission (N,): the key of the mission that each flies. packets:
+    the newest counters of the medium, as in summary.json; empty before there are any.
     """
 
     index: int

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from agent.messages import HOME, Pose
 from agent.qstructure.formation import FormationSpec
-from netem.messages import Conditions, Groups
+from netem.messages import Changed, Conditions, Groups, Healed, Parted
 from netem.schedule import overlaid
 from worldsim.scenario.course import Step, steps
 from worldsim.scenario.events import FrameTable
@@ -34,6 +34,17 @@ class Revival(NamedTuple):
     selectors: tuple[int | str, ...]
 
 
+class Holding(NamedTuple):
+    """Processes are to be stopped (kind pause), or to go on (resume): those selected.
+
+    With none selected, those go on that ``number`` stopped.
+    """
+
+    number: int
+    kind: str
+    selectors: tuple[int | str, ...]
+
+
 class Joining(NamedTuple):
     """New agents are to come."""
 
@@ -49,15 +60,30 @@ class Change(NamedTuple):
     change: Conditions
     undone: bool
 
+    @property
+    def order(self) -> Changed:
+        """What the medium is told."""
+        return Changed(self.conditions)
+
 
 class Partition(NamedTuple):
     """The radio's groups from now on."""
 
     groups: Groups
 
+    @property
+    def order(self) -> Parted:
+        """What the medium is told."""
+        return Parted(self.groups)
+
 
 class Heal(NamedTuple):
     """No groups from now on."""
+
+    @property
+    def order(self) -> Healed:
+        """What the medium is told."""
+        return Healed()
 
 
 class Order(NamedTuple):
@@ -68,7 +94,7 @@ class Order(NamedTuple):
     pose: Pose
 
 
-Action = Strike | Revival | Joining | Change | Partition | Heal | Order
+Action = Strike | Revival | Holding | Joining | Change | Partition | Heal | Order
 
 
 class Timeline:
@@ -100,7 +126,7 @@ class Timeline:
         return actions
 
     def _action(self, step: Step) -> Action | None:
-        event, number = step.event, step.number
+        event = step.event
         if event.netem is not None:
             return self._change(step, event.netem)
         if event.partition is not None or event.heal is not None:
@@ -108,10 +134,8 @@ class Timeline:
         if event.formation is not None or event.frame is not None:
             return self._order(event.formation, event.frame)
         if event.joiners:
-            return Joining(number, event.joiners, event.start or self._fleet_start)
-        if event.restart is not None or step.undo:
-            return Revival(number, event.restart or ())
-        return Strike(number, event.kind, event.selectors)
+            return Joining(step.number, event.joiners, event.start or self._fleet_start)
+        return _upon_agents(step)
 
     def _change(self, step: Step, change: Conditions) -> Change:
         """Lay the changes in force over the scenario's conditions, the later over the earlier."""
@@ -140,6 +164,16 @@ class Timeline:
         if frame is not None:
             self._pose = _posed(self._pose, frame)
         return Order("frame" if formation is None else "formation", self._formation, self._pose)
+
+
+def _upon_agents(step: Step) -> Strike | Revival | Holding:
+    """Return what becomes of agents; what undoes a step is about those whom it struck."""
+    kind, selectors = step.event.kind, () if step.undo else step.event.selectors
+    if kind in {"pause", "resume"}:
+        return Holding(step.number, "resume" if step.undo else kind, selectors)
+    if step.undo or kind == "restart":
+        return Revival(step.number, selectors)
+    return Strike(step.number, kind, selectors)
 
 
 def _posed(pose: Pose, frame: FrameTable) -> Pose:

@@ -21,6 +21,7 @@ from worldsim.run.faults import (
     Action,
     Change,
     Heal,
+    Holding,
     Joining,
     Order,
     Partition,
@@ -29,7 +30,7 @@ from worldsim.run.faults import (
     Timeline,
 )
 from worldsim.run.orders import Orders
-from worldsim.run.team import Begin, Start, Stop, Team
+from worldsim.run.team import Begin, Hold, Start, Stop, Team
 from worldsim.run.told import UNTOLD, Told, told_by
 from worldsim.run.trace import Trace
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
@@ -39,7 +40,7 @@ from worldsim.truth.start import starts_of
 from worldsim.truth.world import Clock, World
 
 Event = dict[str, Any]
-Deed = Stop | Start | Begin | Change | Partition | Heal | Order
+Deed = Stop | Hold | Start | Begin | Change | Partition | Heal | Order
 """What a clock carries out between slots."""
 
 
@@ -124,6 +125,8 @@ class SlotLoop:
         """Find out whom an action means now; return what a clock has to do."""
         if isinstance(action, Strike):
             return self.team.struck(action, self._places, self._formation)
+        if isinstance(action, Holding):
+            return self.team.held(action, self._places, self._formation)
         if isinstance(action, Revival):
             return self.team.revived(action, self.world.fleet.position, self.world.time_s)
         if isinstance(action, Joining):
@@ -135,6 +138,9 @@ class SlotLoop:
         match deed:
             case Stop():
                 self._stop(deed)
+            case Hold():
+                self.team.take(deed, self.world.time_s)
+                self._tell(deed)
             case Start():
                 self._start(deed)
             case Begin():
@@ -154,14 +160,14 @@ class SlotLoop:
         self.trace.poses(world.slot, world.fleet)
         if world.slot % world.clock.slots_per_tick == 0:
             self._show()
-        slots, alive = world.clock.slots_per_tick, self.team.alive.tolist()
-        group = [agent for agent in range(world.slot % slots, len(alive), slots) if alive[agent]]
+        slots, awake = world.clock.slots_per_tick, self.team.awake.tolist()
+        group = [agent for agent in range(world.slot % slots, len(awake), slots) if awake[agent]]
         observations = list(zip(group, world.observe(group), strict=True)) if group else []
         for agent, observation in observations:
             self._headings[agent] = observation.yaw
         if self._orders.pending is not None:
             observations = [self._ordered(*each) for each in observations]
-        return Opened(world.slot, world.time_s, self._radios(alive), observations)
+        return Opened(world.slot, world.time_s, self._radios(), observations)
 
     def obey(self, agent: int, command: Command, encoded: bytes) -> None:
         """Take one agent's command; under a barrier, in order of ids."""
@@ -197,12 +203,16 @@ class SlotLoop:
 
     def _stop(self, stop: Stop) -> None:
         self.team.take(stop, self.world.time_s)
-        for agent in stop.agents:
-            if stop.kind == "leave":
+        if stop.kind == "leave":
+            for agent in stop.agents:
                 self.world.leave(agent)
-            self.event(stop.kind, agent, planned=True)
-        if not stop.agents:
-            self.event(stop.kind, None, planned=True, nobody=stop.selectors)
+        self._tell(stop)
+
+    def _tell(self, deed: Stop | Hold) -> None:
+        for agent in deed.agents:
+            self.event(deed.kind, agent, planned=True)
+        if not deed.agents:
+            self.event(deed.kind, None, planned=True, nobody=deed.selectors)
 
     def _start(self, start: Start) -> None:
         self.team.take(start, self.world.time_s)
@@ -241,10 +251,11 @@ class SlotLoop:
             return agent, observation
         return agent, msgspec.structs.replace(observation, orders=(mission,))
 
-    def _radios(self, alive: list[bool]) -> tuple[Vector | None, ...]:
+    def _radios(self) -> tuple[Vector | None, ...]:
         positions = self.world.positions()
         if self.team.whole:
             return positions
+        alive = self.team.alive.tolist()
         return tuple(where if here else None for where, here in zip(positions, alive, strict=True))
 
     def _watch_place(self, agent: int, now: tuple[int, int] | None) -> None:
@@ -267,8 +278,8 @@ class SlotLoop:
     def _tick(self) -> Tick:
         fleet = self.world.fleet
         told = [
-            row if alive else UNTOLD
-            for row, alive in zip(self._told, self.team.alive.tolist(), strict=True)
+            row if awake else UNTOLD
+            for row, awake in zip(self._told, self.team.awake.tolist(), strict=True)
         ]
         reasons = np.array(
             [(*row.target, row.force, row.turn_deg) for row in told], dtype=np.float32
@@ -284,7 +295,7 @@ class SlotLoop:
             place=np.array([row.place for row in told], dtype=np.int16),
             force=reasons[:, 3],
             turn_deg=reasons[:, 4],
-            alive=self.team.alive.copy(),
+            alive=self.team.awake.copy(),
             mission=np.array([row.mission for row in told], dtype=np.int64),
             links=self._links(told) if self._recorder is not None else NO_LINKS,
             packets=self._packets(),

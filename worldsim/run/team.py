@@ -9,7 +9,7 @@ import numpy as np
 
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation, FormationSpec
-from worldsim.run.faults import Joining, Revival, Strike
+from worldsim.run.faults import Holding, Joining, Revival, Strike
 from worldsim.scenario.starting import BoxStart, ListStart
 from worldsim.scenario.tables import Scenario
 from worldsim.truth.obstacle import Obstacles
@@ -21,6 +21,15 @@ RANDOM_KEY = 0xFA17
 
 class Stop(NamedTuple):
     """These agents' processes end now; kind kill or leave says what becomes of their vehicles."""
+
+    number: int
+    kind: str
+    agents: tuple[int, ...]
+    selectors: tuple[int | str, ...]
+
+
+class Hold(NamedTuple):
+    """These agents' processes are stopped now (kind pause), or go on (resume)."""
 
     number: int
     kind: str
@@ -49,13 +58,17 @@ class Begin(NamedTuple):
 
 
 class Team:
-    """Everybody's part in a run, by row."""
+    """Everybody's part in a run, by row.
+
+    alive (N,): whose process takes part; awake (N,): who steps, too, for it is not paused.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         agents, rows = scenario.fleet.agents, scenario.rows
         self._scenario = scenario
         self._obstacles = Obstacles(scenario.obstacle)
         self.alive = np.arange(rows) < agents
+        self.awake = self.alive.copy()
         self.incarnations = [0] * rows
         self.known = agents
         self.whole = agents == rows
@@ -71,8 +84,8 @@ class Team:
 
     @property
     def first(self) -> int | None:
-        """The lowest id that takes part."""
-        return int(np.argmax(self.alive)) if self.alive.any() else None
+        """The lowest id that steps."""
+        return int(np.argmax(self.awake)) if self.awake.any() else None
 
     def booted(self, time_s: float) -> Begin:
         """Return those who have booted by a time [s]."""
@@ -85,6 +98,19 @@ class Team:
         among = [a for a in range(self.known) if self.alive[a] or a in self._boots]
         agents = self._selected(action.number, action.selectors, among, places, formation)
         return Stop(action.number, action.kind, agents, action.selectors)
+
+    def held(
+        self, action: Holding, places: list[tuple[int, int] | None], formation: FormationSpec
+    ) -> Hold:
+        """Find whose processes are to be stopped, or to go on."""
+        if action.kind == "pause":
+            among = np.flatnonzero(self.awake).tolist()
+        else:
+            among = np.flatnonzero(self.alive & ~self.awake).tolist()
+        agents = tuple(a for a in self._struck.get(action.number, ()) if a in among)
+        if action.selectors:
+            agents = self._selected(action.number, action.selectors, among, places, formation)
+        return Hold(action.number, action.kind, agents, action.selectors)
 
     def revived(self, action: Revival, position: Floats, time_s: float = 0.0) -> Start:
         """Find who comes back at a time [s], and where.
@@ -117,26 +143,31 @@ class Team:
             action.number, "join", dict.fromkeys(agents, 0), dict(zip(agents, where, strict=True))
         )
 
-    def take(self, deed: Stop | Start | Begin, time_s: float) -> None:
+    def take(self, deed: Stop | Hold | Start | Begin, time_s: float) -> None:
         """Let a deed that was done count from a time [s] on."""
-        if isinstance(deed, Stop):
-            self._struck[deed.number] = deed.agents
-            for agent in deed.agents:
-                self.strike_out(agent)
-        elif isinstance(deed, Start):
-            for agent, incarnation in deed.incarnations.items():
-                self.incarnations[agent] = incarnation
-                self._boots[agent] = time_s + self._scenario.fleet.boot_s
-                self.known = max(self.known, agent + 1)
-        else:
-            for agent in deed.agents:
-                del self._boots[agent]
-                self.alive[agent] = True
+        match deed:
+            case Stop(number=number, agents=agents):
+                self._struck[number] = agents
+                for agent in agents:
+                    self.strike_out(agent)
+            case Hold(number=number, kind=kind, agents=agents):
+                if kind == "pause":
+                    self._struck[number] = agents
+                self.awake[list(agents)] = kind == "resume"
+            case Start(incarnations=incarnations):
+                for agent, incarnation in incarnations.items():
+                    self.incarnations[agent] = incarnation
+                    self._boots[agent] = time_s + self._scenario.fleet.boot_s
+                    self.known = max(self.known, agent + 1)
+            case Begin(agents=agents):
+                for agent in agents:
+                    del self._boots[agent]
+                    self.alive[agent] = self.awake[agent] = True
         self.whole = bool(self.alive.all())
 
     def strike_out(self, agent: int) -> None:
         """Let an agent take part no more."""
-        self.alive[agent] = self.whole = False
+        self.alive[agent] = self.awake[agent] = self.whole = False
         self._boots.pop(agent, None)
 
     def _selected(
@@ -156,7 +187,8 @@ class Team:
             elif selector.startswith("random:"):
                 chosen.update(self._random(number, int(selector.partition(":")[2]), among))
             elif spec is not None:
-                chosen.update(_placed(selector, among, places, self._formation(spec)))
+                awake = [agent for agent in among if self.awake[agent]]
+                chosen.update(_placed(selector, awake, places, self._formation(spec)))
         return tuple(agent for agent in among if agent in chosen)
 
     def _formation(self, spec: FormationSpec) -> Formation:

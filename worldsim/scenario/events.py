@@ -41,12 +41,13 @@ class FrameTable(Table, frozen=True):
 
 
 class EventTable(Table, frozen=True):
-    """One action at ``at_s``; ``for_s`` later it is undone (kill, leave, partition, netem).
+    """One action at ``at_s``; ``for_s`` later it is undone (kill, leave, pause, partition, netem).
 
     kill: processes die, their vehicles stop and hover; leave: the vehicles go too; restart: they
-    come back; join: new ones come, under the next free ids. partition: groups that hear only
-    themselves, agents not named form one more; heal ends it. netem: keys of [netem] that change.
-    formation, frame: a mission for the team.
+    come back; join: new ones come, under the next free ids. pause: processes are stopped, their
+    vehicles hover when the last command has expired; resume: they go on. partition: groups that
+    hear only themselves, agents not named form one more; heal ends it. netem: keys of [netem] that
+    change. formation, frame: a mission for the team.
     """
 
     at_s: Time
@@ -54,6 +55,8 @@ class EventTable(Table, frozen=True):
     kill: Selectors | None = None
     leave: Selectors | None = None
     restart: Selectors | None = None
+    pause: Selectors | None = None
+    resume: Selectors | None = None
     join: Joiners | JoinTable | None = None
     partition: Annotated[tuple[Group, ...], Meta(min_length=1, max_length=1000)] | None = None
     heal: bool | None = None
@@ -85,10 +88,12 @@ class EventTable(Table, frozen=True):
 
     @property
     def selectors(self) -> tuple[int | str, ...]:
-        """Whom a kill, leave or restart is about."""
-        return self.kill or self.leave or self.restart or ()
+        """Whom an action upon processes is about."""
+        return self.kill or self.leave or self.restart or self.pause or self.resume or ()
 
 
 ACTIONS = tuple(name for name in EventTable.__struct_fields__ if name not in {"at_s", "for_s"})
-UNDONE = ("kill", "leave", "partition", "netem")
+UNDONE = ("kill", "leave", "pause", "partition", "netem")
 """Actions that ``for_s`` can undo."""
+UPON_PROCESSES = ("kill", "leave", "restart", "join", "pause", "resume")
+"""Actions that need somebody who starts and signals processes."""
