@@ -1,14 +1,22 @@
-"""One directed link: whether a frame gets across, and when.
+"""One directed link: whether a frame gets across, when, and whole or not.
 
-``verdict`` is the whole law of a link. It is a pure function of the link's model, the distance and
-numbers drawn for this very frame, so the same frame always meets the same fate.
+``verdict`` is the whole law of a link: a function of the link's model, the distance, numbers drawn
+for this very frame, and what the link remembers. So the same frame always meets the same fate.
 """
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from hashlib import blake2b
-from struct import Struct as Layout
+from math import inf, log10
 from typing import NamedTuple
+
+from netem.air import Air
+from netem.chance import SHAPES, Numbers, below, correlated
+from netem.messages import GilbertElliott, PathLoss
+
+DEFAULT_LIMIT = 1000
+"""tc-netem's own [frames]."""
+EDGE_SIGMAS = 6.0
+"""So far over the budget, in shadowing_db, nothing is received: one frame in 10^9 would be."""
 
 
 class Cause(IntEnum):
@@ -19,71 +27,169 @@ class Cause(IntEnum):
     DROPPED_LOSS = 2
     DROPPED_MEDIUM = 3
     DROPPED_PARTITION = 4
+    DROPPED_QUEUE = 5
 
 
 class Verdict(NamedTuple):
-    """What a link decides: the cause, and the delay [s] of a frame that gets across."""
+    """What a link decides: the cause, and the delay [s] of a frame that gets across.
+
+    turned: which share of its bits along a frame one is that arrives wrong, in [0, 1); negative
+    where the frame is whole.
+    """
 
     cause: Cause
     delay_s: float = 0.0
+    turned: float = -1.0
+
+
+class Memory:
+    """What one directed link remembers on one channel, from one of its frames to the next.
+
+    bad: Gilbert-Elliott's state. score: the last delay's, a standard normal number; None before the
+    first. air: what waits, where the link has a rate of its own.
+    """
+
+    __slots__ = ("air", "bad", "score")
+
+    def __init__(self) -> None:
+        self.bad = False
+        self.score: float | None = None
+        self.air = Air()
 
 
 @dataclass(frozen=True, slots=True)
 class LinkModel:
     """A link in tc-netem's and ns-3's terms.
 
-    range_m: hard disc, d_c [m]; infinite without a limit.
-    delay_ms, jitter_ms: delay is uniform in [delay - jitter, delay + jitter], never under 0 [ms].
-    loss_percent: independent loss of each frame [%].
-    draws: whether a verdict on this link needs random numbers at all; ``clean``: the verdict in
-    range if it needs none.
+    range_m: hard disc, d_c [m]; infinite without a limit. path_loss: a soft edge within it.
+    delay_ms, jitter_ms, distribution: the delay is delay + jitter * a number of that shape, never
+    under 0 [ms]; delay_correlation_percent: how much it remembers of the frame before.
+    loss_percent, gemodel: independent losses, and losses in bursts; a frame must pass both.
+    duplicate_percent, corrupt_percent: come twice, come with a bit turned. reorder_percent: skip
+    the delay, and so overtake.
+    rate_kbit, rate_overhead_b, limit: how fast frames go out, with so many bytes more for each, and
+    how many may wait [frames]. They are the sender's; ``own_air``: the link has its own.
+    draws: whether a verdict on this link needs random numbers at all, ``plain``: for no more than
+    loss and uniform jitter; ``clean``: the verdict in range if it needs none. remembers: whether it
+    needs a Memory. reach_m: beyond it nothing is ever received.
     """
 
-    range_m: float = float("inf")
+    range_m: float = inf
     delay_ms: float = 0.0
     jitter_ms: float = 0.0
     loss_percent: float = 0.0
+    path_loss: PathLoss | None = None
+    delay_correlation_percent: float = 0.0
+    distribution: str = "uniform"
+    gemodel: GilbertElliott | None = None
+    duplicate_percent: float = 0.0
+    corrupt_percent: float = 0.0
+    reorder_percent: float = 0.0
+    rate_kbit: float = inf
+    rate_overhead_b: int = 0
+    limit: int = DEFAULT_LIMIT
+    own_air: bool = False
 
     draws: bool = field(init=False)
+    plain: bool = field(init=False)
     clean: Verdict = field(init=False)
+    remembers: bool = field(init=False)
+    reach_m: float = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "draws", self.jitter_ms > 0.0 or self.loss_percent > 0.0)
+        rare = self.duplicate_percent + self.corrupt_percent + self.reorder_percent > 0.0
+        shaped = self.delay_correlation_percent > 0.0 or self.distribution != "uniform"
+        jittery = self.jitter_ms > 0.0
+        bursts, soft = self.gemodel is not None, self.path_loss is not None
+        plain = not (rare or bursts or soft or self.own_air or (jittery and shaped))
+        draws = jittery or self.loss_percent > 0.0 or not plain
+        remembers = bursts or self.own_air or (jittery and self.delay_correlation_percent > 0.0)
+        object.__setattr__(self, "draws", draws)
+        object.__setattr__(self, "plain", plain)
         object.__setattr__(self, "clean", Verdict(Cause.DELIVERED, self.delay_ms / 1000.0))
+        object.__setattr__(self, "remembers", remembers)
+        object.__setattr__(self, "reach_m", min(self.range_m, edge_m(self.path_loss)))
 
 
-_KEY = Layout("<6q")
-_NUMBERS = Layout("<4Q")
-_UNIT = 1.0 / 2**53
-
-
-def draw(
-    seed: bytes, source: int, incarnation: int, destination: int, channel: int, count: int
-) -> tuple[float, float, float, float]:
-    """Return four numbers in [0, 1) that belong to one frame on one link and to nothing else.
-
-    They are keyed, not drawn in sequence: order, process and shard do not matter. By purpose:
-    loss, jitter, and two that are not used yet.
-    """
-    key = _KEY.pack(source, incarnation, destination, channel, count, 0)
-    a, b, c, d = _NUMBERS.unpack(blake2b(key, key=seed, digest_size=32).digest())
-    return (a >> 11) * _UNIT, (b >> 11) * _UNIT, (c >> 11) * _UNIT, (d >> 11) * _UNIT
-
-
+FRESH = Memory()
+"""For links that remember nothing; never written to."""
 LOST_TO_RANGE = Verdict(Cause.DROPPED_RANGE)
 LOST = Verdict(Cause.DROPPED_LOSS)
 LOST_TO_PARTITION = Verdict(Cause.DROPPED_PARTITION)
+LOST_TO_QUEUE = Verdict(Cause.DROPPED_QUEUE)
 
 
 def verdict(
-    link: LinkModel, distance_m: float, draws: tuple[float, float, float, float] | None
+    link: LinkModel, distance_m: float, draws: Numbers | None, memory: Memory = FRESH
 ) -> Verdict:
-    """Decide one frame on one link; ``draws`` may be None where ``link.draws`` is False."""
+    """Decide one frame on one link.
+
+    draws: numbers for loss and delay; unless ``link.plain`` also for edge, reorder, the step
+    between good and bad, the loss in bursts, duplicate and corruption; None where ``link.draws`` is
+    False. memory: the link's own, which changes, where ``link.remembers``.
+    """
     if not distance_m <= link.range_m:
         return LOST_TO_RANGE
     if draws is None:
         return link.clean
+    if not link.plain:
+        return _rough(link, distance_m, draws, memory)
     if draws[0] * 100.0 < link.loss_percent:
         return LOST
     delay_ms = link.delay_ms + link.jitter_ms * (2.0 * draws[1] - 1.0)
-    return Verdict(Cause.DELIVERED, max(0.0, delay_ms) / 1000.0)
+    return Verdict(Cause.DELIVERED, delay_ms / 1000.0 if delay_ms > 0.0 else 0.0)
+
+
+def _rough(link: LinkModel, distance_m: float, draws: Numbers, memory: Memory) -> Verdict:
+    """Decide by all that a link may have beyond loss and jitter."""
+    loss, delay, edge, reorder, step, burst, _, corrupt = draws
+    if link.path_loss is not None and not edge < received(link.path_loss, distance_m):
+        return LOST_TO_RANGE
+    in_burst = link.gemodel is not None and _lost_in_burst(link.gemodel, step, burst, memory)
+    if in_burst or loss * 100.0 < link.loss_percent:
+        return LOST
+    delay_s = _delay_ms(link, delay, memory) / 1000.0
+    if reorder * 100.0 < link.reorder_percent:
+        delay_s = 0.0
+    if corrupt * 100.0 < link.corrupt_percent:
+        return Verdict(Cause.DELIVERED, delay_s, corrupt * 100.0 / link.corrupt_percent)
+    return Verdict(Cause.DELIVERED, delay_s)
+
+
+def twice(link: LinkModel, draws: Numbers) -> bool:
+    """Whether a frame is duplicated on a link."""
+    return draws[6] * 100.0 < link.duplicate_percent
+
+
+def _lost_in_burst(model: GilbertElliott, step: float, burst: float, memory: Memory) -> bool:
+    """Decide by Gilbert and Elliott: the state a frame finds loses it, or not; then it steps."""
+    if memory.bad:
+        memory.bad = not step * 100.0 < model.r_percent
+        return burst * 100.0 < model.loss_bad_percent
+    memory.bad = step * 100.0 < model.p_percent
+    return burst * 100.0 < model.loss_good_percent
+
+
+def _delay_ms(link: LinkModel, share: float, memory: Memory) -> float:
+    if link.jitter_ms <= 0.0:
+        return link.delay_ms
+    if link.delay_correlation_percent > 0.0:
+        correlation = link.delay_correlation_percent / 100.0
+        share, memory.score = correlated(share, memory.score, correlation)
+    return max(0.0, link.delay_ms + link.jitter_ms * SHAPES[link.distribution](share))
+
+
+def received(edge: PathLoss, distance_m: float) -> float:
+    """Return the probability that a frame is received over a distance [m]."""
+    far = max(1.0, distance_m / edge.reference_distance_m)
+    loss_db = edge.reference_loss_db + 10.0 * edge.exponent * log10(far)
+    return below((edge.budget_db - loss_db) / edge.shadowing_db)
+
+
+def edge_m(edge: PathLoss | None) -> float:
+    """Return the distance [m] beyond which a soft edge lets nothing through."""
+    if edge is None:
+        return inf
+    room_db = edge.budget_db + EDGE_SIGMAS * edge.shadowing_db - edge.reference_loss_db
+    decades = min(12.0, room_db / (10.0 * edge.exponent))
+    return edge.reference_distance_m * 10.0**decades if room_db > 0.0 else 0.0

@@ -2,27 +2,36 @@
 
 A pure state machine. Time enters with the true positions (``place``); each transmission is judged
 once, link by link, when it is sent; ``collect`` hands a receiver what came due. The order of
-deliveries is canonical, (due, source, incarnation, channel, count), so it does not depend on the
-order in which transmissions arrived.
+deliveries is canonical, (due, source, incarnation, channel, count, copy), so it does not depend on
+the order in which transmissions arrived.
 """
 
+from collections.abc import Iterable, Mapping
 from hashlib import sha256
 from heapq import heappop, heappush
-from math import nan, sqrt
+from math import inf
 from struct import Struct as Layout
 
-from netem.link import LOST_TO_PARTITION, Cause, draw, verdict
+import msgspec
+
+from netem.air import Air
+from netem.barriers import Barriers
+from netem.journal import Journal
+from netem.link import LOST_TO_PARTITION, LOST_TO_QUEUE, Cause, LinkModel, Verdict
+from netem.links import Links, Sending
 from netem.messages import (
     Changed,
     Conditions,
-    Groups,
+    Flapped,
     Healed,
+    Jammed,
     MediumSetup,
     Parted,
     Position,
     RadioOrder,
     Verdicts,
 )
+from netem.near import Near, Neighbourhood
 from netem.schedule import Schedule
 from netem.wire.frame import (
     BATCH_HEAD_B,
@@ -33,66 +42,65 @@ from netem.wire.frame import (
     Transmission,
 )
 
-_FATE = Layout("<5qBd").pack
+_HEAD = Layout("<4q").pack
+_FATE = Layout("<BBdd").pack
 DELIVERED = Cause.DELIVERED
 FATES = tuple(cause.name.lower() for cause in Cause)
-_InFlight = tuple[float, int, int, int, int, Frame]
+_InFlight = tuple[float, int, int, int, int, int, Frame]
 
 
 class Medium:
     """Frames between agents under a seed and conditions.
 
+    receivers: those whom this medium delivers to, all when left out; several mediums that share
+    them out, and all hear of every transmission, decide together what one would.
+
     Conservation, at every moment: ``addressed`` (frames sent, times the other agents, whether they
-    are there or not) equals the sum of all fates plus what is in flight. A frame for a radio that
-    is not there is out of range; what is in flight to one that goes is dropped by the medium.
+    are there or not, and each duplicate once more) equals the sum of all fates plus what is in
+    flight. A frame for a radio that is not there is out of range; what is in flight to one that
+    goes is dropped by the medium.
     """
 
-    def __init__(self, setup: MediumSetup) -> None:
-        self._seed = sha256(b"qswarm medium %d" % setup.seed).digest()
+    def __init__(self, setup: MediumSetup, receivers: Iterable[int] | None = None) -> None:
+        own = tuple(sorted(range(setup.agents) if receivers is None else receivers))
+        self._own = frozenset(own)
+        self._links = Links(sha256(b"qswarm medium %d" % setup.seed).digest())
         self._schedule = Schedule(setup.conditions)
-        self._agents = setup.agents
-        self._positions: tuple[Position | None, ...] = (None,) * setup.agents
+        self._barriers = Barriers()
+        self._near = Neighbourhood(setup.agents, own)
+        self._others = [len(own) - (agent in self._own) for agent in range(setup.agents)]
         self._queues: list[list[_InFlight]] = [[] for _ in range(setup.agents)]
         self._counts: dict[tuple[int, int, int], int] = {}
+        self._airs: dict[tuple[int, int], Air] = {}
         self._fates = [0] * len(Cause)
-        self._journal = sha256()
-        self.sent = 0
-        self.in_flight = 0
-
-    @property
-    def addressed(self) -> int:
-        """How many (frame, other agent) pairs there were so far."""
-        return self.sent * (self._agents - 1)
+        self._journal = Journal(setup.agents)
+        self.sent = self.addressed = self.in_flight = self.duplicated = self.corrupted = 0
 
     def place(self, positions: tuple[Position | None, ...]) -> None:
         """Take the true positions, row i = agent i [m; world frame]; None where no radio is."""
-        self._positions = positions
+        self._near.place(positions)
         if None in positions:
             for receiver, where in enumerate(positions):
                 if where is None and self._queues[receiver]:
                     self.discard(receiver)
 
     def obey(self, order: RadioOrder) -> None:
-        """Carry out an order, between slots."""
+        """Carry out an order, between slots: later frames meet it, those in flight do not."""
         match order:
             case Changed(conditions=conditions):
                 self.change(conditions)
-            case Parted(groups=groups):
-                self.partition(groups)
+            case Parted():
+                self._barriers.partition(order.groups, order.kind, order.bridge)
             case Healed():
-                self.heal()
+                self._barriers.heal()
+            case Jammed():
+                self._barriers.jam(order.number, order.jam)
+            case Flapped():
+                self._barriers.flap(order.number, order.flap)
 
     def change(self, conditions: Conditions) -> None:
         """Judge later frames under other conditions; what is in flight has its verdict."""
         self._schedule.change(conditions)
-
-    def partition(self, groups: Groups) -> None:
-        """Let no later frame across between groups; agents not named form one group more."""
-        self._schedule.partition(groups)
-
-    def heal(self) -> None:
-        """Let later frames across again."""
-        self._schedule.heal()
 
     def transmit(self, source: int, sent_s: float, transmission: Transmission) -> None:
         """Judge one agent's frames of one slot, sent at ``sent_s`` [s], on every link."""
@@ -101,6 +109,7 @@ class Medium:
             count = self._counts.get(count_key, 0)
             self._counts[count_key] = count + 1
             self.sent += 1
+            self.addressed += self._others[source]
             self._spread(
                 Frame(source, transmission.incarnation, outgoing.channel, count, outgoing.payload),
                 sent_s,
@@ -131,45 +140,128 @@ class Medium:
         self._fates[Cause.DROPPED_MEDIUM] += lost
 
     def digest(self) -> bytes:
-        """Return a hash over every verdict so far, in canonical order within a transmission."""
+        """Return a hash over every verdict so far; asked at the end of each slot, it is one."""
         return self._journal.digest()
+
+    def pages(self) -> Mapping[int, bytes]:
+        """Return, at the end of a slot, what a shard noted in it; see ``journal.joined``."""
+        return self._journal.torn_out()
 
     def verdicts(self, slot: int) -> Verdicts:
         """Return the counters as they stand."""
-        fates = dict(zip(FATES, self._fates, strict=True))
-        return Verdicts(slot, self.sent, self.addressed, fates, self.in_flight, {}, self.digest())
+        return Verdicts(
+            slot,
+            self.sent,
+            self.addressed,
+            dict(zip(FATES, self._fates, strict=True)),
+            self.in_flight,
+            {},
+            self.digest(),
+            duplicated=self.duplicated,
+            corrupted=self.corrupted,
+        )
 
     def _spread(self, frame: Frame, sent_s: float) -> None:
         """Judge one frame on its link to every other agent, in order of their ids."""
-        source, incarnation, channel, count = (
-            frame.source,
-            frame.incarnation,
-            frame.channel,
-            frame.count,
-        )
-        here, schedule = self._positions[source], self._schedule
-        journal = []
-        for receiver, there in enumerate(self._positions):
-            if receiver == source:
-                continue
-            link = schedule.model(channel, source, receiver)
-            distance_m = _distance(here, there) if here and there else nan
-            draws = None
-            if link.draws:
-                draws = draw(self._seed, source, incarnation, receiver, channel, count)
-            cause, delay_s = verdict(link, distance_m, draws)
-            if schedule.parted and schedule.cut(source, receiver):
-                cause, delay_s = LOST_TO_PARTITION
-            journal.append(_FATE(source, incarnation, receiver, channel, count, cause, delay_s))
-            if cause is DELIVERED:
-                order = (sent_s + delay_s, source, incarnation, channel, count, frame)
-                heappush(self._queues[receiver], order)
-                self.in_flight += 1
+        source, channel = frame.source, frame.channel
+        key = (source, frame.incarnation, channel, frame.count)
+        sending = Sending(frame, key, sent_s, 0.0)
+        sender = self._schedule.sender(channel)
+        if sender.rate_kbit < inf:
+            waited_s = self._queued(sending, sender)
+            if waited_s is None:
+                return
+            sending = Sending(frame, key, sent_s, waited_s)
+        near = self._near.of(source, self._schedule.reach_m(channel, source))
+        self._fates[Cause.DROPPED_RANGE] += self._others[source] - len(near)
+        alike = self._schedule.alike(channel, source)
+        if alike is None or not alike.plain or self._barriers.raised:
+            self._cross(sending, near)
+        elif alike.draws:
+            self._cross_plain(sending, near, alike)
+        else:
+            self._cross_clean(sending, near, sending.waited_s + alike.clean.delay_s)
+
+    def _queued(self, sending: Sending, sender: LinkModel) -> float | None:
+        """Return how long the sender's channel takes [s]; None, and noted, where it is full."""
+        source, _, channel, _ = sending.key
+        air = self._airs.setdefault((source, channel), Air())
+        size_b = len(sending.frame.payload) + sender.rate_overhead_b
+        waited_s = air.enter(sending.sent_s, size_b, sender.rate_kbit, sender.limit)
+        if waited_s is None:
+            self._fates[Cause.DROPPED_QUEUE] += self._others[source]
+            if source in self._own:
+                self._journal.pages[source] += _HEAD(*sending.key) + _FATE(0, *LOST_TO_QUEUE)
+        return waited_s
+
+    def _cross_clean(self, sending: Sending, near: Near, delay_s: float) -> None:
+        """Deliver a frame to all who are near, after the same delay [s]."""
+        frame, key, sent_s, _ = sending
+        noted = _HEAD(*key) + _FATE(0, DELIVERED, delay_s, -1.0)
+        entry = (sent_s + delay_s, *key, 0, frame)
+        queues, pages = self._queues, self._journal.pages
+        for receiver, _ in near:
+            heappush(queues[receiver], entry)
+            pages[receiver] += noted
+        self.in_flight += len(near)
+
+    def _cross_plain(self, sending: Sending, near: Near, link: LinkModel) -> None:
+        """Judge a frame on links that are all alike, and no more than late and lossy."""
+        head = _HEAD(*sending.key)
+        fates = self._links.plain(link, sending, near)
+        for (receiver, _), fate in zip(near, fates, strict=True):
+            self._note(sending, head, receiver, fate)
+
+    def _cross(self, sending: Sending, near: Near) -> None:
+        """Judge a frame on each link to those who may hear it."""
+        source, _, channel, _ = sending.key
+        head, links, barred = _HEAD(*sending.key), self._links, self._barriers.raised
+        for receiver, distance_m in near:
+            link = self._schedule.model(channel, source, receiver)
+            if barred and self._bars(source, receiver, sending.sent_s):
+                self._note(sending, head, receiver, LOST_TO_PARTITION)
+            elif link.plain:
+                fates = links.plain(link, sending, [(receiver, distance_m)])
+                self._note(sending, head, receiver, fates[0])
             else:
-                self._fates[cause] += 1
-        self._journal.update(b"".join(journal))
+                self._note_all(
+                    sending, head, receiver, links.rough(link, sending, receiver, distance_m)
+                )
+
+    def _note_all(self, sending: Sending, head: bytes, receiver: int, fates: list[Verdict]) -> None:
+        """Enter the verdicts on a frame and on its copy, which counts as one more sent."""
+        for copy, fate in enumerate(fates):
+            self._note(sending, head, receiver, fate, copy)
+        self.addressed += len(fates) - 1
+        self.duplicated += len(fates) - 1
+
+    def _note(
+        self, sending: Sending, head: bytes, receiver: int, fate: Verdict, copy: int = 0
+    ) -> None:
+        """Enter a verdict in the books, and a frame that gets across in its receiver's queue."""
+        cause, delay_s, turned = fate
+        self._journal.pages[receiver] += head + _FATE(copy, cause, delay_s, turned)
+        if cause:
+            self._fates[cause] += 1
+            return
+        frame = sending.frame
+        if turned >= 0.0 and frame.payload:
+            frame = _turned(frame, turned)
+            self.corrupted += 1
+        heappush(self._queues[receiver], (sending.sent_s + delay_s, *sending.key, copy, frame))
+        self.in_flight += 1
+
+    def _bars(self, source: int, receiver: int, now_s: float) -> bool:
+        """Whether anything stands between two radios that are there."""
+        ends = (self._near.positions[source], self._near.positions[receiver])
+        return self._barriers.cut(source, receiver, now_s) or any(
+            where is not None and self._barriers.jammed(where) for where in ends
+        )
 
 
-def _distance(a: Position, b: Position) -> float:
-    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    return sqrt(dx * dx + dy * dy + dz * dz)
+def _turned(frame: Frame, share: float) -> Frame:
+    """Return a frame with the bit turned that stands at a share of its payload, in [0, 1)."""
+    payload = bytearray(frame.payload)
+    bit = int(share * 8 * len(payload))
+    payload[bit // 8] ^= 1 << bit % 8
+    return msgspec.structs.replace(frame, payload=bytes(payload))

@@ -1,6 +1,6 @@
 """What the world tells the medium: the conditions, each slot the true positions, and orders."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
@@ -15,13 +15,59 @@ MAX_CONDITIONS_B = 1024 * 1024
 MAX_ORDERS_B = 1024 * 1024
 
 
+Percent = Annotated[float, Meta(ge=0, le=100)]
+
+
+class _Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A table within the conditions."""
+
+
+class GilbertElliott(_Table, frozen=True):
+    """Losses in bursts, in tc-netem's words (its p, r, 1-h, 1-k).
+
+    A link is good or bad. p_percent: from good to bad, for each frame; r_percent: back, so a burst
+    lasts 100 / r_percent frames on average. loss_bad_percent, loss_good_percent: of the frames sent
+    while it is one or the other.
+    """
+
+    p_percent: Percent
+    r_percent: Percent
+    loss_bad_percent: Percent = 100.0
+    loss_good_percent: Percent = 0.0
+
+
+class PathLoss(_Table, frozen=True):
+    """A soft edge: log-distance path loss with log-normal shadowing, drawn for each frame.
+
+    Over d [m] the loss is reference_loss_db + 10 exponent log10(d / reference_distance_m), and no
+    less than reference_loss_db. budget_db: the loss at which half of the frames are received;
+    shadowing_db: the standard deviation round it.
+    """
+
+    exponent: Annotated[float, Meta(gt=0, le=10)]
+    reference_loss_db: Annotated[float, Meta(ge=0, le=300)]
+    budget_db: Annotated[float, Meta(ge=0, le=300)]
+    reference_distance_m: Annotated[float, Meta(gt=0, le=1e6)] = 1.0
+    shadowing_db: Annotated[float, Meta(gt=0, le=50)] = 4.0
+
+
 class LinkKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """The keys of a link as a scenario writes them; left out means: as the wider table says."""
 
     range_m: Annotated[float, Meta(gt=0, le=1e6)] | None = None
+    path_loss: PathLoss | None = None
     delay_ms: Annotated[float, Meta(ge=0, le=60_000)] | None = None
     jitter_ms: Annotated[float, Meta(ge=0, le=60_000)] | None = None
-    loss_percent: Annotated[float, Meta(ge=0, le=100)] | None = None
+    delay_correlation_percent: Annotated[float, Meta(ge=0, lt=100)] | None = None
+    distribution: Literal["uniform", "normal", "pareto", "paretonormal"] | None = None
+    loss_percent: Percent | None = None
+    gemodel: GilbertElliott | None = None
+    duplicate_percent: Percent | None = None
+    corrupt_percent: Percent | None = None
+    reorder_percent: Percent | None = None
+    rate_kbit: Annotated[float, Meta(gt=0, le=1e9)] | None = None
+    rate_overhead_b: Annotated[int, Meta(ge=0, le=10_000)] | None = None
+    limit: Annotated[int, Meta(ge=1, le=1_000_000)] | None = None
 
 
 class DirectedLink(LinkKeys, frozen=True, kw_only=True, rename={"source": "from"}):
@@ -41,6 +87,28 @@ class Conditions(LinkKeys, frozen=True):
 
 Groups = tuple[tuple[AgentId, ...], ...]
 """Who hears whom in a partition; the agents that no group names form one more."""
+PartitionKind = Literal["clean", "one_way", "bridge", "ring"]
+"""clean: a group hears itself alone; one_way: a group hears all and is heard by itself alone;
+bridge: clean but for some agents that hear and are heard by all; ring: each agent of a group has
+the two beside it in its list, the last beside the first."""
+
+
+class Jam(_Table, frozen=True):
+    """A sphere [m; world frame]: no frame gets to or from a radio in it."""
+
+    centre_m: Position
+    radius_m: Annotated[float, Meta(gt=0, le=1e6)]
+
+
+class Flap(_Table, frozen=True):
+    """Links that go down and up again: down for the first half of each period, from ``from_s`` on.
+
+    links: directed, as (from, to); none: all.
+    """
+
+    period_s: Annotated[float, Meta(gt=0, le=86_400)]
+    from_s: Annotated[float, Meta(ge=0, le=1e9)] = 0.0
+    links: Annotated[tuple[tuple[AgentId, AgentId], ...], Meta(max_length=10_000)] = ()
 
 
 class Changed(msgspec.Struct, frozen=True, tag="change", forbid_unknown_fields=True):
@@ -50,16 +118,32 @@ class Changed(msgspec.Struct, frozen=True, tag="change", forbid_unknown_fields=T
 
 
 class Parted(msgspec.Struct, frozen=True, tag="partition", forbid_unknown_fields=True):
-    """From now on agents hear only those of their own group."""
+    """From now on groups are parted, as ``kind`` says; ``bridge``: those whom all hear."""
 
     groups: Groups
+    kind: PartitionKind = "clean"
+    bridge: tuple[AgentId, ...] = ()
 
 
 class Healed(msgspec.Struct, frozen=True, tag="heal", forbid_unknown_fields=True):
     """From now on there are no groups."""
 
 
-RadioOrder = Changed | Parted | Healed
+class Jammed(msgspec.Struct, frozen=True, tag="jam", forbid_unknown_fields=True):
+    """From now on there is a jam under that number, or with None none."""
+
+    number: Count
+    jam: Jam | None = None
+
+
+class Flapped(msgspec.Struct, frozen=True, tag="flap", forbid_unknown_fields=True):
+    """From now on links flap, under that number, or with None they do not."""
+
+    number: Count
+    flap: Flap | None = None
+
+
+RadioOrder = Changed | Parted | Healed | Jammed | Flapped
 """What the medium does between slots."""
 
 
@@ -96,6 +180,8 @@ class Truth(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unkno
 class Verdicts(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
     """What the medium reports: how many frames met which fate so far, and a digest of all fates.
 
+    addressed: frames sent, times the other agents, and each duplicate once more; it equals the sum
+    of fates and in_flight. duplicated, corrupted: how many were copies, or had a bit turned.
     late_s: how much later than their due time batches left, free-running [s]: median and worst.
     """
 
@@ -107,8 +193,11 @@ class Verdicts(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_un
     rejected: dict[str, Count]
     digest: bytes = b""
     late_s: tuple[float, float] | None = None
+    duplicated: Count = 0
+    corrupted: Count = 0
 
     def packets(self) -> dict[str, int]:
         """Return the counters under their names in summary.json, fates between the others."""
         counted = {"sent": self.sent, "addressed": self.addressed}
-        return {**counted, **self.fates, "in_flight": self.in_flight}
+        marked = {"duplicated": self.duplicated, "corrupted": self.corrupted}
+        return {**counted, **self.fates, **marked, "in_flight": self.in_flight}

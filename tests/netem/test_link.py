@@ -5,7 +5,8 @@ from math import inf, nan, sqrt
 
 import pytest
 
-from netem.link import Cause, LinkModel, Verdict, draw, verdict
+from netem.chance import draw
+from netem.link import Cause, LinkModel, Verdict, verdict
 
 PACKETS = 100_000
 SEED = bytes(range(32))
@@ -114,7 +115,7 @@ def test_within_the_range_all_gets_across(distance_m):
 
 def test_range_comes_before_loss():
     link = LinkModel(range_m=6.0, loss_percent=100.0)
-    assert verdict(link, 7.0, (0.0, 0.0, 0.0, 0.0)).cause is Cause.DROPPED_RANGE
+    assert verdict(link, 7.0, (0.0, 0.0)).cause is Cause.DROPPED_RANGE
 
 
 def test_where_there_is_no_limit_a_missing_position_hears_nothing():

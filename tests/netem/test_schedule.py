@@ -5,13 +5,36 @@ from hypothesis import strategies as st
 
 from netem.link import LinkModel
 from netem.medium import Medium
-from netem.messages import Conditions, DirectedLink, LinkKeys, MediumSetup
+from netem.messages import (
+    Conditions,
+    DirectedLink,
+    GilbertElliott,
+    Healed,
+    LinkKeys,
+    MediumSetup,
+    Parted,
+    PathLoss,
+)
 from netem.schedule import Schedule, overlaid
 from netem.wire.frame import LOCAL, MULTIHOP, Outgoing, Transmission
 
 FIELDS = LinkKeys.__struct_fields__
+AIR = ("rate_kbit", "rate_overhead_b", "limit")
+VALUES = {
+    "distribution": st.sampled_from(["uniform", "normal", "pareto", "paretonormal"]),
+    "gemodel": st.builds(GilbertElliott, p_percent=st.just(1.0), r_percent=st.floats(1.0, 99.0)),
+    "path_loss": st.builds(
+        PathLoss,
+        exponent=st.floats(2.0, 4.0),
+        reference_loss_db=st.just(40.0),
+        budget_db=st.floats(60.0, 80.0),
+    ),
+    "rate_overhead_b": st.integers(0, 100),
+    "limit": st.integers(1, 100),
+}
+measures = st.floats(0.5, 99.0, allow_nan=False)
 tables = st.fixed_dictionaries(
-    {}, optional={field: st.floats(0.5, 99.0, allow_nan=False) for field in FIELDS}
+    {}, optional={field: VALUES.get(field, measures) for field in FIELDS}
 )
 
 
@@ -24,7 +47,8 @@ def conditions(both, local, multihop, link=()):
 def test_a_links_own_table_wins_over_its_channels_and_that_over_both(both, local, multihop, own):
     schedule = Schedule(conditions(both, local, multihop, (DirectedLink(source=2, to=5, **own),)))
     for channel, table in ((LOCAL, local), (MULTIHOP, multihop)):
-        assert schedule.model(channel, 2, 5) == LinkModel(**(both | table | own))
+        own_air = any(key in own for key in AIR)
+        assert schedule.model(channel, 2, 5) == LinkModel(**(both | table | own), own_air=own_air)
         assert schedule.model(channel, 5, 2) == LinkModel(**(both | table))
         assert schedule.model(channel, 0, 1) == LinkModel(**(both | table))
 
@@ -56,20 +80,6 @@ def test_a_change_lies_over_what_was_table_by_table_and_key_by_key(both, own, ch
     assert overlaid(before, Conditions()) == before
 
 
-def test_agents_that_no_group_names_are_one_group_more():
-    schedule = Schedule(Conditions())
-    assert not schedule.parted
-    schedule.partition(((0, 1), (2,)))
-    groups = [{0, 1}, {2}, {3, 4}]
-    for a in range(5):
-        for b in range(5):
-            together = any({a, b} <= group for group in groups)
-            assert schedule.cut(a, b) is not together
-    schedule.heal()
-    assert not schedule.parted
-    assert not schedule.cut(0, 2)
-
-
 def radio(**keys):
     made = Medium(MediumSetup(1, 3, 4, 80.0, Conditions(**keys)))
     made.place(((0.0, 0.0, 0.0),) * 3)
@@ -92,9 +102,9 @@ def test_a_change_meets_later_frames_and_not_those_in_flight():
 def test_a_partition_cuts_later_frames_and_a_heal_ends_it():
     made = radio(delay_ms=100.0)
     say(made, 0.0)
-    made.partition(((0, 1),))
+    made.obey(Parted(((0, 1),)))
     say(made, 0.05)
-    made.heal()
+    made.obey(Healed())
     say(made, 0.06)
     assert [len(made.collect(who, 1.0)) for who in (1, 2)] == [3, 2]
     fates = made.verdicts(0).fates

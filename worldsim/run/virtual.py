@@ -4,7 +4,6 @@ The same agents, medium and world as in processes, driven by the same slot loop.
 still crosses its codec; payloads that several agents hear are decoded once.
 """
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,16 +12,8 @@ from time import perf_counter, process_time
 from agent.codec import decode_beacon, decode_command, decode_gossip, decode_observation, encode
 from agent.core import Agent, Decoders
 from netem.medium import Medium
-from netem.messages import Verdicts
-from netem.wire.frame import (
-    BATCH_RING,
-    Batch,
-    Outgoing,
-    Transmission,
-    pack,
-    unpack_batch,
-    unpack_transmission,
-)
+from netem.messages import Healed, Parted, Verdicts
+from netem.wire.frame import Batch, Outgoing, Transmission, pack, unpack_batch, unpack_transmission
 from worldsim.judge.tick import Packets
 from worldsim.run.faults import Change, Heal, Partition
 from worldsim.run.slots import Deed, Event, Opened, Recorder, SlotLoop, world_of
@@ -55,7 +46,7 @@ class VirtualFleet:
         self._decoders = decoders
         self._agents = {agent: self._started(agent, 0) for agent in range(scenario.fleet.agents)}
         self._rejected = 0
-        self._inboxes = [deque[bytes](maxlen=BATCH_RING) for _ in range(scenario.rows)]
+        self._batches: dict[int, bytes] = {}
         self.loop = SlotLoop(scenario, world_of(scenario, COMMAND_TICKS), recorder, self._packets)
 
     @property
@@ -86,12 +77,16 @@ class VirtualFleet:
             case Stop(agents=agents):
                 for agent in agents:
                     self._rejected += self._agents.pop(agent).rejected.total()
-                    self._inboxes[agent].clear()
+                    self._batches.pop(agent, None)
             case Start(incarnations=incarnations):
                 for agent, incarnation in incarnations.items():
                     self._agents[agent] = self._started(agent, incarnation)
-            case Change() | Partition() | Heal():
-                self._medium.obey(deed.order)
+            case Change(conditions=conditions):
+                self._medium.change(conditions)
+            case Partition(groups=groups):
+                self._medium.obey(Parted(groups))
+            case Heal():
+                self._medium.obey(Healed())
 
     def _started(self, agent: int, incarnation: int) -> Agent:
         setup = self._scenario.agent_setup(agent, incarnation, COMMAND_TICKS)
@@ -100,9 +95,9 @@ class VirtualFleet:
     def _step(self, agent: int, observed: bytes, opened: Opened) -> None:
         core = self._agents[agent]
         observation = decode_observation(observed)
-        inbox = self._inboxes[agent]
-        while inbox:
-            for frame in unpack_batch(inbox.popleft()).frames:
+        batch = self._batches.pop(agent, None)
+        if batch is not None:
+            for frame in unpack_batch(batch).frames:
                 core.receive(frame.source, frame.channel, frame.payload, observation.time_s)
         outbox = core.step(observation)
         outgoing = tuple(Outgoing(channel, payload) for channel, payload in outbox.frames)
@@ -119,7 +114,7 @@ class VirtualFleet:
             if not alive[agent]:
                 continue
             frames = self._medium.collect(agent, clock.time_s(slot))
-            self._inboxes[agent].append(pack(Batch(slot, frames)))
+            self._batches[agent] = pack(Batch(slot, frames))
 
     def _packets(self) -> Packets:
         return self.verdicts.packets()
