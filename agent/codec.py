@@ -15,6 +15,8 @@ from agent.qstructure.formation import FormationSpec
 
 MAX_RADIO_B = 1200
 MAX_MESSAGE_B = 4096
+MAX_OBSERVATION_B = 65536
+"""Bodies sensed, and with them a mission: its formation and its frame's path."""
 MAX_FORMATION_B = 16 * 900
 MAX_EXPRESSION = 300
 
@@ -91,7 +93,7 @@ def decode_gossip(payload: bytes) -> Gossip:
 
 def decode_observation(data: bytes) -> Observation:
     """Decode what the world tells a vehicle, or raise :class:`RejectedError`."""
-    return _typed(data, _observation, MAX_MESSAGE_B)
+    return _typed(data, _observation, MAX_OBSERVATION_B)
 
 
 def decode_command(data: bytes) -> Command:

@@ -89,7 +89,7 @@ class Agent:
         )
         self._promises = PromiseFilter(*filtered)
         self._speed_cap = limits.max_speed_mps
-        self._missions = Missions(setup.id, setup.formation, setup.control.spacing_m)
+        self._missions = Missions(setup.id, setup.formation, setup.control.spacing_m, setup.frame)
         self._hierarchy = Hierarchy(setup.id)
         self._standing = ALONE
         self._bodies = SilentBodies(setup.fleet_max_speed_mps)
@@ -117,23 +117,23 @@ class Agent:
         intent = self._intent = self._controller.decide(senses)
         velocity = self._safe(intent, senses)
         command = self._command(observation.slot, senses, intent, velocity)
-        own = self._own_state(senses.position, velocity, intent)
+        own = self._own_state(senses, velocity, intent)
         pieces = self._missions.pieces() if self._lagging else ()
         echoes = self._neighbours.echoes()
         frames = self._broadcast.frames(senses.now_s, own, echoes, self._table, pieces)
         return Outbox(command, frames)
 
-    def _own_state(self, position: Vector, velocity: Vector, intent: Intent) -> OwnState:
+    def _own_state(self, senses: Senses, velocity: Vector, intent: Intent) -> OwnState:
         missions = self._missions
         return OwnState(
-            position,
+            senses.position,
             velocity,
             intent.heading_for,
             intent.place,
             self._speed_cap,
             missions.flown.key,
             missions.frame_key,
-            missions.pose,
+            *missions.told(senses.now_s),
             self._standing,
             intent.blocked,
             min(round(1000.0 * intent.cost_m), MAX_COST_MM),
@@ -151,7 +151,7 @@ class Agent:
             raise RejectedError("spoofed", f"{source} says it is {beacon.id}")
         self._neighbours.hear(beacon, now_s, self._broadcast.sent_s)
         self._table.adopt_beacon(beacon)
-        if beacon.frame_key > self._missions.frame_key:
+        if self._missions.is_news(beacon):
             self._missions.glimpse(beacon)
 
     def _hear_gossip(self, source: int, payload: bytes, now_s: float) -> None:
@@ -164,7 +164,7 @@ class Agent:
 
     def _senses(self, observation: Observation) -> Senses:
         now_s = observation.time_s
-        mission = self._missions.flown
+        mission = self._missions.flown_at(now_s)
         if now_s >= self._tidy_at_s:
             self._tidy_at_s = now_s + TIDY_S
             self._tidy(observation)

@@ -56,6 +56,36 @@ class Pose(NamedTuple):
 HOME = Pose(0.0, 0.0, 0.0, 0.0)
 
 
+class Drift(NamedTuple):
+    """How a frame moves that was at its pose at ``stamp_s`` [s]: [m/s; world frame], [rad/s]."""
+
+    stamp_s: Seconds
+    x: Speed
+    y: Speed
+    z: Speed
+    yaw_rate: Annotated[float, Meta(ge=-100, le=100)]
+
+
+class FramePath(Message, frozen=True):
+    """Where the target's frame goes: from waypoint to waypoint [m; world frame].
+
+    One waypoint: it stands there. speed [m/s]; start_s: when it leaves the first one, in the
+    Observation's time. turn_rate: how fast its yaw turns into the direction of the next leg
+    [rad/s]; 0: it does not. yaw [rad] is added to that direction, or is all there is. waits_s: how
+    long it waits at each waypoint [s].
+    """
+
+    waypoints: Annotated[tuple[Position, ...], Meta(min_length=1, max_length=16)]
+    speed: Annotated[float, Meta(gt=0, le=100)] = 0.25
+    start_s: Seconds = 0.0
+    yaw: Radians = 0.0
+    turn_rate: Annotated[float, Meta(ge=0, le=100)] = 0.0
+    waits_s: Annotated[tuple[Seconds, ...], Meta(max_length=16)] = ()
+
+
+AT_HOME = FramePath(((0.0, 0.0, 0.0),))
+
+
 class Mission(Message, frozen=True):
     """What the team shall form, and where; the highest ``key`` wins everywhere.
 
@@ -64,7 +94,7 @@ class Mission(Message, frozen=True):
     """
 
     key: Count
-    frame: Pose
+    frame: FramePath
     formation: Annotated[bytes, Meta(max_length=3000)]
 
 
@@ -134,8 +164,9 @@ class Beacon(Message, frozen=True):
     cost_mm: how far from there it was when it first claimed it, by which a contest is decided.
     speed_cap: it promises to stay below this speed for the next 3 s [m/s].
     echoes: for each neighbour the last sequence heard of it.
-    mission: the key of the one it flies; frame: where the target's frame stands, by the mission of
-    ``frame_key``, which may be a newer one that is still on its way. tier: 0 for a
+    mission: the key of the one it flies; frame: where the target's frame is, by the mission of
+    ``frame_key``, which may be a newer one that is still on its way; drift: how it moves, None
+    where it stands for good. tier: 0 for a
     queue-vertex agent, else its parent's + 1, -1 in distress. parent: whom it follows, -1 for none;
     root: the vertex agent's sequence as it came down the tiers (E15).
     """
@@ -155,6 +186,7 @@ class Beacon(Message, frozen=True):
     mission: Count
     frame_key: Count
     frame: Pose
+    drift: Drift | None
     tier: Index
     parent: Annotated[int, Meta(ge=-1, lt=2**16)]
     root: Count
@@ -183,10 +215,9 @@ class Record(Message, frozen=True):
 
 
 class Piece(Message, frozen=True):
-    """A part of a mission under way: the ``index``-th of ``count``."""
+    """A part of a mission under way, path and formation: the ``index``-th of ``count``."""
 
     key: Count
-    frame: Pose
     index: Annotated[int, Meta(ge=0, lt=16)]
     count: Annotated[int, Meta(ge=1, le=16)]
     data: Annotated[bytes, Meta(max_length=1000)]

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from agent.messages import AT_HOME, FramePath
 from agent.qstructure.formation import FormationSpec
 
 Positive = Annotated[float, Meta(gt=0, le=1e4)]
@@ -63,6 +64,7 @@ class AgentSetup(Table, frozen=True):
 
     command_ticks: for how many ticks a command is valid; H of docs/method.md follows from it.
     fleet_max_speed_mps: the fastest vehicle's limit, which is what the others must reckon with.
+    frame: where the target's frame goes, until a mission says otherwise.
     """
 
     id: Annotated[int, Meta(ge=0, lt=2**16)]
@@ -75,3 +77,4 @@ class AgentSetup(Table, frozen=True):
     control: Control
     comms: Comms
     formation: FormationSpec
+    frame: FramePath = AT_HOME

@@ -10,14 +10,14 @@ from typing import NamedTuple
 from agent.codec import encode
 from agent.comms.gossip import Table
 from agent.comms.hierarchy import ALONE, Standing
-from agent.messages import HOME, Beacon, Piece, Place, Pose, Record, Vector
+from agent.messages import HOME, Beacon, Drift, Piece, Place, Pose, Record, Vector
 
 LOCAL, MULTIHOP = 0, 1
 """Channels of the radio."""
 MEMORY = 200
 """So many of the own beacons are remembered, for the echoes that may come."""
-MAX_ECHOES = 71
-"""So many fit beside the greatest numbers that a Beacon may hold: 265 B and 13 B for each echo."""
+MAX_ECHOES = 68
+"""So many fit beside the greatest numbers that a Beacon may hold: 311 B and 13 B for each echo."""
 
 
 class OwnState(NamedTuple):
@@ -31,6 +31,7 @@ class OwnState(NamedTuple):
     mission: int = 0
     frame_key: int = 0
     frame: Pose = HOME
+    drift: Drift | None = None
     standing: Standing = ALONE
     blocked: tuple[Place, ...] = ()
     cost_mm: int = 0
@@ -98,6 +99,7 @@ class Broadcast:
             own.mission,
             own.frame_key,
             own.frame,
+            own.drift,
             own.standing.tier,
             own.standing.parent,
             own.standing.root,

@@ -20,6 +20,8 @@ PATIENCE_S = 1.0
 NEAR_M = 0.9
 AHEAD = 0.5
 """Cosine of the angle within which a body is in the way."""
+NEW_M = 0.2
+"""A target that moves farther than this between two steps is another one."""
 STEEP = 0.7
 LEVEL = 0.02
 SAME_BODY_M = 0.4
@@ -53,10 +55,12 @@ class Dodge:
     def _moves_on(self, senses: Senses, target: Vector) -> bool:
         """Whether there is nothing to complain of: arrived, a new target, or not yet patient."""
         away_m = dist(senses.position, target)
-        if target != self._target or away_m < ARRIVED_M:
-            self._target = target
+        before, self._target = self._target, target
+        if before is None or away_m < ARRIVED_M or dist(before, target) > NEW_M:
             self._nearest_m, self._since_s = away_m, senses.now_s
             return True
+        if target != before:
+            self._nearest_m += away_m - dist(senses.position, before)
         if away_m < self._nearest_m - PROGRESS_M:
             self._nearest_m = away_m
             if self._side is None:

@@ -4,16 +4,17 @@ Target-on-queue (Algorithm 1, at 5 Hz), bobber (Algorithm 2), potentials (18)-(2
 turn. Plain floats throughout.
 """
 
-from math import dist, pi, radians, sqrt
+from math import dist, hypot, pi, radians, sqrt
 
 from agent.controller import Intent, Senses
 from agent.guidance.bobber import bobber, cast_zone
-from agent.guidance.cone import cone_of
+from agent.guidance.cone import azimuth_error, cone_of
 from agent.guidance.dodge import Dodge
-from agent.guidance.movement import saturated, steer
+from agent.guidance.movement import DEAD_BAND_MPS, saturated, steer
 from agent.guidance.potential import Potential
 from agent.guidance.target_on_queue import OwnTarget, TargetOnQueue
 from agent.messages import Place, Vector
+from agent.qstructure.frame import Frame
 from agent.setup import AgentSetup
 
 GAIN = 2.0
@@ -54,14 +55,14 @@ class QStructure:
         self._choose(senses)
         q, mine, frame = senses.position, self._mine, senses.mission.frame
         q_toq = frame.to_world(mine.slot.point) if mine is not None else q
-        q_tg = bobber(q, senses.yaw, q_toq, self._zone)
+        q_tg = bobber(q, senses.yaw, _led(q_toq, frame), self._zone)
         x, y, z = self._potential.omega(q, q_tg, senses.neighbours)
         wanted = self._wanted((-GAIN * x, -GAIN * y, -GAIN * z), senses, q_toq)
         velocity, yaw = steer(wanted, senses.yaw, self._cone)
         tilt = (0.0, 0.0)
         if mine is not None and dist(q, q_toq) < AT_SLOT_M and velocity == wanted:
             attitude = mine.slot.attitude
-            yaw = yaw if attitude.yaw is None else attitude.yaw + frame.yaw
+            yaw = self._heading(yaw, attitude.yaw, velocity, frame)
             tilt = (attitude.pitch or 0.0, attitude.roll or 0.0)
         return Intent(
             wanted,
@@ -76,6 +77,15 @@ class QStructure:
             vertex=mine is not None and mine.vertex,
             blocked=self._blocked,
         )
+
+    def _heading(self, yaw: float, asked: float | None, velocity: Vector, frame: Frame) -> float:
+        """Return the heading at the slot [rad]: the queue's, if one can fly on with it."""
+        if asked is None:
+            return yaw
+        u, v, _ = velocity
+        error = azimuth_error(u, v, asked + frame.yaw)
+        flies_on = hypot(u, v) <= DEAD_BAND_MPS or self._cone.holds(error)
+        return asked + frame.yaw if flies_on else yaw
 
     def _wanted(self, u: Vector, senses: Senses, q_toq: Vector) -> Vector:
         """Return u of (28) [m/s] within the vehicle's limits, and past what holds it (E23)."""
@@ -115,3 +125,14 @@ class QStructure:
             self._known, self._new_at_s = known, now_s
         self._listening = now_s - self._new_at_s < LISTEN_S - 1e-6
         return self._listening
+
+
+def _led(q_toq: Vector, frame: Frame) -> Vector:
+    """Return where to aim for so that a slot that moves is held [m; world frame].
+
+    1 / c ahead of it: there c (q_tg - q) is the slot's own velocity, once one is at the slot.
+    """
+    if not frame.moves:
+        return q_toq
+    (x, y, z), (u, v, w) = q_toq, frame.velocity_at(q_toq)
+    return (x + u / GAIN, y + v / GAIN, z + w / GAIN)

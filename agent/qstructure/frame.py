@@ -4,15 +4,29 @@ from math import cos, sin
 
 from agent.messages import Vector
 
+REST = (0.0, 0.0, 0.0)
+
 
 class Frame:
-    """A frame that stands at ``origin`` [m; world frame], turned by ``yaw`` [rad] about +z."""
+    """A frame at one time: at ``origin`` [m; world frame], turned by ``yaw`` [rad] about +z.
 
-    __slots__ = ("_cos", "_sin", "origin", "yaw")
+    velocity: of its origin [m/s; world frame]; yaw_rate [rad/s].
+    """
 
-    def __init__(self, origin: Vector = (0.0, 0.0, 0.0), yaw: float = 0.0) -> None:
+    __slots__ = ("_cos", "_sin", "moves", "origin", "velocity", "yaw", "yaw_rate")
+
+    def __init__(
+        self,
+        origin: Vector = (0.0, 0.0, 0.0),
+        yaw: float = 0.0,
+        velocity: Vector = REST,
+        yaw_rate: float = 0.0,
+    ) -> None:
         self.origin = origin
         self.yaw = yaw
+        self.velocity = velocity
+        self.yaw_rate = yaw_rate
+        self.moves = yaw_rate != 0.0 or velocity != REST
         self._cos = cos(yaw)
         self._sin = sin(yaw)
 
@@ -24,3 +38,12 @@ class Frame:
             self.origin[1] + self._sin * x + self._cos * y,
             self.origin[2] + z,
         )
+
+    def velocity_at(self, point: Vector) -> Vector:
+        """Return how fast a point that rests in this frame moves [m/s; world frame]: v + w x r.
+
+        point [m; world frame].
+        """
+        x, y = point[0] - self.origin[0], point[1] - self.origin[1]
+        u, v, w = self.velocity
+        return (u - self.yaw_rate * y, v + self.yaw_rate * x, w)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from agent.codec import (
     MAX_MESSAGE_B,
+    MAX_OBSERVATION_B,
     MAX_RADIO_B,
     RejectedError,
     decode_beacon,
@@ -22,6 +23,8 @@ from agent.codec import (
 from agent.messages import (
     Beacon,
     Command,
+    Drift,
+    FramePath,
     Gossip,
     Mission,
     Observation,
@@ -34,11 +37,13 @@ from agent.messages import (
 MANY = 15_000
 VECTOR = (1.0, -2.5, 0.25)
 POSE = Pose(1.0, 2.0, 3.0, 0.5)
+DRIFT = Drift(1.5, 0.1, 0.2, 0.3, 0.4)
+PATH = FramePath((VECTOR, VECTOR), 0.25, 2.0, 0.5, 0.2, (1.0, 2.0))
 TELEMETRY = Telemetry(VECTOR, 1.0, VECTOR, (1, 2), (3, 4), 5, 6, 1, 3, 0)
 RECORD = Record(4, 0, 77, 1.25, VECTOR, -1, -1, 0, 7, ((0, 0),))
 GOOD = {
     Observation: Observation(
-        7, 1.5, VECTOR, VECTOR, 0.5, (VECTOR, VECTOR), (VECTOR,), (Mission(0, POSE, b""),)
+        7, 1.5, VECTOR, VECTOR, 0.5, (VECTOR, VECTOR), (VECTOR,), (Mission(0, PATH, b""),)
     ),
     Command: Command(
         7,
@@ -65,6 +70,7 @@ GOOD = {
         7,
         7,
         POSE,
+        DRIFT,
         1,
         4,
         900,
@@ -74,7 +80,7 @@ GOOD = {
         3,
         1.5,
         (RECORD,) * 3,
-        Piece(7, POSE, 0, 1, b"x"),
+        Piece(7, 0, 1, b"x"),
     ),
 }
 DECODE = {
@@ -84,7 +90,7 @@ DECODE = {
     Gossip: decode_gossip,
 }
 LIMIT_B = {
-    Observation: MAX_MESSAGE_B,
+    Observation: MAX_OBSERVATION_B,
     Command: MAX_MESSAGE_B,
     Beacon: MAX_RADIO_B,
     Gossip: MAX_RADIO_B,
@@ -105,9 +111,20 @@ parents = st.integers(-1, 2**16 - 1)
 costs = st.integers(0, 2**31 - 1)
 poses = st.builds(Pose, metres, metres, metres, angles)
 blocked = st.lists(st.tuples(indices, indices), max_size=8).map(tuple)
-missions = st.builds(Mission, counts, poses, st.binary(max_size=900))
+drifts = st.builds(Drift, seconds, speeds, speeds, speeds, angles)
+rates = st.floats(1e-6, 100.0)
+paths = st.builds(
+    FramePath,
+    st.lists(positions, min_size=1, max_size=3).map(tuple),
+    rates,
+    seconds,
+    angles,
+    rates,
+    st.lists(seconds, max_size=3).map(tuple),
+)
+missions = st.builds(Mission, counts, paths, st.binary(max_size=900))
 pieces = st.builds(
-    Piece, counts, poses, st.integers(0, 15), st.integers(1, 16), st.binary(max_size=900)
+    Piece, counts, st.integers(0, 15), st.integers(1, 16), st.binary(max_size=900)
 )
 records = st.builds(
     Record, ids, counts, counts, seconds, positions, indices, indices, costs, counts, blocked
@@ -157,6 +174,7 @@ messages = st.one_of(
         counts,
         counts,
         poses,
+        st.none() | drifts,
         indices,
         parents,
         counts,

@@ -99,10 +99,14 @@ def test_a_partition_ends_by_itself_by_heal_or_by_the_next() -> None:
     ]
 
 
+def placed(path):
+    return (*path.waypoints[0], path.yaw)
+
+
 def test_missions_keep_what_they_do_not_say() -> None:
     other = LINE.replace("'line'", "'other'")
     orders = [
-        (action.kind, action.formation.name, action.pose)
+        (action.kind, action.formation.name, placed(action.path))
         for _, action in played(
             "at_s = 1\nframe = { yaw_deg = 90 }",
             f"at_s = 2\nformation = {other}",

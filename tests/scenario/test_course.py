@@ -28,6 +28,10 @@ SOUND = [
     ["at_s = 5, for_s = 1, netem = { loss_percent = 50, multihop = { delay_ms = 9 } }"],
     [f"at_s = 5, formation = {LINES}", "at_s = 6, kill = ['vertex:V3']"],
     ["at_s = 5, frame = { yaw_deg = 90, waypoints_m = [[1, 2, 3]] }"],
+    [
+        "at_s = 5, frame = { waypoints_m = [[0, 0, 0], [1, 0, 0]], speed_mps = 0.2, yaw = 'path' }",
+        "at_s = 6, frame = { yaw_deg = 20 }",
+    ],
 ]
 
 
@@ -88,8 +92,24 @@ BROKEN = [
     (["at_s = 5, frame = {}"], "event[0].frame", "yaw_deg"),
     (
         ["at_s = 5, frame = { waypoints_m = [[0, 0, 0], [1, 0, 0]] }"],
-        "event[0].frame.waypoints_m",
-        "one point",
+        "event[0].frame.speed_mps",
+        "is missing",
+    ),
+    (["at_s = 5, frame = { speed_mps = 0.2 }"], "event[0].frame.speed_mps", "a new path"),
+    (
+        ["at_s = 5, frame = { waypoints_m = [[0, 0, 0]], speed_mps = 0.2 }"],
+        "event[0].frame.speed_mps",
+        "two waypoints or more",
+    ),
+    (
+        ["at_s = 5, frame = { waypoints_m = [[0, 0, 0], [1, 0, 0]], speed_mps = 1, start_s = 4 }"],
+        "event[0].frame.start_s",
+        "or later",
+    ),
+    (
+        ["at_s = 5, frame = { waypoints_m = [[0, 0, 0], [0, 0, 0]], speed_mps = 0.2 }"],
+        "event[0].frame.waypoints_m[1]",
+        "once more",
     ),
     (["at_s = 5, join = 0"], "event[0].join", "from 1"),
     (["at_s = 5, join = { coun = 2 }"], "event[0].join.coun", "did you mean 'count'"),

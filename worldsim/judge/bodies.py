@@ -28,5 +28,5 @@ class Bodies:
         others = ~np.isnan(tick.position[:, 0])
         others[team] = False
         bodies = [(x, y, z) for x, y, z in tick.position[others].tolist()]
-        flown = Flown(phase.mission, phase.formation, phase.frame)
+        flown = Flown(phase.mission, phase.formation, phase.frame(tick.time_s))
         return frozenset(self._targets.blocked(flown, len(team), bodies))

@@ -1,5 +1,7 @@
 """A phase: one formation in one frame, from the mission that asked for it to the next.
 
+The frame may be at rest or on its path.
+
 Of an agent's telemetry only the place that it means to hold is taken, and which mission it flies;
 where that place is, is computed here.
 """
@@ -9,16 +11,16 @@ from math import degrees, isfinite, remainder, tau
 
 import numpy as np
 
-from agent.messages import Place
+from agent.messages import AT_HOME, FramePath, Place
 from agent.qstructure.formation import Formation, Slot
 from agent.qstructure.frame import Frame
+from agent.qstructure.path import Track
 from worldsim.judge.metrics import Floats
 from worldsim.judge.tick import Tick
 
 CONVERGED_M = 0.12
 CONVERGED_S = 2.0
 NO_CLAIM = (-1, -1)
-HERE = Frame()
 
 
 class Phase:
@@ -28,11 +30,11 @@ class Phase:
     """
 
     def __init__(
-        self, formation: Formation, from_s: float, frame: Frame = HERE, mission: int = 0
+        self, formation: Formation, from_s: float, path: FramePath = AT_HOME, mission: int = 0
     ) -> None:
         self.formation = formation
         self.from_s = from_s
-        self.frame = frame
+        self._track = Track(path)
         self.mission = mission
         self.converge_s: float | None = None
         self.residual_m: float | None = None
@@ -40,6 +42,10 @@ class Phase:
         self._slots: dict[tuple[int, int, int], Slot | None] = {}
         self._owned: dict[int, Slot] = {}
         self._owned_by: tuple[bytes, bytes, bytes] | None = None
+
+    def frame(self, time_s: float) -> Frame:
+        """Return where the target's frame is at a time [s]."""
+        return self._track.at(time_s)
 
     def slot_error(self, tick: Tick) -> Floats:
         """Return each agent's distance to the slot it claims [m]; infinite without a valid one.
@@ -50,7 +56,8 @@ class Phase:
         slots = self._own_slots(tick)
         if slots:
             rows = list(slots)
-            stands = [self.frame.to_world(slot.point) for slot in slots.values()]
+            frame = self.frame(tick.time_s)
+            stands = [frame.to_world(slot.point) for slot in slots.values()]
             off = tick.position[rows].astype(np.float64) - np.array(stands)
             error[rows] = np.sqrt(np.sum(off * off, axis=1))
         error[np.isnan(tick.position[:, 0])] = np.nan
@@ -61,8 +68,9 @@ class Phase:
 
         Angles that a queue leaves free do not count; None where all are free.
         """
+        frame = self.frame(tick.time_s)
         wanted = [
-            (angle + (self.frame.yaw if axis == 0 else 0.0), float(tick.attitude[row, axis]))
+            (angle + (frame.yaw if axis == 0 else 0.0), float(tick.attitude[row, axis]))
             for row, slot in self._own_slots(tick).items()
             for axis, angle in enumerate(slot.attitude)
             if angle is not None and tick.alive[row]

@@ -12,13 +12,14 @@ import msgspec
 import numpy as np
 
 from agent.guidance.cone import cone_of
+from agent.messages import FramePath
 from agent.qstructure.formation import Formation, FormationSpec
-from agent.qstructure.frame import Frame
 from worldsim.judge.invariants import Invariants
 from worldsim.judge.metrics import Floats, conserved, swept_separation
 from worldsim.judge.phase import Phase
 from worldsim.judge.recovery import LOSSES, RETURNS, Recoveries, Recovery
 from worldsim.judge.tick import Packets, Tick
+from worldsim.scenario.frame import path_of
 from worldsim.scenario.tables import Scenario
 
 TURN_LIMIT_SLACK_DEG = 1e-6
@@ -51,7 +52,8 @@ class Judge:
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        self.phases = [Phase(Formation(scenario.formation, scenario.control.spacing_m), 0.0)]
+        formation = Formation(scenario.formation, scenario.control.spacing_m)
+        self.phases = [Phase(formation, 0.0, path_of(scenario.frame))]
         self._recoveries = Recoveries(scenario.control.spacing_m)
         self._allocation = Invariants(scenario) if scenario.expect.converge else None
         self.ticks = 0
@@ -150,10 +152,9 @@ class Judge:
 
     def _open_phase(self, event: dict[str, Any]) -> None:
         spec = msgspec.convert(event["tables"], FormationSpec)
-        x, y, z, yaw = event["pose"]
+        path = msgspec.convert(event["path"], FramePath)
         formation = Formation(spec, self._scenario.control.spacing_m)
-        frame = Frame((x, y, z), yaw)
-        self.phases.append(Phase(formation, event["t_s"], frame, event["mission"]))
+        self.phases.append(Phase(formation, event["t_s"], path, event["mission"]))
 
     def _reformed(self, within_s: float) -> Expectation:
         took = [recovery.reformed_s for recovery in self.recoveries]

@@ -4,15 +4,16 @@ An action says what shall happen; whom it strikes is found when it happens (``te
 deed that a clock carries out.
 """
 
-from math import inf, radians
+from math import inf
 from typing import NamedTuple
 
-from agent.messages import HOME, Pose
+from agent.messages import FramePath
 from agent.qstructure.formation import FormationSpec
-from netem.messages import Changed, Conditions, Groups, Healed, Parted
+from netem.messages import Conditions, Groups
 from netem.schedule import overlaid
 from worldsim.scenario.course import Step, steps
-from worldsim.scenario.events import FrameTable
+from worldsim.scenario.events import EventTable
+from worldsim.scenario.frame import changed, path_of
 from worldsim.scenario.starting import BoxStart, ListStart
 from worldsim.scenario.tables import Scenario
 
@@ -34,17 +35,6 @@ class Revival(NamedTuple):
     selectors: tuple[int | str, ...]
 
 
-class Holding(NamedTuple):
-    """Processes are to be stopped (kind pause), or to go on (resume): those selected.
-
-    With none selected, those go on that ``number`` stopped.
-    """
-
-    number: int
-    kind: str
-    selectors: tuple[int | str, ...]
-
-
 class Joining(NamedTuple):
     """New agents are to come."""
 
@@ -60,41 +50,29 @@ class Change(NamedTuple):
     change: Conditions
     undone: bool
 
-    @property
-    def order(self) -> Changed:
-        """What the medium is told."""
-        return Changed(self.conditions)
-
 
 class Partition(NamedTuple):
     """The radio's groups from now on."""
 
     groups: Groups
 
-    @property
-    def order(self) -> Parted:
-        """What the medium is told."""
-        return Parted(self.groups)
-
 
 class Heal(NamedTuple):
     """No groups from now on."""
 
-    @property
-    def order(self) -> Healed:
-        """What the medium is told."""
-        return Healed()
-
 
 class Order(NamedTuple):
-    """What the team shall form from now on, and where; kind: formation or frame, what is new."""
+    """What the team shall form from now on, and where its frame goes.
+
+    kind: formation or frame, what is new.
+    """
 
     kind: str
     formation: FormationSpec
-    pose: Pose
+    path: FramePath
 
 
-Action = Strike | Revival | Holding | Joining | Change | Partition | Heal | Order
+Action = Strike | Revival | Joining | Change | Partition | Heal | Order
 
 
 class Timeline:
@@ -108,7 +86,7 @@ class Timeline:
         self._changes: dict[int, Conditions] = {}
         self._parted_by: int | None = None
         self._formation = scenario.formation
-        self._pose = HOME
+        self._frame = scenario.frame
 
     @property
     def next_s(self) -> float:
@@ -126,16 +104,18 @@ class Timeline:
         return actions
 
     def _action(self, step: Step) -> Action | None:
-        event = step.event
+        event, number = step.event, step.number
         if event.netem is not None:
             return self._change(step, event.netem)
         if event.partition is not None or event.heal is not None:
             return self._partition(step)
         if event.formation is not None or event.frame is not None:
-            return self._order(event.formation, event.frame)
+            return self._order(event)
         if event.joiners:
-            return Joining(step.number, event.joiners, event.start or self._fleet_start)
-        return _upon_agents(step)
+            return Joining(number, event.joiners, event.start or self._fleet_start)
+        if event.restart is not None or step.undo:
+            return Revival(number, event.restart or ())
+        return Strike(number, event.kind, event.selectors)
 
     def _change(self, step: Step, change: Conditions) -> Change:
         """Lay the changes in force over the scenario's conditions, the later over the earlier."""
@@ -158,24 +138,9 @@ class Timeline:
         self._parted_by = None
         return Heal()
 
-    def _order(self, formation: FormationSpec | None, frame: FrameTable | None) -> Order:
-        if formation is not None:
-            self._formation = formation
-        if frame is not None:
-            self._pose = _posed(self._pose, frame)
-        return Order("frame" if formation is None else "formation", self._formation, self._pose)
-
-
-def _upon_agents(step: Step) -> Strike | Revival | Holding:
-    """Return what becomes of agents; what undoes a step is about those whom it struck."""
-    kind, selectors = step.event.kind, () if step.undo else step.event.selectors
-    if kind in {"pause", "resume"}:
-        return Holding(step.number, "resume" if step.undo else kind, selectors)
-    if step.undo or kind == "restart":
-        return Revival(step.number, selectors)
-    return Strike(step.number, kind, selectors)
-
-
-def _posed(pose: Pose, frame: FrameTable) -> Pose:
-    x, y, z = frame.waypoints_m[0] if frame.waypoints_m is not None else pose[:3]
-    return Pose(x, y, z, pose.yaw if frame.yaw_deg is None else radians(frame.yaw_deg))
+    def _order(self, event: EventTable) -> Order:
+        if event.formation is not None:
+            self._formation = event.formation
+        if event.frame is not None:
+            self._frame = changed(self._frame, event.frame, event.at_s)
+        return Order(event.kind, self._formation, path_of(self._frame))

@@ -20,7 +20,7 @@ class Orders:
         """Make a mission of an order, newer than any told so far; return its key."""
         self._issued = max(self._issued, newest_key // ORIGINS) + 1
         key = self._issued * ORIGINS
-        self.pending = Mission(key, order.pose, encode_formation(order.formation))
+        self.pending = Mission(key, order.path, encode_formation(order.formation))
         return key
 
     def heard(self, key: int) -> None:

@@ -239,7 +239,7 @@ class SlotLoop:
             self.team.first,
             formation=order.formation.name,
             mission=key,
-            pose=list(order.pose),
+            path=msgspec.to_builtins(order.path),
             planned=True,
             tables=msgspec.to_builtins(order.formation),
         )

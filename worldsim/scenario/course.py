@@ -12,6 +12,7 @@ from typing import NamedTuple
 from agent.codec import encode_formation
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from worldsim.scenario.events import ACTIONS, UNDONE, EventTable
+from worldsim.scenario.frame import broken_key, changed
 from worldsim.scenario.rules import TARGET_FLOOR_M, Finding, tilts_where_asked
 from worldsim.scenario.starting import BoxStart, ListStart
 from worldsim.scenario.tables import MAX_AGENTS, Scenario
@@ -19,8 +20,6 @@ from worldsim.scenario.toml import ScenarioError
 
 MAX_ORDER_B = 3000
 """What a Mission may hold of a formation [bytes]."""
-COME_BACK = frozenset({"restart", "resume"})
-"""Who comes back holds no place by which to be found."""
 _SELECTOR = re.compile(r"all|random:[1-9]\d{0,3}|(vertex|queue):(.+)", re.DOTALL)
 
 
@@ -104,6 +103,7 @@ class _Course:
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._spec = scenario.formation
+        self._frame = scenario.frame
         self._formation = self._made(scenario.formation)
         self._known = scenario.fleet.agents
         self._living = set(range(self._known))
@@ -119,7 +119,7 @@ class _Course:
         yield from self._partition(event)
         yield from self._links(event)
         yield from self._join(event)
-        yield from self._frame(event)
+        yield from self._frame_change(event)
         if event.formation is not None:
             yield from self._new_formation(event.formation)
 
@@ -131,8 +131,10 @@ class _Course:
             self._parted_by = gone if step.undo else step.number
         elif event.kind == "heal":
             self._parted_by = None
-        elif event.selectors:
-            self._change_team(event, back=step.undo or event.kind in COME_BACK)
+        elif event.kind in {"kill", "leave", "restart"}:
+            self._change_team(event, back=step.undo or event.kind == "restart")
+        elif event.frame is not None:
+            self._frame = changed(self._frame, event.frame, event.at_s)
         elif event.formation is not None:
             self._spec, self._formation = event.formation, self._made(event.formation)
         self._living.update(range(self._known, self._known + event.joiners))
@@ -175,9 +177,8 @@ class _Course:
             known = range(self._known)
             return None if selector in known else f"no agent {selector}; 0 to {known[-1]} by then"
         word, _, name = selector.partition(":")
-        placeless = kind in COME_BACK
-        if not _SELECTOR.fullmatch(selector) or (placeless and name and word != "random"):
-            places = "" if placeless else " 'vertex:V1', 'queue:Q1',"
+        if not _SELECTOR.fullmatch(selector) or (kind == "restart" and name and word != "random"):
+            places = "" if kind == "restart" else " 'vertex:V1', 'queue:Q1',"
             return f"got the text {selector!r}; allowed: an id,{places} 'random:2' or 'all'"
         names = {"vertex": list(self._spec.vertices), "queue": [q.name for q in self._spec.queue]}
         if word in names and name not in names[word]:
@@ -222,18 +223,24 @@ class _Course:
         except FormationError as error:
             yield Finding("join", f"{self._formation.name!r} has no room for them: {error.detail}")
 
-    @staticmethod
-    def _frame(event: EventTable) -> Iterator[Finding]:
-        if event.frame is None:
+    def _frame_change(self, event: EventTable) -> Iterator[Finding]:
+        change = event.frame
+        if change is None:
             return
-        if event.frame.yaw_deg is None and event.frame.waypoints_m is None:
+        if not change.given:
             yield Finding("frame", "empty; yaw_deg, waypoints_m or both")
-        if len(event.frame.waypoints_m or ()) > 1:
-            yield Finding(
-                "frame.waypoints_m",
-                f"{len(event.frame.waypoints_m or ())} points; one point, where the frame stands"
-                " from then on: it does not move along waypoints",
-            )
+        for key in ("speed_mps", "start_s", "pauses_s"):
+            if key in change.given and change.waypoints_m is None:
+                yield Finding(f"frame.{key}", "not without waypoints_m: a new path, from there on")
+        if change.start_s is not None and change.start_s < event.at_s:
+            detail = f"{change.start_s:g}; the event's at_s = {event.at_s:g} or later"
+            yield Finding("frame.start_s", detail)
+        broken = broken_key(changed(self._frame, change, event.at_s))
+        if broken is not None:
+            yield Finding(f"frame.{broken[0]}", broken[1])
+        size_b = len(encode_formation(self._spec))
+        if size_b > MAX_ORDER_B:
+            yield Finding("frame", f"the formation has {size_b} B; a mission at most {MAX_ORDER_B}")
 
     def _new_formation(self, spec: FormationSpec) -> Iterator[Finding]:
         team, vertices = self._team, len(spec.vertices)

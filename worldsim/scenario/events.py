@@ -11,9 +11,9 @@ from agent.messages import AgentId
 from agent.qstructure.formation import FormationSpec
 from agent.setup import Positive, Table
 from netem.messages import Conditions
-from worldsim.scenario.starting import BoxStart, Degrees, ListStart, Triple
+from worldsim.scenario.frame import FrameChange, Time
+from worldsim.scenario.starting import BoxStart, ListStart
 
-Time = Annotated[float, Meta(ge=0, le=86_400)]
 Selector = Annotated[
     int | str,
     Meta(description="an id, 'vertex:V1', 'queue:Q1', 'random:2' or 'all'"),
@@ -28,16 +28,6 @@ class JoinTable(Table, frozen=True):
 
     count: Joiners
     start: BoxStart | ListStart | None = None
-
-
-class FrameTable(Table, frozen=True):
-    """Where the target's frame stands from now on; what is left out stays as it was.
-
-    waypoints_m: one point, where the frame's origin is from then on.
-    """
-
-    yaw_deg: Degrees | None = None
-    waypoints_m: Annotated[tuple[Triple, ...], Meta(min_length=1, max_length=64)] | None = None
 
 
 class EventTable(Table, frozen=True):
@@ -62,7 +52,7 @@ class EventTable(Table, frozen=True):
     heal: bool | None = None
     netem: Conditions | None = None
     formation: FormationSpec | None = None
-    frame: FrameTable | None = None
+    frame: FrameChange | None = None
 
     @property
     def actions(self) -> list[str]:

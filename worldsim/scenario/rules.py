@@ -4,11 +4,13 @@ A rule is a function that returns what is broken, or None; a caution one that re
 allowed but unwise.
 """
 
-from math import ceil, degrees, dist
+from math import ceil, degrees, dist, hypot
 from pathlib import Path
 from typing import NamedTuple
 
 from agent.qstructure.formation import Formation
+from agent.qstructure.path import tip_speed
+from worldsim.scenario.frame import broken_key, path_of
 from worldsim.scenario.obstacles import obstacle_problem
 from worldsim.scenario.starting import BoxStart
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
@@ -216,6 +218,36 @@ def _obstacles_sound(scenario: Scenario) -> Finding | None:
     return None
 
 
+def _frame_whole(scenario: Scenario) -> Finding | None:
+    broken = broken_key(scenario.frame)
+    return Finding(f"frame.{broken[0]}", broken[1]) if broken is not None else None
+
+
+def _frame_followed(scenario: Scenario) -> Finding | None:
+    """Say if the frame is faster than the slowest vehicle, or turns its slots faster than that."""
+    slowest = min(vehicle.max_speed_mps for vehicle in scenario.vehicles)
+    speed, turns_dps = scenario.frame.speed_mps or 0.0, scenario.frame.turn_dps
+    if speed >= slowest:
+        detail = f"{speed:g} leaves vehicles behind; below max_speed_mps = {slowest:g}"
+        return Finding("frame.speed_mps", detail)
+    reach_m = _reach_m(scenario)
+    needed = tip_speed(path_of(scenario.frame), reach_m)
+    if needed < slowest:
+        return None
+    return Finding(
+        "frame.turn_dps",
+        f"{turns_dps:g} moves a slot {reach_m:.3g} m off the axis at {needed:.3g} m/s;"
+        f" below {degrees(slowest / reach_m):.3g}, for max_speed_mps = {slowest:g}",
+    )
+
+
+def _reach_m(scenario: Scenario) -> float:
+    """Return how far from the frame's upright axis a slot is at most [m]."""
+    formation = Formation(scenario.formation, scenario.control.spacing_m)
+    slots = formation.layout(scenario.fleet.agents).slots.values()
+    return max(hypot(slot.point[0], slot.point[1]) for slot in slots)
+
+
 def _local_range_m(scenario: Scenario) -> float | None:
     own = scenario.netem.local.range_m
     return own if own is not None else scenario.netem.range_m
@@ -231,6 +263,7 @@ RULES = (
     _links_of_the_fleet,
     _cast_zone_open,
     _sent_by_the_tick,
+    _frame_whole,
     _obstacles_sound,
 )
-CAUTIONS = (_cast_within_range, _neighbours_in_range, _long_enough_to_converge)
+CAUTIONS = (_cast_within_range, _neighbours_in_range, _long_enough_to_converge, _frame_followed)

@@ -14,6 +14,7 @@ from agent.qstructure.formation import FormationSpec
 from agent.setup import AgentSetup, Comms, Control, Hertz, Positive, Table, Vehicle
 from netem.messages import Conditions, MediumSetup
 from worldsim.scenario.events import EventTable
+from worldsim.scenario.frame import FrameTable, path_of
 from worldsim.scenario.obstacles import ObstacleField, Obstacles
 from worldsim.scenario.starting import BoxStart, ListStart
 
@@ -111,6 +112,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
     control: Control = Control()
     comms: Comms = Comms()
     netem: Conditions = Conditions()
+    frame: FrameTable = FrameTable()
     obstacle: Obstacles = ()
     obstacle_field: ObstacleField | None = None
     event: tuple[EventTable, ...] = ()
@@ -180,4 +182,5 @@ class Scenario(Table, frozen=True, omit_defaults=False):
             control=self._control(),
             comms=self.comms,
             formation=self.formation,
+            frame=path_of(self.frame),
         )

@@ -54,6 +54,8 @@ EXAMPLES: Given = {
     "expect.reform_within_s": 10.0,
     "expect.min_separation_m": 0.25,
     "expect.min_obstacle_distance_m": 0.4,
+    "frame.speed_mps": 0.25,
+    "event.frame.yaw_deg": 90.0,
     "formation.queue.capacity": 0.5,
     "formation.queue.orientation.yaw_deg": "10*d",
     "netem.delay_ms": 20.0,

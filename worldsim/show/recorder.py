@@ -14,10 +14,12 @@ import msgspec
 import numpy as np
 import rerun as rr
 
+from agent.messages import FramePath
 from agent.qstructure.formation import Formation, FormationSpec
-from agent.qstructure.frame import Frame
+from agent.qstructure.path import Track
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
+from worldsim.scenario.frame import path_of
 from worldsim.scenario.tables import Scenario
 from worldsim.show import layout
 from worldsim.show.blueprint import blueprint_of, stage_of
@@ -27,8 +29,8 @@ from worldsim.show.spool import Spool
 
 Event = dict[str, Any]
 FLUSH_S = 5.0
-UNSPOKEN = frozenset({"t_s", "kind", "agent", "tables", "conditions"})
-WARNINGS = frozenset({"kill", "leave", "pause", "partition", "jam", "late"})
+UNSPOKEN = frozenset({"t_s", "kind", "agent", "tables", "conditions", "path"})
+WARNINGS = frozenset({"kill", "leave", "partition", "jam"})
 
 
 def complain(text: str) -> None:
@@ -95,7 +97,12 @@ class RunRecorder:
     def _open(self, path: Path, run_id: str, mode: str) -> None:
         rr.set_strict_mode(True)
         self._spool = Spool(path, self._say)
-        scenery = Scenery(self._scenario, self._formation, self._scenario.fleet.agents)
+        scenery = Scenery(
+            self._scenario,
+            self._formation,
+            self._scenario.fleet.agents,
+            Track(path_of(self._scenario.frame)).at(0.0),
+        )
         # Without an id of our own: a viewer takes two recordings of one id for one.
         self._stream = rr.RecordingStream(
             "qswarm",
@@ -145,8 +152,8 @@ class RunRecorder:
         """Draw the formation that a mission asks for, from its time on."""
         spec = msgspec.convert(event["tables"], FormationSpec)
         formation = Formation(spec, self._scenario.control.spacing_m)
-        x, y, z, yaw = event["pose"]
-        scenery = Scenery(self._scenario, formation, self._team, Frame((x, y, z), yaw))
+        track = Track(msgspec.convert(event["path"], FramePath))
+        scenery = Scenery(self._scenario, formation, self._team, track.at(event["t_s"]))
         self._stream.set_time(layout.SIM_TIME, duration=event["t_s"])
         self._stream.set_time(layout.TICK, sequence=self._tick_at(event["t_s"]))
         for entity, part in scenery.formation():

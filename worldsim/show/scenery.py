@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from agent.messages import Vector
 from agent.qstructure.formation import Formation
 from agent.qstructure.frame import Frame
-from worldsim.judge.phase import CONVERGED_M, HERE
+from worldsim.judge.phase import CONVERGED_M
 from worldsim.scenario.file import dump
 from worldsim.scenario.tables import Scenario
 from worldsim.show import layout, palette
@@ -27,9 +27,7 @@ class Scenery:
     team: how many the formation is drawn for. slots: (M, 3), where its places are [m; world frame].
     """
 
-    def __init__(
-        self, scenario: Scenario, formation: Formation, team: int, frame: Frame = HERE
-    ) -> None:
+    def __init__(self, scenario: Scenario, formation: Formation, team: int, frame: Frame) -> None:
         self._scenario = scenario
         self._formation = formation
         self._frame = frame

@@ -8,7 +8,7 @@ AT_REST = (0.0, 0.0, 0.0)
 GREATEST = 2**53 - 1
 FAR = -999_999.9
 LATE_S = 999_999_999.9
-UNLED = (0, 0, HOME, -1, -1, 0, ())
+UNLED = (0, 0, HOME, None, -1, -1, 0, ())
 """The tail of a beacon without a new mission or a parent."""
 
 
