@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from agent.messages import FramePath
 from agent.qstructure.formation import FormationSpec
-from netem.messages import Conditions, Groups
+from netem.messages import Changed, Conditions, Groups, Healed, Parted
 from netem.schedule import overlaid
 from worldsim.scenario.course import Step, steps
 from worldsim.scenario.events import EventTable
@@ -35,6 +35,17 @@ class Revival(NamedTuple):
     selectors: tuple[int | str, ...]
 
 
+class Holding(NamedTuple):
+    """Processes are to be stopped (kind pause), or to go on (resume): those selected.
+
+    With none selected, those go on that ``number`` stopped.
+    """
+
+    number: int
+    kind: str
+    selectors: tuple[int | str, ...]
+
+
 class Joining(NamedTuple):
     """New agents are to come."""
 
@@ -50,15 +61,30 @@ class Change(NamedTuple):
     change: Conditions
     undone: bool
 
+    @property
+    def order(self) -> Changed:
+        """What the medium is told."""
+        return Changed(self.conditions)
+
 
 class Partition(NamedTuple):
     """The radio's groups from now on."""
 
     groups: Groups
 
+    @property
+    def order(self) -> Parted:
+        """What the medium is told."""
+        return Parted(self.groups)
+
 
 class Heal(NamedTuple):
     """No groups from now on."""
+
+    @property
+    def order(self) -> Healed:
+        """What the medium is told."""
+        return Healed()
 
 
 class Order(NamedTuple):
@@ -72,7 +98,7 @@ class Order(NamedTuple):
     path: FramePath
 
 
-Action = Strike | Revival | Joining | Change | Partition | Heal | Order
+Action = Strike | Revival | Holding | Joining | Change | Partition | Heal | Order
 
 
 class Timeline:
@@ -104,7 +130,7 @@ class Timeline:
         return actions
 
     def _action(self, step: Step) -> Action | None:
-        event, number = step.event, step.number
+        event = step.event
         if event.netem is not None:
             return self._change(step, event.netem)
         if event.partition is not None or event.heal is not None:
@@ -112,10 +138,8 @@ class Timeline:
         if event.formation is not None or event.frame is not None:
             return self._order(event)
         if event.joiners:
-            return Joining(number, event.joiners, event.start or self._fleet_start)
-        if event.restart is not None or step.undo:
-            return Revival(number, event.restart or ())
-        return Strike(number, event.kind, event.selectors)
+            return Joining(step.number, event.joiners, event.start or self._fleet_start)
+        return _upon_agents(step)
 
     def _change(self, step: Step, change: Conditions) -> Change:
         """Lay the changes in force over the scenario's conditions, the later over the earlier."""
@@ -144,3 +168,13 @@ class Timeline:
         if event.frame is not None:
             self._frame = changed(self._frame, event.frame, event.at_s)
         return Order(event.kind, self._formation, path_of(self._frame))
+
+
+def _upon_agents(step: Step) -> Strike | Revival | Holding:
+    """Return what becomes of agents; what undoes a step is about those whom it struck."""
+    kind, selectors = step.event.kind, () if step.undo else step.event.selectors
+    if kind in {"pause", "resume"}:
+        return Holding(step.number, "resume" if step.undo else kind, selectors)
+    if step.undo or kind == "restart":
+        return Revival(step.number, selectors)
+    return Strike(step.number, kind, selectors)

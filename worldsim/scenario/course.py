@@ -20,6 +20,8 @@ from worldsim.scenario.toml import ScenarioError
 
 MAX_ORDER_B = 3000
 """What a Mission may hold of a formation [bytes]."""
+COME_BACK = frozenset({"restart", "resume"})
+"""Who comes back holds no place by which to be found."""
 _SELECTOR = re.compile(r"all|random:[1-9]\d{0,3}|(vertex|queue):(.+)", re.DOTALL)
 
 
@@ -131,8 +133,8 @@ class _Course:
             self._parted_by = gone if step.undo else step.number
         elif event.kind == "heal":
             self._parted_by = None
-        elif event.kind in {"kill", "leave", "restart"}:
-            self._change_team(event, back=step.undo or event.kind == "restart")
+        elif event.selectors:
+            self._change_team(event, back=step.undo or event.kind in COME_BACK)
         elif event.frame is not None:
             self._frame = changed(self._frame, event.frame, event.at_s)
         elif event.formation is not None:
@@ -177,8 +179,9 @@ class _Course:
             known = range(self._known)
             return None if selector in known else f"no agent {selector}; 0 to {known[-1]} by then"
         word, _, name = selector.partition(":")
-        if not _SELECTOR.fullmatch(selector) or (kind == "restart" and name and word != "random"):
-            places = "" if kind == "restart" else " 'vertex:V1', 'queue:Q1',"
+        placeless = kind in COME_BACK
+        if not _SELECTOR.fullmatch(selector) or (placeless and name and word != "random"):
+            places = "" if placeless else " 'vertex:V1', 'queue:Q1',"
             return f"got the text {selector!r}; allowed: an id,{places} 'random:2' or 'all'"
         names = {"vertex": list(self._spec.vertices), "queue": [q.name for q in self._spec.queue]}
         if word in names and name not in names[word]:

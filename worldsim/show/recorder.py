@@ -30,7 +30,7 @@ from worldsim.show.spool import Spool
 Event = dict[str, Any]
 FLUSH_S = 5.0
 UNSPOKEN = frozenset({"t_s", "kind", "agent", "tables", "conditions", "path"})
-WARNINGS = frozenset({"kill", "leave", "partition", "jam"})
+WARNINGS = frozenset({"kill", "leave", "pause", "partition", "jam", "late"})
 
 
 def complain(text: str) -> None:
