@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worldsim.judge.tick import Packets, Singles
+from worldsim.truth.obstacle import Obstacles
 
 Floats = NDArray[np.float64]
 
@@ -24,6 +25,20 @@ def swept_separation(before: Singles, after: Singles) -> Floats:
     square.flat[:: len(before) + 1] = np.nan
     least: Floats = np.fmin.reduce(square, axis=1, initial=np.nan)
     return np.sqrt(least)
+
+
+def swept_obstacle_distance(
+    before: Floats, after: Floats, obstacles: Obstacles, times_s: tuple[float, float]
+) -> Floats:
+    """Return each vehicle's least distance, centre to surface, from tick to tick [m].
+
+    before, after: (N, 3) [m; world frame] at ``times_s``; vehicles and obstacles are taken to move
+    straight between. Negative within an obstacle; NaN for no vehicle.
+    """
+    starts = before[:, None] - obstacles.centres(times_s[0])
+    ends = after[:, None] - obstacles.centres(times_s[1])
+    least: Floats = np.min(obstacles.swept(starts, ends), axis=1)
+    return least
 
 
 def conserved(packets: Packets) -> bool:

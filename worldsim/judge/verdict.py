@@ -14,6 +14,7 @@ import numpy as np
 from agent.guidance.cone import cone_of
 from agent.messages import FramePath
 from agent.qstructure.formation import Formation, FormationSpec
+from worldsim.judge.clearance import Clearance
 from worldsim.judge.invariants import Invariants
 from worldsim.judge.metrics import Floats, conserved, swept_separation
 from worldsim.judge.phase import Phase
@@ -29,12 +30,14 @@ TURN_LIMIT_SLACK_DEG = 1e-6
 class Figures:
     """What the judge measured at one tick; NaN where there is nothing to measure.
 
-    separation (N,) [m]: swept since the tick before; slot_error (N,) [m]: to the agent's own slot.
+    separation (N,) [m]: swept since the tick before; slot_error (N,) [m]: to the agent's own slot;
+    obstacle_distance (N,) [m]: centre to surface, swept likewise; None where there is no obstacle.
     """
 
     separation: Floats
     slot_error: Floats
     converged: bool
+    obstacle_distance: Floats | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +61,8 @@ class Judge:
         self._allocation = Invariants(scenario) if scenario.expect.converge else None
         self.ticks = 0
         self.min_separation_m: float | None = None
-        self.separation_violations = 0
+        self.clearance = Clearance(scenario)
+        self.safety_violations = 0
         self.packet_ticks = 0
         self.packet_violations = 0
         cones = np.degrees([cone_of(vehicle) for vehicle in scenario.vehicles])
@@ -79,11 +83,12 @@ class Judge:
 
     def see(self, tick: Tick) -> Figures:
         """Judge one tick; ticks come in order."""
-        before = self._before.position if self._before is not None else tick.position
+        before = self._before if self._before is not None else tick
         self._before = tick
         self.ticks += 1
-        separation = swept_separation(before, tick.position)
-        self._see_separation(separation)
+        separation = swept_separation(before.position, tick.position)
+        distance, too_near = self.clearance.see(before, tick) if self.clearance else (None, False)
+        self.safety_violations += self._see_separation(separation) or too_near
         self._see_packets(tick.packets)
         self._turns += int(np.count_nonzero(~np.isnan(tick.turn_deg)))
         self._turns_over += int(np.count_nonzero(tick.turn_deg > self._turn_left_deg))
@@ -94,12 +99,17 @@ class Judge:
         self._recoveries.see(tick, phase, in_place)
         if self._allocation is not None:
             self._allocation.see(tick, phase, in_place)
-        return Figures(separation, error, in_place)
+        return Figures(separation, error, in_place, distance)
 
     @property
     def recoveries(self) -> list[Recovery]:
         """Every change of the team, and how long it took to re-form."""
         return self._recoveries.all
+
+    @property
+    def min_obstacle_distance_m(self) -> float | None:
+        """The least distance from a vehicle's centre to a surface [m]; None without obstacles."""
+        return self.clearance.least_m
 
     @property
     def attitude_error_deg(self) -> float | None:
@@ -126,6 +136,8 @@ class Judge:
                 least >= wanted_m if least is not None else self._scenario.fleet.agents == 1,
             )
         ]
+        if self.clearance:
+            rows.append(self._cleared())
         for phase in self.phases if expect.converge else ():
             within = expect.converge_within_s
             got = phase.converge_s
@@ -138,14 +150,15 @@ class Judge:
     def invariants(self) -> dict[str, dict[str, int]]:
         """Return each invariant checked at every tick: ticks evaluated, violations.
 
-        I8 is evaluated wherever the medium's counters are known: in virtual time at every tick, in
-        processes from netem's first report on. One of allocation whose premise never held is
-        absent, as are all of them where no formation is to be formed.
+        I1: no two vehicles too near, and none to an obstacle. I8 is evaluated wherever the medium's
+        counters are known: in virtual time at every tick, in processes from netem's first report
+        on. One of allocation whose premise never held is absent, as are all of them where no
+        formation is to be formed.
         """
         tallies = self._allocation.tallies if self._allocation is not None else {}
         allocation = {name: asdict(tally) for name, tally in tallies.items() if tally.ticks}
         return {
-            "I1": {"ticks": self.ticks, "violations": self.separation_violations},
+            "I1": {"ticks": self.ticks, "violations": self.safety_violations},
             **allocation,
             "I8": {"ticks": self.packet_ticks, "violations": self.packet_violations},
         }
@@ -163,16 +176,21 @@ class Judge:
         held = len(known) == len(took) and all(each <= within_s for each in known)
         return Expectation("reform_within_s", within_s, worst_s, held)
 
+    def _cleared(self) -> Expectation:
+        wanted_m, least_m = self.clearance.bound_m, self.min_obstacle_distance_m
+        held = least_m is not None and least_m >= wanted_m
+        return Expectation("min_obstacle_distance_m", wanted_m, least_m, held)
+
     def _see_packets(self, packets: Packets) -> None:
         if "addressed" in packets:
             self.packet_ticks += 1
             self.packet_violations += not conserved(packets)
 
-    def _see_separation(self, separation: Floats) -> None:
+    def _see_separation(self, separation: Floats) -> bool:
+        """Take the distances of a tick [m]; return whether two were too near."""
         least = float(np.fmin.reduce(separation, initial=np.inf))
         if least == inf:
-            return
+            return False
         if self.min_separation_m is None or least < self.min_separation_m:
             self.min_separation_m = least
-        if least < self._scenario.control.separation_m:
-            self.separation_violations += 1
+        return least < self._scenario.control.separation_m

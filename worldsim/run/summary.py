@@ -57,7 +57,7 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
         "reason": reason,
         "expectations": [_row(expectation) for expectation in expectations],
         "min_separation_m": judge.min_separation_m,
-        "min_obstacle_distance_m": None,
+        "min_obstacle_distance_m": judge.min_obstacle_distance_m,
         "phases": _phases(judge),
         "recoveries": [asdict(recovery) for recovery in judge.recoveries],
         "attitude_error_deg": judge.attitude_error_deg,

@@ -34,10 +34,12 @@ def stage_of(scenario: Scenario, slots: NDArray[np.float64]) -> Stage:
     return Stage(centre, max(float(np.linalg.norm(high - low)) / 2.0, 1.0))
 
 
-def blueprint_of(stage: Stage) -> rrb.Blueprint:
-    """Return the viewer's default layout."""
+def blueprint_of(stage: Stage, obstacles: bool = False) -> rrb.Blueprint:
+    """Return the viewer's default layout; ``obstacles``: whether there are any."""
+    near = [_series("Distance to the nearest obstacle [m]", layout.OBSTACLE_DISTANCE)]
     figures = rrb.Vertical(
         _series("Separation to the nearest other [m]", layout.SEPARATION),
+        *(near if obstacles else ()),
         _series("Distance to the own slot [m]", layout.SLOT_ERROR),
         _series("Force |u|", layout.FORCE),
         _series("Wanted turn [deg]", layout.TURN_DEG),

@@ -13,11 +13,14 @@ LINKS = "/world/links"
 SLOTS = "/world/formation/slots"
 ARRIVED = "/world/formation/arrived"
 QUEUES = "/world/formation/queues"
+OBSTACLES = "/world/obstacles"
+MOVING = "/world/obstacles/moving"
 
 FORCE = "/metrics/force"
 SEPARATION = "/metrics/separation"
 TURN_DEG = "/metrics/turn_deg"
 SLOT_ERROR = "/metrics/slot_error"
+OBSTACLE_DISTANCE = "/metrics/obstacle_distance"
 PACKETS = "/metrics/packets"
 
 EVENTS = "/log/events"
@@ -39,3 +42,5 @@ def limit_of(metric: str) -> str:
 
 PER_AGENT = (FORCE, SEPARATION, TURN_DEG, SLOT_ERROR)
 """Metrics with one series for each agent."""
+NEAR_OBSTACLES = (*PER_AGENT, OBSTACLE_DISTANCE)
+"""The same, where there are obstacles."""

@@ -23,6 +23,7 @@ UNPLACED = np.uint32(0xC8CDD6FF)
 DEAD = np.uint32(0x5A5F69FF)
 LINK = np.uint32(0x333D4DFF)
 LIMIT = np.uint32(0xFF5252FF)
+OBSTACLE = np.uint32(0x6F6256FF)
 
 
 def of_places(place: NDArray[np.int16], shared: NDArray[np.int16]) -> Colours:

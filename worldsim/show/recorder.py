@@ -23,9 +23,11 @@ from worldsim.scenario.frame import path_of
 from worldsim.scenario.tables import Scenario
 from worldsim.show import layout
 from worldsim.show.blueprint import blueprint_of, stage_of
+from worldsim.show.obstacles import Shapes
 from worldsim.show.scenery import Scenery, limits
 from worldsim.show.sheets import Sheet, Sheets
 from worldsim.show.spool import Spool
+from worldsim.truth.obstacle import Obstacles
 
 Event = dict[str, Any]
 FLUSH_S = 5.0
@@ -60,6 +62,7 @@ class RunRecorder:
         self._formation = Formation(scenario.formation, scenario.control.spacing_m)
         shared = np.array(self._formation.common, dtype=np.int16).reshape(-1, 2)
         self._sheets = Sheets(shared, scenario.fleet.tick_hz, limits(scenario))
+        self._shapes = Shapes(Obstacles(scenario.obstacle))
         self._team = scenario.fleet.agents
         self._every = max(1, round(scenario.fleet.tick_hz))
         self._ticks: list[Tick] = []
@@ -110,7 +113,9 @@ class RunRecorder:
         )
         self._stream.set_sinks(
             rr.FileSink(self._spool.path),
-            default_blueprint=blueprint_of(stage_of(self._scenario, scenery.slots)),
+            default_blueprint=blueprint_of(
+                stage_of(self._scenario, scenery.slots), bool(self._scenario.obstacle)
+            ),
         )
         self._spool.opened()
         rr.set_log_time_enabled(False, recording=self._stream)
@@ -128,7 +133,7 @@ class RunRecorder:
         self._lay_out(scenery)
 
     def _lay_out(self, scenery: Scenery) -> None:
-        for entity, parts in scenery.lasting():
+        for entity, parts in (*scenery.lasting(), *self._shapes.lasting()):
             self._stream.log(entity, *parts, static=True)
         self._stream.set_time(layout.SIM_TIME, duration=0.0)
         self._stream.set_time(layout.TICK, sequence=0)
@@ -139,7 +144,8 @@ class RunRecorder:
     def _flush(self) -> None:
         if self._ticks:
             self._team = int(np.count_nonzero(self._ticks[-1].alive))
-            for sheet in self._sheets.of(self._ticks, self._figures):
+            sheets = self._sheets.of(self._ticks, self._figures)
+            for sheet in (*sheets, *self._shapes.sheets(self._ticks)):
                 self._send(sheet)
         if self._events:
             self._send_events()

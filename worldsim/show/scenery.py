@@ -49,7 +49,8 @@ class Scenery:
             [rr.LineStrips3D.from_fields(colors=np.array([palette.LINK]), radii=[0.004])],
         )
         yield layout.VEHICLES, [self._bodies(names)]
-        for metric in layout.PER_AGENT:
+        metrics = layout.NEAR_OBSTACLES if self._scenario.obstacle else layout.PER_AGENT
+        for metric in metrics:
             yield metric, [rr.SeriesLines(names=names, widths=[1.2] * agents)]
         for metric, lines in limits(self._scenario).items():
             yield layout.limit_of(metric), [_reference(len(lines))]
@@ -113,7 +114,9 @@ def limits(scenario: Scenario) -> dict[str, list[float]]:
     """Return the reference lines of each metric that has a limit."""
     least = scenario.expect.min_separation_m
     turn = scenario.vehicle.max_turn_deg
+    near = {layout.OBSTACLE_DISTANCE: [scenario.obstacle_bound_m]} if scenario.obstacle else {}
     return {
+        **near,
         layout.SEPARATION: [least if least is not None else scenario.control.separation_m],
         layout.SLOT_ERROR: [CONVERGED_M],
         layout.TURN_DEG: [-turn, turn],

@@ -65,6 +65,8 @@ class Sheets:
         self._flown = Latest()
         self._counters: dict[str, Latest] = {}
         self._lines_due = 0
+        near = layout.OBSTACLE_DISTANCE in limits
+        self._per_agent = layout.NEAR_OBSTACLES if near else layout.PER_AGENT
 
     def of(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Sheet]:
         """Return the sheets of a block; blocks come in order."""
@@ -92,7 +94,7 @@ class Sheets:
         for entity, archetype in ((layout.VEHICLES, rr.Boxes3D), (layout.TARGETS, rr.Points3D)):
             yield Sheet(entity, rows, archetype.columns(colors=colours).partition(counts))
         lasting = rr.SeriesLines.columns(colors=series[rows[-1]]).partition(counts[:1])
-        for entity in layout.PER_AGENT:
+        for entity in self._per_agent:
             yield Sheet(entity, (), lasting)
 
     def _hearing(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
@@ -198,6 +200,10 @@ def _metrics(ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Shee
     ):
         columns = rr.Scalars.columns(scalars=np.concatenate(series)).partition(counts)
         yield Sheet(entity, range(len(ticks)), columns)
+    near = [seen.obstacle_distance for seen in figures if seen.obstacle_distance is not None]
+    if near:
+        columns = rr.Scalars.columns(scalars=np.concatenate(near)).partition(counts)
+        yield Sheet(layout.OBSTACLE_DISTANCE, range(len(ticks)), columns)
 
 
 def _state(ticks: Sequence[Tick]) -> Sheet:

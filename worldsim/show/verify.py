@@ -61,6 +61,7 @@ class Verification:
     duration_s: float = 0.0
     expectations: tuple[Expectation, ...] = ()
     min_separation_m: Figure = None
+    min_obstacle_distance_m: Figure = None
     turns_over_limit_fraction: Figure = None
     phases: tuple[PhaseFigures, ...] = ()
     recoveries: tuple[Recovery, ...] = ()
@@ -113,6 +114,7 @@ def _judged(run: Path, recording: Path) -> Verification:
         duration_s=readback.scenario.duration_s,
         expectations=tuple(judge.expectations()),
         min_separation_m=judge.min_separation_m,
+        min_obstacle_distance_m=judge.min_obstacle_distance_m,
         turns_over_limit_fraction=judge.turns_over_limit_fraction,
         phases=tuple(
             PhaseFigures(
@@ -174,6 +176,7 @@ def _figures(judged: Verification) -> dict[str, Any]:
     """Return what must be equal, by its path in summary.json."""
     figures: dict[str, Any] = {
         "min_separation_m": judged.min_separation_m,
+        "min_obstacle_distance_m": judged.min_obstacle_distance_m,
         "turns_over_limit_fraction": judged.turns_over_limit_fraction,
     }
     for name, counts in judged.invariants.items():

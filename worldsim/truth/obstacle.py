@@ -54,8 +54,9 @@ class Path(NamedTuple):
 class Obstacles:
     """All obstacles of a world; column j is the j-th of the scenario.
 
-    Boxes and walls are told by half their size and their heading, cylinders by radius and half
-    their height, spheres by their radius.
+    spheres, cylinders, boxes: columns of each kind, walls being boxes. radius (M,) [m]; half
+    (M, 3): half of a box's size, and of a cylinder's height [m]; heading (M, 2): cosine and sine of
+    a box's.
     """
 
     def __init__(self, tables: Sequence[Obstacle]) -> None:
@@ -63,20 +64,20 @@ class Obstacles:
         self._centre = np.array([_centre(each) for each in tables], dtype=np.float64)
         self._centre = self._centre.reshape(-1, 3)
         self._paths = {j: _path(each) for j, each in enumerate(tables) if _moves(each)}
-        self._round = _columns(tables, Sphere)
-        self._upright = _columns(tables, Cylinder)
-        self._square = np.sort(np.concatenate((_columns(tables, Box), _columns(tables, Wall))))
-        self._radius = np.array([getattr(each, "radius_m", 0.0) for each in tables])
-        self._half = np.array([_half(each) for each in tables]).reshape(-1, 3)
-        self._heading = np.array([_heading(each) for each in tables]).reshape(-1, 2)
+        self.spheres = _columns(tables, Sphere)
+        self.cylinders = _columns(tables, Cylinder)
+        self.boxes = np.sort(np.concatenate((_columns(tables, Box), _columns(tables, Wall))))
+        self.radius = np.array([getattr(each, "radius_m", 0.0) for each in tables])
+        self.half = np.array([_half(each) for each in tables]).reshape(-1, 3)
+        self.heading = np.array([_heading(each) for each in tables]).reshape(-1, 2)
 
     def __len__(self) -> int:
         return len(self.tables)
 
     @property
-    def moving(self) -> bool:
-        """Whether any of them moves."""
-        return bool(self._paths)
+    def moves(self) -> NDArray[np.bool_]:
+        """Which of them move (M,)."""
+        return np.array([column in self._paths for column in range(len(self))], dtype=np.bool_)
 
     def centres(self, time_s: float) -> Floats:
         """Return where the centres are at a time, (M, 3) [m; world frame]."""
@@ -96,9 +97,9 @@ class Obstacles:
         """Return how far points are from each surface; (P, M, 3) [m], relative to the centres."""
         distance, away = np.empty(relative.shape[:2]), np.empty(relative.shape)
         for columns, form in (
-            (self._round, self._from_spheres),
-            (self._upright, self._from_cylinders),
-            (self._square, self._from_boxes),
+            (self.spheres, self._from_spheres),
+            (self.cylinders, self._from_cylinders),
+            (self.boxes, self._from_boxes),
         ):
             if len(columns):
                 found = form(relative[:, columns], columns)
@@ -134,20 +135,20 @@ class Obstacles:
 
     def _from_spheres(self, relative: Floats, columns: NDArray[np.intp]) -> Nearest:
         r = np.sqrt(_dot(relative, relative))
-        return Nearest(r - self._radius[columns], _unit(relative, r))
+        return Nearest(r - self.radius[columns], _unit(relative, r))
 
     def _from_cylinders(self, relative: Floats, columns: NDArray[np.intp]) -> Nearest:
         x, y, z = np.moveaxis(relative, 2, 0)
         across = np.sqrt(x * x + y * y)
-        side, cap = across - self._radius[columns], np.abs(z) - self._half[columns, 2]
+        side, cap = across - self.radius[columns], np.abs(z) - self.half[columns, 2]
         distance, (radial, upward) = _from_corner((side, cap))
         outward = radial / np.where(across > 0.0, across, 1.0)
         out_x = np.where(across > 0.0, x * outward, radial)
         return Nearest(distance, np.stack((out_x, y * outward, np.copysign(upward, z)), axis=2))
 
     def _from_boxes(self, relative: Floats, columns: NDArray[np.intp]) -> Nearest:
-        c, s = self._heading[columns].T
-        half = self._half[columns]
+        c, s = self.heading[columns].T
+        half = self.half[columns]
         x, y, z = np.moveaxis(relative, 2, 0)
         ahead, left = c * x + s * y, c * y - s * x
         beyond = [np.abs(each) - half[:, k] for k, each in enumerate((ahead, left, z))]
