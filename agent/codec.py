@@ -6,6 +6,7 @@ several agents in one process.
 
 from collections.abc import Callable
 from typing import Any, TypeVar
+from zlib import crc32
 
 import msgpack
 import msgspec
@@ -14,6 +15,8 @@ from agent.messages import Beacon, Command, Gossip, Observation
 from agent.qstructure.formation import FormationSpec
 
 MAX_RADIO_B = 1200
+"""What the radio carries in a frame, the seal included."""
+SEAL_B = 4
 MAX_MESSAGE_B = 4096
 MAX_OBSERVATION_B = 65536
 """Bodies sensed, and with them a mission: its formation and its frame's path."""
@@ -35,6 +38,21 @@ class RejectedError(ValueError):
 def encode(message: msgspec.Struct) -> bytes:
     """Encode any message of ours as msgpack."""
     return _encode(message)
+
+
+def sealed(data: bytes) -> bytes:
+    """Return what the radio carries: bytes, and a checksum (crc32) after them."""
+    return data + crc32(data).to_bytes(SEAL_B, "little")
+
+
+def unsealed(payload: bytes) -> bytes:
+    """Return what was sealed, or raise :class:`RejectedError` where a bit was turned on the way."""
+    if len(payload) > MAX_RADIO_B:
+        raise RejectedError("oversize", f"{len(payload)} B where {MAX_RADIO_B} B are allowed")
+    data = payload[:-SEAL_B]
+    if payload != sealed(data):
+        raise RejectedError("corrupt", "the checksum does not fit")
+    return data
 
 
 def decode(data: bytes, kind: type[_T], max_bytes: int = MAX_MESSAGE_B, max_text: int = 64) -> _T:
@@ -83,12 +101,12 @@ _command = msgspec.msgpack.Decoder(Command).decode
 
 def decode_beacon(payload: bytes) -> Beacon:
     """Decode a frame of the local channel, or raise :class:`RejectedError`."""
-    return _typed(payload, _beacon, MAX_RADIO_B)
+    return _typed(unsealed(payload), _beacon, MAX_RADIO_B)
 
 
 def decode_gossip(payload: bytes) -> Gossip:
     """Decode a frame of the multihop channel, or raise :class:`RejectedError`."""
-    return _typed(payload, _gossip, MAX_RADIO_B)
+    return _typed(unsealed(payload), _gossip, MAX_RADIO_B)
 
 
 def decode_observation(data: bytes) -> Observation:

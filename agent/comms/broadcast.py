@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
-from agent.codec import encode
+from agent.codec import encode, sealed
 from agent.comms.gossip import Table
 from agent.comms.hierarchy import ALONE, Standing
 from agent.messages import HOME, Beacon, Drift, Piece, Place, Pose, Record, Vector
@@ -16,8 +16,8 @@ LOCAL, MULTIHOP = 0, 1
 """Channels of the radio."""
 MEMORY = 200
 """So many of the own beacons are remembered, for the echoes that may come."""
-MAX_ECHOES = 68
-"""So many fit beside the greatest numbers that a Beacon may hold: 311 B and 13 B for each echo."""
+MAX_ECHOES = 67
+"""So many fit beside the greatest numbers of a Beacon: 317 B with its seal, and 13 B each."""
 
 
 class OwnState(NamedTuple):
@@ -75,7 +75,7 @@ class Broadcast:
         frames: list[tuple[int, bytes]] = []
         if now_s >= self._next_beacon_s:
             self._next_beacon_s = now_s + self._beacon_period_s - 1e-9
-            frames.append((LOCAL, encode(self._beacon(now_s, own, echoes))))
+            frames.append((LOCAL, sealed(encode(self._beacon(now_s, own, echoes)))))
         if now_s >= self._next_round_s:
             self._next_round_s = now_s + self._round_period_s - 1e-9
             frames.extend(

@@ -7,7 +7,7 @@ version of a record is its subject's beacon sequence, so a beacon heard directly
 
 from collections.abc import Collection, Iterator, Sequence
 
-from agent.codec import encode
+from agent.codec import MAX_RADIO_B, SEAL_B, encode, sealed
 from agent.comms.silent import Member
 from agent.controller import Peer
 from agent.messages import Beacon, Gossip, Piece, Place, Record
@@ -17,7 +17,7 @@ RELAYED_SILENCE_ROUNDS = 12
 hops at that loss, is twice the age at which a subject's records are measured to come."""
 LAG_SMOOTHING = 0.25
 LEAST_RELAYED_SILENCE_S = 2.5
-MAX_FRAME_B = 1200
+MAX_FRAME_B = MAX_RADIO_B - SEAL_B
 FRAME_HEAD_B = 17
 """What a Gossip takes besides its records, with the greatest numbers it may hold."""
 MAX_KNOWN = 1024
@@ -113,10 +113,9 @@ class Table:
         pieces: of a mission that somebody lacks; each travels in a frame of its own.
         """
         records = [own, *(_record(self._newest[who]) for who in sorted(self._newest))]
-        frames = [
-            encode(Gossip(self._own_id, own.stamp_s, chunk, None)) for chunk in _chunks(records)
-        ]
-        return frames + [encode(Gossip(self._own_id, own.stamp_s, (), piece)) for piece in pieces]
+        said = [Gossip(self._own_id, own.stamp_s, chunk, None) for chunk in _chunks(records)]
+        said += [Gossip(self._own_id, own.stamp_s, (), piece) for piece in pieces]
+        return [sealed(encode(gossip)) for gossip in said]
 
     def _may_be_silent_s(self, who: int) -> float:
         return self._relayed_silence_s + 2.0 * self._lag_s.get(who, 0.0)

@@ -13,12 +13,14 @@ from agent.codec import (
     MAX_MESSAGE_B,
     MAX_OBSERVATION_B,
     MAX_RADIO_B,
+    SEAL_B,
     RejectedError,
     decode_beacon,
     decode_command,
     decode_gossip,
     decode_observation,
     encode,
+    sealed,
 )
 from agent.messages import (
     Beacon,
@@ -86,14 +88,14 @@ GOOD = {
 DECODE = {
     Observation: decode_observation,
     Command: decode_command,
-    Beacon: decode_beacon,
-    Gossip: decode_gossip,
+    Beacon: lambda data: decode_beacon(sealed(data)),
+    Gossip: lambda data: decode_gossip(sealed(data)),
 }
 LIMIT_B = {
     Observation: MAX_OBSERVATION_B,
     Command: MAX_MESSAGE_B,
-    Beacon: MAX_RADIO_B,
-    Gossip: MAX_RADIO_B,
+    Beacon: MAX_RADIO_B - SEAL_B,
+    Gossip: MAX_RADIO_B - SEAL_B,
 }
 KINDS = pytest.mark.parametrize("kind", GOOD, ids=lambda kind: kind.__name__)
 CAUSES = {"oversize", "garbage", "invalid"}
@@ -123,9 +125,7 @@ paths = st.builds(
     st.lists(seconds, max_size=3).map(tuple),
 )
 missions = st.builds(Mission, counts, paths, st.binary(max_size=900))
-pieces = st.builds(
-    Piece, counts, st.integers(0, 15), st.integers(1, 16), st.binary(max_size=900)
-)
+pieces = st.builds(Piece, counts, st.integers(0, 15), st.integers(1, 16), st.binary(max_size=900))
 records = st.builds(
     Record, ids, counts, counts, seconds, positions, indices, indices, costs, counts, blocked
 )
@@ -237,6 +237,26 @@ def test_mutations_are_refused_or_still_keep_the_promise(kind):
             del data[random.randrange(len(data)) :]
         refused += survives(kind, bytes(data)) is None
     assert refused > MANY // 4
+
+
+@pytest.mark.parametrize("decode_radio", [decode_beacon, decode_gossip])
+def test_a_turned_bit_is_seen_wherever_it_is(decode_radio):
+    payload = sealed(encode(GOOD[Beacon if decode_radio is decode_beacon else Gossip]))
+    assert decode_radio(payload) in GOOD.values()
+    for bit in range(8 * len(payload)):
+        turned = bytearray(payload)
+        turned[bit // 8] ^= 1 << bit % 8
+        with pytest.raises(RejectedError) as caught:
+            decode_radio(bytes(turned))
+        assert caught.value.cause == "corrupt"
+
+
+@given(st.binary(max_size=10))
+def test_what_is_too_short_for_a_seal_or_has_none_is_corrupt(payload):
+    for decode_radio in (decode_beacon, decode_gossip):
+        with pytest.raises(RejectedError) as caught:
+            decode_radio(payload)
+        assert caught.value.cause == "corrupt" or payload == sealed(payload[:-SEAL_B])
 
 
 @KINDS

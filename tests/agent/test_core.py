@@ -7,7 +7,7 @@ from random import Random
 import msgspec
 import pytest
 
-from agent.codec import MAX_RADIO_B, decode_command, encode
+from agent.codec import MAX_RADIO_B, decode_command, encode, sealed, unsealed
 from agent.comms.broadcast import LOCAL, MULTIHOP
 from agent.core import Agent
 from agent.messages import Beacon, Gossip, Observation
@@ -70,7 +70,7 @@ def airworthy(outbox, tick):
 
 def hear(core, message, now_s, source=None):
     channel = LOCAL if isinstance(message, Beacon) else MULTIHOP
-    core.receive(message.id if source is None else source, channel, encode(message), now_s)
+    core.receive(message.id if source is None else source, channel, sealed(encode(message)), now_s)
 
 
 def test_junk_is_counted_and_the_agent_flies_as_if_it_had_heard_nothing():
@@ -78,13 +78,15 @@ def test_junk_is_counted_and_the_agent_flies_as_if_it_had_heard_nothing():
     for tick in range(100):
         for _ in range(50):
             size = random.choice((3, 20, 80, 1201))
-            bothered.receive(1, random.randrange(2), random.randbytes(size), tick * TICK_S)
+            junk = random.randbytes(size)
+            whole = sealed(junk) if random.random() < 0.5 else junk
+            bothered.receive(1, random.randrange(2), whole, tick * TICK_S)
         one = airworthy(bothered.step(seen(tick)), tick)
         other = airworthy(alone.step(seen(tick)), tick)
         assert (one.velocity, one.yaw) == (other.velocity, other.yaw)
         assert one.telemetry.rejected == 50 * (tick + 1)
     assert bothered.rejected.total() == 5000
-    assert set(bothered.rejected) == {"garbage", "invalid", "oversize"}
+    assert set(bothered.rejected) == {"garbage", "invalid", "oversize", "corrupt"}
     assert alone.rejected.total() == 0
 
 
@@ -94,10 +96,10 @@ def test_mutated_frames_never_bring_it_down():
         now_s = tick * TICK_S
         for channel, payload in speaker.step(seen(tick, (0.0, 0.0, 1.0))).frames:
             for _ in range(10):
-                data = bytearray(payload)
+                data = bytearray(unsealed(payload))
                 for _ in range(random.randrange(1, 4)):
                     data[random.randrange(len(data))] = random.randrange(256)
-                listener.receive(1, channel, bytes(data), now_s)
+                listener.receive(1, channel, sealed(bytes(data)), now_s)
         airworthy(listener.step(seen(tick)), tick)
     assert listener.rejected.total() > 500
 

@@ -6,7 +6,7 @@ from math import inf
 import msgspec
 import pytest
 
-from agent.codec import MAX_RADIO_B, decode_beacon, decode_gossip, encode
+from agent.codec import MAX_RADIO_B, decode_beacon, decode_gossip, encode, sealed
 from agent.comms.broadcast import LOCAL, MAX_ECHOES, MULTIHOP, Broadcast, OwnState
 from agent.comms.gossip import Table
 from agent.comms.hierarchy import Standing
@@ -95,7 +95,7 @@ def test_as_many_echoes_as_possible_fit_beside_the_greatest_numbers():
         payload = speaker(incarnation=GREATEST).frames(LATE_S, EXTREME, told, Table(3, 2.0))[0][1]
         said = decode_beacon(payload)
         extreme = msgspec.structs.replace(said, id=2**16 - 1, sequence=GREATEST, echoes=told)
-        return len(encode(extreme))
+        return len(sealed(encode(extreme)))
 
     assert size_b(MAX_ECHOES) <= MAX_RADIO_B < size_b(MAX_ECHOES + 1)
 
