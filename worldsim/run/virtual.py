@@ -4,6 +4,7 @@ The same agents, medium and world as in processes, driven by the same slot loop.
 still crosses its codec; payloads that several agents hear are decoded once.
 """
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,8 +13,16 @@ from time import perf_counter, process_time
 from agent.codec import decode_beacon, decode_command, decode_gossip, decode_observation, encode
 from agent.core import Agent, Decoders
 from netem.medium import Medium
-from netem.messages import Healed, Parted, Verdicts
-from netem.wire.frame import Batch, Outgoing, Transmission, pack, unpack_batch, unpack_transmission
+from netem.messages import Verdicts
+from netem.wire.frame import (
+    BATCH_RING,
+    Batch,
+    Outgoing,
+    Transmission,
+    pack,
+    unpack_batch,
+    unpack_transmission,
+)
 from worldsim.judge.tick import Packets
 from worldsim.run.faults import Change, Heal, Partition
 from worldsim.run.slots import Deed, Event, Opened, Recorder, SlotLoop, world_of
@@ -46,7 +55,7 @@ class VirtualFleet:
         self._decoders = decoders
         self._agents = {agent: self._started(agent, 0) for agent in range(scenario.fleet.agents)}
         self._rejected = 0
-        self._batches: dict[int, bytes] = {}
+        self._inboxes = [deque[bytes](maxlen=BATCH_RING) for _ in range(scenario.rows)]
         self.loop = SlotLoop(scenario, world_of(scenario, COMMAND_TICKS), recorder, self._packets)
 
     @property
@@ -77,16 +86,12 @@ class VirtualFleet:
             case Stop(agents=agents):
                 for agent in agents:
                     self._rejected += self._agents.pop(agent).rejected.total()
-                    self._batches.pop(agent, None)
+                    self._inboxes[agent].clear()
             case Start(incarnations=incarnations):
                 for agent, incarnation in incarnations.items():
                     self._agents[agent] = self._started(agent, incarnation)
-            case Change(conditions=conditions):
-                self._medium.change(conditions)
-            case Partition(groups=groups):
-                self._medium.obey(Parted(groups))
-            case Heal():
-                self._medium.obey(Healed())
+            case Change() | Partition() | Heal():
+                self._medium.obey(deed.order)
 
     def _started(self, agent: int, incarnation: int) -> Agent:
         setup = self._scenario.agent_setup(agent, incarnation, COMMAND_TICKS)
@@ -95,9 +100,9 @@ class VirtualFleet:
     def _step(self, agent: int, observed: bytes, opened: Opened) -> None:
         core = self._agents[agent]
         observation = decode_observation(observed)
-        batch = self._batches.pop(agent, None)
-        if batch is not None:
-            for frame in unpack_batch(batch).frames:
+        inbox = self._inboxes[agent]
+        while inbox:
+            for frame in unpack_batch(inbox.popleft()).frames:
                 core.receive(frame.source, frame.channel, frame.payload, observation.time_s)
         outbox = core.step(observation)
         outgoing = tuple(Outgoing(channel, payload) for channel, payload in outbox.frames)
@@ -114,7 +119,7 @@ class VirtualFleet:
             if not alive[agent]:
                 continue
             frames = self._medium.collect(agent, clock.time_s(slot))
-            self._batches[agent] = pack(Batch(slot, frames))
+            self._inboxes[agent].append(pack(Batch(slot, frames)))
 
     def _packets(self) -> Packets:
         return self.verdicts.packets()
