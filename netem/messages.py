@@ -55,19 +55,19 @@ class LinkKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_def
     """The keys of a link as a scenario writes them; left out means: as the wider table says."""
 
     range_m: Annotated[float, Meta(gt=0, le=1e6)] | None = None
-    path_loss: PathLoss | None = None
     delay_ms: Annotated[float, Meta(ge=0, le=60_000)] | None = None
     jitter_ms: Annotated[float, Meta(ge=0, le=60_000)] | None = None
     delay_correlation_percent: Annotated[float, Meta(ge=0, lt=100)] | None = None
     distribution: Literal["uniform", "normal", "pareto", "paretonormal"] | None = None
     loss_percent: Percent | None = None
-    gemodel: GilbertElliott | None = None
     duplicate_percent: Percent | None = None
     corrupt_percent: Percent | None = None
     reorder_percent: Percent | None = None
     rate_kbit: Annotated[float, Meta(gt=0, le=1e9)] | None = None
     rate_overhead_b: Annotated[int, Meta(ge=0, le=10_000)] | None = None
     limit: Annotated[int, Meta(ge=1, le=1_000_000)] | None = None
+    gemodel: GilbertElliott | None = None
+    path_loss: PathLoss | None = None
 
 
 class DirectedLink(LinkKeys, frozen=True, kw_only=True, rename={"source": "from"}):

@@ -9,11 +9,23 @@ from typing import NamedTuple
 
 from agent.messages import FramePath
 from agent.qstructure.formation import FormationSpec
-from netem.messages import Changed, Conditions, Groups, Healed, Parted
+from netem.messages import (
+    Changed,
+    Conditions,
+    Flap,
+    Flapped,
+    Groups,
+    Healed,
+    Jam,
+    Jammed,
+    Parted,
+    PartitionKind,
+)
 from netem.schedule import overlaid
 from worldsim.scenario.course import Step, steps
 from worldsim.scenario.events import EventTable
 from worldsim.scenario.frame import changed, path_of
+from worldsim.scenario.radio import partition_of
 from worldsim.scenario.starting import BoxStart, ListStart
 from worldsim.scenario.tables import Scenario
 
@@ -68,14 +80,16 @@ class Change(NamedTuple):
 
 
 class Partition(NamedTuple):
-    """The radio's groups from now on."""
+    """The radio's groups from now on, parted in a way; ``bridge``: whom all hear."""
 
     groups: Groups
+    parted: PartitionKind = "clean"
+    bridge: tuple[int, ...] = ()
 
     @property
     def order(self) -> Parted:
         """What the medium is told."""
-        return Parted(self.groups)
+        return Parted(self.groups, self.parted, self.bridge)
 
 
 class Heal(NamedTuple):
@@ -85,6 +99,30 @@ class Heal(NamedTuple):
     def order(self) -> Healed:
         """What the medium is told."""
         return Healed()
+
+
+class Jamming(NamedTuple):
+    """A jam from now on, or with None its end; ``number`` tells it from others."""
+
+    number: int
+    jam: Jam | None
+
+    @property
+    def order(self) -> Jammed:
+        """What the medium is told."""
+        return Jammed(self.number, self.jam)
+
+
+class Flapping(NamedTuple):
+    """Links that flap from now on, or with None their end; ``number`` tells them from others."""
+
+    number: int
+    flap: Flap | None
+
+    @property
+    def order(self) -> Flapped:
+        """What the medium is told."""
+        return Flapped(self.number, self.flap)
 
 
 class Order(NamedTuple):
@@ -98,7 +136,11 @@ class Order(NamedTuple):
     path: FramePath
 
 
-Action = Strike | Revival | Holding | Joining | Change | Partition | Heal | Order
+UponRadio = Change | Partition | Heal | Jamming | Flapping
+"""What the medium carries out: each has its ``order``."""
+BARRIERS = {Partition: "partition", Heal: "heal", Jamming: "jam", Flapping: "flap"}
+"""Of these, what lets frames across or not, and the kind of event that each is."""
+Action = Strike | Revival | Holding | Joining | UponRadio | Order
 
 
 class Timeline:
@@ -135,6 +177,8 @@ class Timeline:
             return self._change(step, event.netem)
         if event.partition is not None or event.heal is not None:
             return self._partition(step)
+        if event.jam is not None or event.flap is not None:
+            return _barrier(step)
         if event.formation is not None or event.frame is not None:
             return self._order(event)
         if event.joiners:
@@ -156,7 +200,8 @@ class Timeline:
         """Let a partition take the place of the one before; only its own end heals it."""
         if step.event.partition is not None and not step.undo:
             self._parted_by = step.number
-            return Partition(step.event.partition)
+            table = partition_of(step.event.partition)
+            return Partition(table.groups, table.kind, table.bridge)
         if step.undo and self._parted_by != step.number:
             return None
         self._parted_by = None
@@ -168,6 +213,13 @@ class Timeline:
         if event.frame is not None:
             self._frame = changed(self._frame, event.frame, event.at_s)
         return Order(event.kind, self._formation, path_of(self._frame))
+
+
+def _barrier(step: Step) -> Jamming | Flapping:
+    event = step.event
+    if event.flap is not None:
+        return Flapping(step.number, None if step.undo else event.flap.from_s(event.at_s))
+    return Jamming(step.number, None if step.undo else event.jam)
 
 
 def _upon_agents(step: Step) -> Strike | Revival | Holding:

@@ -18,16 +18,20 @@ from agent.messages import Command, Observation, Vector
 from worldsim.judge.tick import Packets, Tick
 from worldsim.judge.verdict import Figures, Judge
 from worldsim.run.faults import (
+    BARRIERS,
     Action,
     Change,
+    Flapping,
     Heal,
     Holding,
+    Jamming,
     Joining,
     Order,
     Partition,
     Revival,
     Strike,
     Timeline,
+    UponRadio,
 )
 from worldsim.run.orders import Orders
 from worldsim.run.team import Begin, Hold, Start, Stop, Team
@@ -40,7 +44,7 @@ from worldsim.truth.start import starts_of
 from worldsim.truth.world import Clock, World
 
 Event = dict[str, Any]
-Deed = Stop | Hold | Start | Begin | Change | Partition | Heal | Order
+Deed = Stop | Hold | Start | Begin | UponRadio | Order
 """What a clock carries out between slots."""
 
 
@@ -147,10 +151,9 @@ class SlotLoop:
                 self.team.take(deed, self.world.time_s)
             case Change():
                 self._change(deed)
-            case Partition(groups=groups):
-                self.event("partition", None, groups=groups, planned=True)
-            case Heal():
-                self.event("heal", None, planned=True)
+            case Partition() | Heal() | Jamming() | Flapping():
+                told = msgspec.to_builtins(deed._asdict())
+                self.event(BARRIERS[type(deed)], None, **told, planned=True)
             case Order():
                 self._order(deed)
 
@@ -212,7 +215,7 @@ class SlotLoop:
         for agent in deed.agents:
             self.event(deed.kind, agent, planned=True)
         if not deed.agents:
-            self.event(deed.kind, None, planned=True, nobody=deed.selectors)
+            self.event(BARRIERS[type(deed)], None, planned=True, nobody=deed.selectors)
 
     def _start(self, start: Start) -> None:
         self.team.take(start, self.world.time_s)

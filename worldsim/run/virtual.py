@@ -24,7 +24,7 @@ from netem.wire.frame import (
     unpack_transmission,
 )
 from worldsim.judge.tick import Packets
-from worldsim.run.faults import Change, Heal, Partition
+from worldsim.run.faults import Change, Flapping, Heal, Jamming, Partition
 from worldsim.run.slots import Deed, Event, Opened, Recorder, SlotLoop, world_of
 from worldsim.run.team import Start, Stop
 from worldsim.scenario.tables import Scenario
@@ -90,7 +90,7 @@ class VirtualFleet:
             case Start(incarnations=incarnations):
                 for agent, incarnation in incarnations.items():
                     self._agents[agent] = self._started(agent, incarnation)
-            case Change() | Partition() | Heal():
+            case Change() | Partition() | Heal() | Jamming() | Flapping():
                 self._medium.obey(deed.order)
 
     def _started(self, agent: int, incarnation: int) -> Agent:

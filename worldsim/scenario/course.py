@@ -13,6 +13,7 @@ from agent.codec import encode_formation
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from worldsim.scenario.events import ACTIONS, UNDONE, EventTable
 from worldsim.scenario.frame import broken_key, changed
+from worldsim.scenario.radio import flap_faults, partition_faults
 from worldsim.scenario.rules import TARGET_FLOOR_M, Finding, tilts_where_asked
 from worldsim.scenario.starting import BoxStart, ListStart
 from worldsim.scenario.tables import MAX_AGENTS, Scenario
@@ -118,7 +119,7 @@ class _Course:
         if step.undo:
             return
         yield from self._selectors(event)
-        yield from self._partition(event)
+        yield from self._barriers(event)
         yield from self._links(event)
         yield from self._join(event)
         yield from self._frame_change(event)
@@ -188,18 +189,14 @@ class _Course:
             return f"no {word} {name!r} in {self._spec.name!r}; there are {', '.join(names[word])}"
         return None
 
-    def _partition(self, event: EventTable) -> Iterator[Finding]:
+    def _barriers(self, event: EventTable) -> Iterator[Finding]:
         if event.heal and self._parted_by is None:
             yield Finding("heal", "no partition to heal at that time")
-        seen: set[int] = set()
-        for index, group in enumerate(event.partition or ()):
-            for agent in group:
-                if agent >= self._scenario.rows:
-                    last = self._scenario.rows - 1
-                    yield Finding(f"partition[{index}]", f"no agent {agent}; 0 to {last}")
-                if agent in seen:
-                    yield Finding(f"partition[{index}]", f"agent {agent} is named twice")
-                seen.add(agent)
+        agents = self._scenario.rows
+        if event.partition is not None:
+            yield from (Finding(*each) for each in partition_faults(event.partition, agents))
+        if event.flap is not None:
+            yield from (Finding(*each) for each in flap_faults(event.flap, agents))
 
     def _links(self, event: EventTable) -> Iterator[Finding]:
         last = self._scenario.rows - 1

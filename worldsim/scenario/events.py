@@ -7,11 +7,11 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from agent.messages import AgentId
 from agent.qstructure.formation import FormationSpec
 from agent.setup import Positive, Table
-from netem.messages import Conditions
+from netem.messages import Conditions, Jam
 from worldsim.scenario.frame import FrameChange, Time
+from worldsim.scenario.radio import FlapTable, Groups, PartitionTable
 from worldsim.scenario.starting import BoxStart, ListStart
 
 Selector = Annotated[
@@ -20,7 +20,6 @@ Selector = Annotated[
 ]
 Selectors = Annotated[tuple[Selector, ...], Meta(min_length=1, max_length=1000)]
 Joiners = Annotated[int, Meta(ge=1, le=1000)]
-Group = Annotated[tuple[AgentId, ...], Meta(min_length=1, max_length=1000)]
 
 
 class JoinTable(Table, frozen=True):
@@ -31,12 +30,13 @@ class JoinTable(Table, frozen=True):
 
 
 class EventTable(Table, frozen=True):
-    """One action at ``at_s``; ``for_s`` later it is undone (kill, leave, pause, partition, netem).
+    """One action at ``at_s``; ``for_s`` later it is undone, where it can be.
 
     kill: processes die, their vehicles stop and hover; leave: the vehicles go too; restart: they
     come back; join: new ones come, under the next free ids. pause: processes are stopped, their
     vehicles hover when the last command has expired; resume: they go on. partition: groups that
-    hear only themselves, agents not named form one more; heal ends it. netem: keys of [netem] that
+    hear only themselves, agents not named form one more, or a table for other kinds; heal ends it.
+    jam: a sphere where no radio works; flap: links that go down and up. netem: keys of [netem] that
     change. formation, frame: a mission for the team.
     """
 
@@ -48,8 +48,10 @@ class EventTable(Table, frozen=True):
     pause: Selectors | None = None
     resume: Selectors | None = None
     join: Joiners | JoinTable | None = None
-    partition: Annotated[tuple[Group, ...], Meta(min_length=1, max_length=1000)] | None = None
+    partition: Groups | PartitionTable | None = None
     heal: bool | None = None
+    jam: Jam | None = None
+    flap: FlapTable | None = None
     netem: Conditions | None = None
     formation: FormationSpec | None = None
     frame: FrameChange | None = None
@@ -83,7 +85,7 @@ class EventTable(Table, frozen=True):
 
 
 ACTIONS = tuple(name for name in EventTable.__struct_fields__ if name not in {"at_s", "for_s"})
-UNDONE = ("kill", "leave", "pause", "partition", "netem")
+UNDONE = ("kill", "leave", "pause", "partition", "jam", "flap", "netem")
 """Actions that ``for_s`` can undo."""
 UPON_PROCESSES = ("kill", "leave", "restart", "join", "pause", "resume")
 """Actions that need somebody who starts and signals processes."""
