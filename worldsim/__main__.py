@@ -53,7 +53,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         scenario = load(options.scenario)
-        admit(scenario, options.scenario, PROCESS_COMMAND_TICKS)
+        admit(scenario, options.scenario, PROCESS_COMMAND_TICKS, by_hand=True)
     except ScenarioError as error:
         print(f"world: {error}", file=sys.stderr)
         return 2

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 SCENARIO = """
 name = "four"
@@ -76,6 +77,10 @@ def eventually(
     while not condition():
         assert time.monotonic() < deadline, f"not within {within_s:g} s: {what()}"
         pause.wait(0.05)
+
+
+def events_of(run: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (run / "events.jsonl").read_text().splitlines()]
 
 
 def pids(run: Path) -> dict[str, int]:

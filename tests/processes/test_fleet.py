@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.processes.harness import QSWARM, Started, eventually, pids
+from tests.processes.harness import QSWARM, Started, events_of, eventually, pids
 from worldsim.run.fleet import processes
 
 pytestmark = pytest.mark.processes
@@ -30,10 +30,6 @@ def launched(start: Start, scenario: str, run: Path, *options: str) -> Started:
 def summary_of(run: Path) -> dict[str, Any]:
     summary: dict[str, Any] = json.loads((run / "summary.json").read_text())
     return summary
-
-
-def events_of(run: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in (run / "events.jsonl").read_text().splitlines()]
 
 
 def nobody_left(of: dict[str, int]) -> None:

@@ -74,6 +74,9 @@ def test_a_tick_is_late_when_its_command_is_not_there_at_the_next_slot() -> None
     punctuality.ask(1, 1, None)
     punctuality.ask(1, 5, None)
     assert punctuality.late_fraction == pytest.approx(2 / 3)
+    punctuality.forget([1])  # its process ended: nothing is late of what it was asked last
+    punctuality.ask(1, 80, None)
+    assert punctuality.late_fraction == pytest.approx(2 / 3)
 
 
 def test_the_intake_takes_each_slot_of_a_sender_once(intake: Intake) -> None:
@@ -202,12 +205,21 @@ def test_by_hand_the_death_of_the_medium_is_nobody_elses() -> None:
     assert outside.stopped == "netem is gone"
 
 
+def test_by_hand_no_process_is_touched() -> None:
+    with pytest.raises(LookupError, match="started by hand"):
+        ByHand(list).act("kill", [(2, 0)])
+
+
 def test_under_a_launcher_losses_come_by_lines_and_its_end_is_the_end() -> None:
     near, far = Lines.pair()
     outside = Conducted(far)
-    near.send(lost=[3, 9, None])
+    near.send(done="kill", whom=[[3, 1]])
+    near.send(lost=[3, 1, 9, None])
     outside.wait(5.0)
-    assert outside.losses() == [Loss(3, signal=9)]
+    assert outside.losses() == [Loss(3, incarnation=1, signal=9)]
+    outside.act("pause", [(2, 0)])
+    outside.act("resume", [])
+    assert near.receive() == [{"do": "pause", "whom": [[2, 0]]}]
     assert outside.stopped is None
     near.close()
     outside.wait(5.0)

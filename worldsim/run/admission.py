@@ -8,6 +8,7 @@ from pathlib import Path
 
 from agent.controller import ControllerError
 from agent.controller import load as load_controller
+from worldsim.scenario.events import UPON_PROCESSES
 from worldsim.scenario.rules import Finding, too_fast
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
@@ -17,15 +18,16 @@ from worldsim.truth.start import StartError, starts_of
 VIRTUAL_COMMAND_TICKS = 1
 PROCESS_COMMAND_TICKS = 2
 """For how many ticks a command lives under each clock: H of docs/method.md."""
-PROCESS_EVENTS = ("formation", "frame")
-"""Events that a fleet of processes meets: missions, which travel in observations."""
 
 
-def admit(scenario: Scenario, file: str | Path, command_ticks: int) -> None:
-    """Raise ScenarioError if a scenario cannot be flown where a command lives that long."""
+def admit(scenario: Scenario, file: str | Path, command_ticks: int, by_hand: bool = False) -> None:
+    """Raise ScenarioError if a scenario cannot be flown where a command lives that long.
+
+    by_hand: whether every process is started by hand, so that none can be stopped by a timeline.
+    """
     broken = (
         too_fast(scenario, command_ticks)
-        or _events(scenario, command_ticks)
+        or (_launcher(scenario) if by_hand else None)
         or _controller(scenario)
         or _room(scenario)
     )
@@ -33,16 +35,13 @@ def admit(scenario: Scenario, file: str | Path, command_ticks: int) -> None:
         raise ScenarioError(file, *broken)
 
 
-def _events(scenario: Scenario, command_ticks: int) -> Finding | None:
-    """Say which event a fleet of processes cannot meet yet."""
-    if command_ticks == VIRTUAL_COMMAND_TICKS:
-        return None
+def _launcher(scenario: Scenario) -> Finding | None:
+    """Say which event needs somebody who starts and ends processes."""
     for index, event in enumerate(scenario.event):
-        if event.kind not in PROCESS_EVENTS:
+        if event.kind in UPON_PROCESSES:
             return Finding(
                 f"event[{index}].{event.kind}",
-                f"happens on virtual time only so far (qswarm sim); to processes, "
-                f"{' and '.join(PROCESS_EVENTS)}",
+                "needs the launcher (qswarm run): who is started by hand is ended by hand",
             )
     return None
 

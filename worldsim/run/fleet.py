@@ -84,7 +84,7 @@ class Launch:
         self._kin = Kin(directory.logs, self._child_ended)
         self._zygote, self._zygote_end = Lines.pair()
         self._world, self._world_end = Lines.pair()
-        self._agents: dict[int, int] = {}
+        self._doomed: set[tuple[int, int]] = set()
         self._missing: list[str] | None = None
         self._say_missing_at_s = time.monotonic() + PATIENCE_S
         self._landing = False
@@ -151,8 +151,7 @@ class Launch:
             self._roster.add(name, pid)
         self._kin.listen(self._zygote, self._hear_zygote)
         self._kin.listen(self._world, self._hear_world)
-        for agent in agents:
-            self._zygote.send(spawn=agent)
+        self._zygote.send(do="start", whom=[(agent, 0) for agent in agents])
 
     def _be_zygote(self) -> int:
         for end in (self._zygote, self._world, self._world_end):
@@ -180,9 +179,8 @@ class Launch:
         lines = self._zygote.receive()
         for line in lines:
             if "spawned" in line:
-                self._agents[line["spawned"]] = line["pid"]
                 self._roster.add(f"agent-{line['spawned']}", line["pid"])
-            else:
+            elif "exit" in line:
                 self._agent_ended(line)
         if any("spawned" in line for line in lines):
             self._roster.write()
@@ -193,23 +191,33 @@ class Launch:
                 progress = Progress(**line["progress"])
                 self._time_s = progress.time_s
                 self.terminal.show(progress)
+            elif "do" in line:
+                self._pass_on(line)
             elif "missing" in line:
                 self._missing = line["missing"]
             else:
                 self._landing = True
+
+    def _pass_on(self, line: Line) -> None:
+        """Hand what the world wants done to the zygote, which has the agents."""
+        if line["do"] == "kill":
+            self._doomed.update((agent, incarnation) for agent, incarnation in line["whom"])
+        self._zygote.send(**line)
 
     def _agent_ended(self, line: Line) -> None:
         # What the world said before an agent could end is there already.
         self._hear_world()
         if self._landing:
             return
-        agent, end = line["exit"], Exit(line["signal"], line["status"])
+        agent, incarnation, *how = line["exit"]
+        end = Exit(*how)
         if not self._flying:
             raise self._not_started(f"agent-{agent}", end)
-        self._world.send(lost=[agent, *end])
+        self._world.send(lost=[agent, incarnation, *end])
+        planned = (agent, incarnation) in self._doomed
         self.terminal.say(
             f"agent-{agent} (pid {line['pid']}) {end} about {self._time_s:.1f} s into the run;"
-            " its vehicle hovers"
+            f" {'as planned' if planned else 'its vehicle hovers'}"
         )
         if end.status is not None:
             self.terminal.say(self._last_words(f"agent-{agent}"))

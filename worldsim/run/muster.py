@@ -1,8 +1,7 @@
 """Before a flight: the medium takes its conditions, each agent its setup, and all report."""
 
 import time
-from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 
 import msgspec
 import zenoh
@@ -28,7 +27,7 @@ class Muster:
     def __init__(self, post: Post, scenario: Scenario) -> None:
         self._post = post
         self._scenario = scenario
-        self._starts: Counter[int] = Counter()
+        self._incarnations = dict.fromkeys(range(scenario.fleet.agents), 0)
         self._roll: Roll = post.roll()
         self._questions: Waiting[zenoh.Query] = post.questions("setup")
 
@@ -54,17 +53,25 @@ class Muster:
         wanted = ["netem", *(f"agent-{agent}" for agent in agents)]
         return [name for name in wanted if name not in self._roll.present]
 
+    def expect(self, incarnations: Mapping[int, int]) -> None:
+        """Let agents come, too, or again: each with its incarnation."""
+        self._incarnations.update(incarnations)
+
+    def absent(self, agents: Iterable[int]) -> list[int]:
+        """Return which of these agents show no sign of life."""
+        self._roll.gone()
+        return [agent for agent in agents if f"agent-{agent}" not in self._roll.present]
+
     def gone(self) -> list[str]:
         """Return who went since the last call, as liveliness has it: a hint."""
         return self._roll.gone()
 
     def _answer(self, query: zenoh.Query) -> None:
         agent = str(query.key_expr).rsplit("/", 1)[1]
-        if not agent.isdecimal() or int(agent) >= self._scenario.fleet.agents:
-            query.reply_err(f"no agent {agent} in a run of {self._scenario.fleet.agents}")
+        incarnation = self._incarnations.get(int(agent)) if agent.isdecimal() else None
+        if incarnation is None:
+            query.reply_err(f"no agent {agent} in a run of {len(self._incarnations)}")
             return
-        incarnation = self._starts[int(agent)]
-        self._starts[int(agent)] += 1
         setup = self._scenario.agent_setup(int(agent), incarnation, PROCESS_COMMAND_TICKS)
         query.reply(query.key_expr, msgspec.json.encode(setup))
 

@@ -16,9 +16,13 @@ PRINT_EVERY_S = 2.0
 
 
 class Loss(NamedTuple):
-    """An agent whose process is gone: by a signal, with a status, or nobody knows how."""
+    """An agent whose process is gone: by a signal, with a status, or nobody knows how.
+
+    incarnation: which of its processes; None where nobody counts them.
+    """
 
     agent: int
+    incarnation: int | None = None
     signal: int | None = None
     status: int | None = None
 
@@ -53,7 +57,10 @@ class Outside(Protocol):
         """Wait ``left_s`` [s], or less when there is news."""
 
     def losses(self) -> list[Loss]:
-        """Return who was lost since the last call."""
+        """Return whose process ended since the last call, planned or not."""
+
+    def act(self, deed: str, whom: list[tuple[int, int]]) -> None:
+        """Ask for a deed on processes, (agent, incarnation) each: start, kill, pause or resume."""
 
     def missing(self, names: list[str]) -> None:
         """Say who is not there yet."""
@@ -82,7 +89,12 @@ class Conducted:
 
     def losses(self) -> list[Loss]:
         """Return the exits that the launcher told."""
-        return [Loss(*line["lost"]) for line in self._lines.receive()]
+        return [Loss(*line["lost"]) for line in self._lines.receive() if "lost" in line]
+
+    def act(self, deed: str, whom: list[tuple[int, int]]) -> None:
+        """Ask the launcher for it."""
+        if whom:
+            self._lines.send(do=deed, whom=whom)
 
     def missing(self, names: list[str]) -> None:
         """Tell the launcher who is not there yet; an empty list when everybody is."""
@@ -119,6 +131,10 @@ class ByHand:
         for agent in agents:
             print(f"agent-{agent} is gone", flush=True)
         return [Loss(agent) for agent in agents]
+
+    def act(self, deed: str, whom: list[tuple[int, int]]) -> None:
+        """Refuse: what was started by hand is stopped by hand. Raises LookupError."""
+        raise LookupError(f"nobody can {deed} {whom}: these processes were started by hand")
 
     def missing(self, names: list[str]) -> None:
         """Print who is not there yet, every two seconds."""

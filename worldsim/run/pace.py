@@ -1,7 +1,7 @@
 """Wall time: when slots are due, and whether the agents keep up."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from agent.messages import Command
 
@@ -53,6 +53,11 @@ class Punctuality:
         if asked is not None:
             self._ticks += 1
             self._late += last is None or last.slot < asked
+
+    def forget(self, agents: Iterable[int]) -> None:
+        """Expect no answer any more to what agents were asked: they stopped, or start anew."""
+        for agent in agents:
+            self._asked[agent] = None
 
     @property
     def late_fraction(self) -> float | None:

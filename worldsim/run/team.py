@@ -87,6 +87,11 @@ class Team:
         """The lowest id that steps."""
         return int(np.argmax(self.awake)) if self.awake.any() else None
 
+    def has(self, agent: int, incarnation: int | None) -> bool:
+        """Whether an agent takes part or boots, in its incarnation; None: in whichever."""
+        there = bool(self.alive[agent]) or agent in self._boots
+        return there and incarnation in {None, self.incarnations[agent]}
+
     def booted(self, time_s: float) -> Begin:
         """Return those who have booted by a time [s]."""
         return Begin(tuple(a for a, at_s in sorted(self._boots.items()) if at_s <= time_s + 1e-9))

@@ -1,7 +1,8 @@
 """The zygote: a warm process of one thread, without sessions, that agents are forked from.
 
-It does what the launcher asks for over a socket pair, at the start or late: fork agent i. It reaps
-its agents and reports each exit as waitpid has it, which is what the launcher believes.
+It does what the launcher asks for over a socket pair, at the start or late: start agents, kill,
+pause or resume them. It reaps its agents and reports each exit as waitpid has it, which is what the
+launcher believes.
 """
 
 import gc
@@ -18,6 +19,9 @@ from worldsim.run.child import fork, reaped
 from worldsim.run.lines import Line, Lines
 
 END_WITHIN_S = 2.0
+SIGNALS = {"kill": signal.SIGKILL, "pause": signal.SIGSTOP, "resume": signal.SIGCONT}
+ARRIVED = {signal.SIGSTOP: os.WSTOPPED, signal.SIGCONT: os.WCONTINUED}
+"""What waitid waits for, to see that a signal has done what it should."""
 
 
 class Brood(NamedTuple):
@@ -34,7 +38,7 @@ class Zygote:
     def __init__(self, lines: Lines, brood: Brood) -> None:
         self._lines = lines
         self._brood = brood
-        self._pids: dict[int, int] = {}
+        self._agents: dict[int, tuple[int, int]] = {}
         self._watch = selectors.DefaultSelector()
         self._ending = False
 
@@ -46,11 +50,12 @@ class Zygote:
             self._turn(None)
         self._watch.unregister(self._lines)
         self._signal_all(signal.SIGTERM)
+        self._signal_all(signal.SIGCONT)  # who is paused ends, too
         deadline = time.monotonic() + END_WITHIN_S
-        while self._pids and (left_s := deadline - time.monotonic()) > 0.0:
+        while self._agents and (left_s := deadline - time.monotonic()) > 0.0:
             self._turn(left_s)
         self._signal_all(signal.SIGKILL)
-        while self._pids:
+        while self._agents:
             self._turn(None)
         return 0
 
@@ -67,18 +72,31 @@ class Zygote:
     def _obey(self, line: Line) -> None:
         if "end" in line:
             self._ending = True
-        else:
-            self._spawn(line["spawn"])
+            return
+        for agent, incarnation in line["whom"]:
+            if line["do"] == "start":
+                self._spawn(agent, incarnation)
+            else:
+                self._signal(agent, incarnation, SIGNALS[line["do"]])
+        self._lines.send(done=line["do"], whom=line["whom"])
 
-    def _spawn(self, agent: int) -> None:
+    def _signal(self, agent: int, incarnation: int, number: signal.Signals) -> None:
+        """Send a signal to an agent's process; to one that has ended there is nothing to do."""
+        for pid, who in self._agents.items():
+            if who == (agent, incarnation):
+                os.kill(pid, number)
+                if number in ARRIVED:
+                    os.waitid(os.P_PID, pid, ARRIVED[number] | os.WEXITED | os.WNOWAIT)
+
+    def _spawn(self, agent: int, incarnation: int) -> None:
         log = self._brood.logs / f"agent-{agent}.log"
         pid = fork(log, signal.SIGKILL, lambda: self._live(agent))
         exit_descriptor = os.pidfd_open(pid)
-        self._pids[pid] = agent
+        self._agents[pid] = (agent, incarnation)
         self._watch.register(
             exit_descriptor, selectors.EVENT_READ, lambda: self._bury(exit_descriptor, pid)
         )
-        self._lines.send(spawned=agent, pid=pid)
+        self._lines.send(spawned=agent, pid=pid, incarnation=incarnation)
 
     def _live(self, agent: int) -> int:
         self._lines.close()
@@ -90,8 +108,9 @@ class Zygote:
             return
         self._watch.unregister(exit_descriptor)
         os.close(exit_descriptor)
-        self._lines.send(exit=self._pids.pop(pid), pid=pid, signal=end.signal, status=end.status)
+        agent, incarnation = self._agents.pop(pid)
+        self._lines.send(exit=[agent, incarnation, *end], pid=pid)
 
     def _signal_all(self, number: signal.Signals) -> None:
-        for pid in self._pids:
+        for pid in self._agents:
             os.kill(pid, number)

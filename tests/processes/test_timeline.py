@@ -1,0 +1,116 @@
+"""The timeline on real processes: who dies, comes back, joins, pauses; what the radio does."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.processes.harness import QSWARM, Started, events_of, pids
+
+pytestmark = pytest.mark.processes
+
+Start = Callable[..., Started]
+Write = Callable[..., str]
+UPON = ("kill", "leave", "join", "restart", "pause", "resume", "late")
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    return tmp_path / "run"
+
+
+@pytest.fixture
+def timeline(scenario: Callable[[float], str]) -> Write:
+    def write(duration_s: float, *events: str) -> str:
+        path = Path(scenario(duration_s))
+        told = "".join(f"\n[[event]]\n{event}\n" for event in events)
+        path.write_text(path.read_text().replace("agents = 4", "agents = 4\nboot_s = 0.5") + told)
+        return str(path)
+
+    return write
+
+
+def flown(start: Start, scenario: str, run: Path) -> dict[str, Any]:
+    fleet = start(*QSWARM, "run", scenario, "--out", str(run), "--no-recording", "--speed", "2")
+    assert fleet.status(40.0) in (0, 1), fleet.text
+    summary: dict[str, Any] = json.loads((run / "summary.json").read_text())
+    counts = summary["invariants"]
+    assert [counts[name]["violations"] for name in ("I1", "I8")] == [0, 0], summary
+    return summary
+
+
+def upon(run: Path) -> list[tuple[float, str, int, bool]]:
+    return [
+        (event["t_s"], event["kind"], event["agent"], event["planned"])
+        for event in events_of(run)
+        if event["kind"] in UPON
+    ]
+
+
+def test_the_killed_come_back_as_new_processes(start: Start, timeline: Write, run: Path) -> None:
+    summary = flown(start, timeline(14.0, "at_s = 6\nkill = [1, 2]\nfor_s = 1.5"), run)
+    assert upon(run) == [
+        (6.0, "kill", 1, True),
+        (6.0, "kill", 2, True),
+        (7.5, "restart", 1, True),
+        (7.5, "restart", 2, True),
+    ]
+    assert (run / "logs/agent-1.log").read_text().count("flies in run") == 2
+    assert [recovery["kind"] for recovery in summary["recoveries"]] == ["kill", "restart"]
+    assert summary["recoveries"][1]["reformed_s"] is not None
+    back = [e for e in events_of(run) if e["kind"] == "slot" and e["agent"] == 1 and e["t_s"] > 7.5]
+    assert back[0]["t_s"] >= 8.0
+
+
+def test_some_join_and_some_leave(start: Start, timeline: Write, run: Path) -> None:
+    places = "{ kind = 'list', positions_m = [[-4.2, 0.3, 0], [-5.1, 0, 0]] }"
+    joins = f"at_s = 5\njoin = {{ count = 2, start = {places} }}"
+    summary = flown(start, timeline(18.0, joins, "at_s = 10\nleave = [0, 3]"), run)
+    assert upon(run) == [
+        (5.0, "join", 4, True),
+        (5.0, "join", 5, True),
+        (10.0, "leave", 0, True),
+        (10.0, "leave", 3, True),
+    ]
+    assert {"agent-4", "agent-5"} <= pids(run).keys()
+    assert [recovery["reformed_s"] is not None for recovery in summary["recoveries"]] == [True] * 2
+
+
+def test_the_paused_hover_and_go_on(start: Start, timeline: Write, run: Path) -> None:
+    summary = flown(start, timeline(14.0, "at_s = 5\npause = [1]\nfor_s = 3"), run)
+    assert upon(run) == [(5.0, "pause", 1, True), (8.0, "resume", 1, True)]
+    assert not [e for e in events_of(run) if e["agent"] == 1 and 5.0 < e["t_s"] < 8.0]
+    assert [recovery["reformed_s"] is not None for recovery in summary["recoveries"]] == [True] * 2
+    assert (run / "logs/agent-1.log").read_text().count("flies in run") == 1
+
+
+def test_the_radio_is_parted_healed_and_made_worse(
+    start: Start, timeline: Write, run: Path
+) -> None:
+    parted = "at_s = 2\npartition = [[0, 1]]\nfor_s = 1"
+    worse = "at_s = 4\nnetem = { loss_percent = 60 }\nfor_s = 1"
+    packets = flown(start, timeline(6.0, parted, worse), run)["packets"]
+    # 4 agents send 20 frames a second: 2 * 2 of 4 * 3 links are cut each way.
+    assert 0.8 < packets["dropped_partition"] / (8 * 22) < 1.2
+    assert 0.6 < packets["dropped_loss"] / (12 * 22 * 0.6) < 1.4
+    kinds = [event["kind"] for event in events_of(run) if event["t_s"] >= 2.0]
+    assert [kind for kind in kinds if kind in {"partition", "heal", "netem"}] == [
+        "partition",
+        "heal",
+        "netem",
+        "netem",
+    ]
+
+
+def test_by_hand_process_faults_are_refused_at_the_start(
+    start: Start, timeline: Write, endpoint: str, run: Path
+) -> None:
+    scenario = timeline(6.0, "at_s = 2\npartition = [[0, 1]]", "at_s = 3\nkill = [2]")
+    python = QSWARM[0]
+    world = start(python, "-m", "worldsim", scenario, "--connect", endpoint, "--out", str(run))
+    assert world.status(10.0) == 2
+    said = "event[1].kill: needs the launcher (qswarm run): who is started by hand is ended by hand"
+    assert world.text == f"world: {scenario}: {said}\n"
+    assert not run.exists()

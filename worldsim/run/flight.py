@@ -1,0 +1,179 @@
+"""A fleet of real processes in the air, slot by slot on the wall clock. Nothing waits for anybody.
+
+Each slot: what the timeline and the operator want is done; the truth goes to the medium and
+observations to the agents that step; what they command before the next slot is due moves the
+vehicles.
+"""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from agent.codec import RejectedError, decode_command, encode
+from netem.messages import Truth, Verdicts
+from netem.wire.frame import WireError, pack, unpack
+from netem.wire.post import Post
+from worldsim.judge.phase import CONVERGED_M
+from worldsim.judge.tick import Packets
+from worldsim.run.admission import PROCESS_COMMAND_TICKS
+from worldsim.run.hands import Hands
+from worldsim.run.muster import Muster
+from worldsim.run.outside import Loss, Outside, Progress
+from worldsim.run.pace import Pacer, Punctuality
+from worldsim.run.slots import Deed, Opened, Recorder, SlotLoop, world_of
+from worldsim.run.team import Begin, Hold, Stop
+from worldsim.scenario.tables import Scenario
+
+SENDER_RING = 4
+SENDER_QUOTA = 2
+LOOK_EVERY_S = 0.25
+PROGRESS_EVERY_S = 0.25
+FINAL_VERDICTS_WITHIN_S = 1.0
+MAX_VERDICTS_B = 64 * 1024
+
+
+class Flight:
+    """A fleet in the air."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        post: Post,
+        recorder: Recorder,
+        outside: Outside,
+        muster: Muster,
+        speed: float,
+    ) -> None:
+        rows = range(scenario.rows)
+        self.loop = SlotLoop(
+            scenario, world_of(scenario, PROCESS_COMMAND_TICKS), recorder, self._packets
+        )
+        self.verdicts: Verdicts | None = None
+        self.punctuality = Punctuality(len(rows))
+        self.real_time_factor: float | None = None
+        self._scenario = scenario
+        self._outside = outside
+        self._muster = muster
+        self._hands = Hands(post, muster, outside)
+        self.begun = self._landed = False
+        self._unreadable = 0
+        self._pacer = Pacer(1.0 / (scenario.slot_hz * speed))
+        self._progress_at_s = 0.0
+        self._truth, self._over = post.putter("truth"), post.putter("over")
+        self._observers = [post.putter("observation", agent) for agent in rows]
+        self._commands = [post.ring("command", agent, SENDER_RING) for agent in rows]
+        self._reports = post.ring("verdicts", size=SENDER_RING)
+
+    @property
+    def rejected(self) -> int:
+        """Messages refused so far: by the agents, by the medium, and by the world."""
+        by_agents = sum(last.telemetry.rejected for last in self.loop.world.latest if last)
+        by_medium = sum(self.verdicts.rejected.values()) if self.verdicts is not None else 0
+        return by_agents + by_medium + self._unreadable
+
+    def fly(self, unwanted: Callable[[], bool]) -> bool:
+        """Fly the scenario's slots until the end, or until unwanted; return whether all of them."""
+        self._pacer.start()
+        self.begun = True
+        slots, world = self._scenario.slots, self.loop.world
+        while world.slot < slots and not unwanted():
+            self._slot(unwanted)
+        self.real_time_factor = world.time_s / max(self._pacer.elapsed_s, 1e-9)
+        self.land()
+        self.loop.finish()
+        return world.slot == slots
+
+    def land(self) -> None:
+        """End the run for everybody, once, and take the medium's last counters."""
+        if self._landed:
+            return
+        self._landed = True
+        if self.begun:
+            self._outside.landing()
+        self._over(b"")
+        deadline = time.monotonic() + FINAL_VERDICTS_WITHIN_S
+        while (left_s := deadline - time.monotonic()) > 0.0:
+            report = self._reports.wait(left_s)
+            if report is not None:
+                self._read_report(report)
+            if self.verdicts is not None and self.verdicts.slot >= self.loop.world.slot:
+                break
+
+    def _slot(self, unwanted: Callable[[], bool]) -> None:
+        slot = self.loop.world.slot
+        self._pacer.begin(slot)
+        self._muster.instruct_agents()
+        for deed in self.loop.due():
+            self._do(deed)
+        self._send(self.loop.open())
+        self._strike_out()
+        while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not unwanted():
+            self._outside.wait(min(left_s, LOOK_EVERY_S))
+            self._strike_out()
+        for agent, ring in enumerate(self._commands):
+            for data in ring.drain(SENDER_QUOTA):
+                self._obey(agent, data)
+        for report in self._reports.drain(SENDER_RING):
+            self._read_report(report)
+        self.loop.close(b"")
+        self._say_progress()
+
+    def _do(self, deed: Deed) -> None:
+        """Carry out what happens between slots, and let it count at once."""
+        late = self._hands.do(deed, self.loop.world.slot, self.loop.team.incarnations)
+        self.loop.take(deed)
+        if isinstance(deed, Stop | Hold | Begin):
+            self.punctuality.forget(deed.agents)
+        for agent in late:
+            self.loop.event("late", agent, detail="its process is not up by the end of boot_s")
+
+    def _send(self, opened: Opened) -> None:
+        self._truth(pack(Truth(opened.slot, opened.time_s, opened.positions)))
+        for agent, observation in opened.observations:
+            self._observers[agent](encode(observation))
+            self.punctuality.ask(agent, opened.slot, self.loop.world.latest[agent])
+
+    def _obey(self, agent: int, data: bytes) -> None:
+        """Take a command; what one who takes no part had still under way moves nothing."""
+        if not self.loop.team.awake[agent]:
+            return
+        try:
+            self.loop.obey(agent, decode_command(data), data)
+        except RejectedError:
+            self._unreadable += 1
+
+    def _read_report(self, data: bytes) -> None:
+        try:
+            self.verdicts = unpack(data, Verdicts, MAX_VERDICTS_B)
+        except WireError:
+            self._unreadable += 1
+
+    def _strike_out(self) -> None:
+        for loss in self._outside.losses():
+            if self.loop.team.has(loss.agent, loss.incarnation):
+                self.loop.lost(loss.agent, **_known(loss), planned=False)
+
+    def _packets(self) -> Packets:
+        return self.verdicts.packets() if self.verdicts is not None else {}
+
+    def _say_progress(self) -> None:
+        if self._pacer.elapsed_s >= self._progress_at_s:
+            self._progress_at_s = self._pacer.elapsed_s + PROGRESS_EVERY_S
+            self._outside.progress(self._progress())
+
+    def _progress(self) -> Progress:
+        figures = self.loop.figures
+        in_place = int(np.sum(figures.slot_error <= CONVERGED_M)) if figures is not None else 0
+        return Progress(
+            self.loop.world.time_s,
+            self._scenario.duration_s,
+            int(np.count_nonzero(self.loop.team.awake)),
+            in_place,
+            self.loop.judge.min_separation_m,
+            self.punctuality.late_fraction,
+        )
+
+
+def _known(loss: Loss) -> dict[str, int]:
+    return {key: value for key in ("signal", "status") if (value := getattr(loss, key)) is not None}

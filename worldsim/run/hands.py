@@ -1,0 +1,48 @@
+"""Deeds carried out on real processes: orders to the medium, starts and signals by the launcher.
+
+Nothing is waited for: what was asked for is done within milliseconds, or said to be late.
+"""
+
+from collections.abc import Iterable, Sequence
+
+import msgspec
+
+from netem.messages import Orders
+from netem.wire.post import Post
+from worldsim.run.faults import Change, Heal, Partition
+from worldsim.run.muster import Muster
+from worldsim.run.outside import Outside
+from worldsim.run.slots import Deed
+from worldsim.run.team import Begin, Hold, Start, Stop
+
+
+class Hands:
+    """What a flight reaches the other processes with."""
+
+    def __init__(self, post: Post, muster: Muster, outside: Outside) -> None:
+        self._orders = post.putter("orders")
+        self._muster = muster
+        self._outside = outside
+
+    def do(self, deed: Deed, slot: int, incarnations: Sequence[int]) -> list[int]:
+        """Carry out a deed before a slot; return the agents that should be there, and are not.
+
+        incarnations: everybody's, as they were before the deed.
+        """
+        match deed:
+            case Stop(agents=agents):
+                self._outside.act("kill", _named(agents, incarnations))
+            case Hold(kind=kind, agents=agents):
+                self._outside.act(kind, _named(agents, incarnations))
+            case Start(incarnations=started):
+                self._muster.expect(started)
+                self._outside.act("start", list(started.items()))
+            case Begin(agents=agents):
+                return self._muster.absent(agents)
+            case Change() | Partition() | Heal():
+                self._orders(msgspec.json.encode(Orders(slot, (deed.order,))))
+        return []
+
+
+def _named(agents: Iterable[int], incarnations: Sequence[int]) -> list[tuple[int, int]]:
+    return [(agent, incarnations[agent]) for agent in agents]
