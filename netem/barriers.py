@@ -90,9 +90,13 @@ class Barriers:
             self._flaps[number] = flap
         self._look()
 
+    def parts(self, source: int, destination: int) -> bool:
+        """Whether a partition keeps a destination from hearing a source."""
+        return self._partition is not None and self._partition.parts(source, destination)
+
     def cut(self, source: int, destination: int, now_s: float) -> bool:
         """Whether anything but a jam stands between two agents at a time [s]."""
-        if self._partition is not None and self._partition.parts(source, destination):
+        if self.parts(source, destination):
             return True
         return any(
             down(flap, now_s)

@@ -111,6 +111,29 @@ class LinkModel:
         object.__setattr__(self, "reach_m", min(self.range_m, edge_m(self.path_loss)))
 
 
+def mean_loss(link: LinkModel) -> float:
+    """Return the share of frames that a link loses in the long run, in range."""
+    kept = 1.0 - link.loss_percent / 100.0
+    model = link.gemodel
+    if model is not None:
+        turns = model.p_percent + model.r_percent
+        bad = model.p_percent / turns if turns > 0.0 else 0.0
+        kept *= 1.0 - (bad * model.loss_bad_percent + (1.0 - bad) * model.loss_good_percent) / 100.0
+    return 1.0 - kept
+
+
+def stretch(link: LinkModel) -> float:
+    """Return by how much bursts widen what is lost: (1 + rho) / (1 - rho), rho = 1 - p - r.
+
+    The variance of the mean of a two-state chain against independent draws; 1 without bursts. With
+    p + r = 0 the chain never moves: infinite.
+    """
+    if link.gemodel is None:
+        return 1.0
+    rho = 1.0 - (link.gemodel.p_percent + link.gemodel.r_percent) / 100.0
+    return (1.0 + rho) / (1.0 - rho) if rho < 1.0 else inf
+
+
 FRESH = Memory()
 """For links that remember nothing; never written to."""
 LOST_TO_RANGE = Verdict(Cause.DROPPED_RANGE)

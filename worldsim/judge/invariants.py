@@ -22,7 +22,7 @@ from worldsim.judge.recovery import LOSSES, RETURNS
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
 
-FAULTS = LOSSES | RETURNS | {"partition", "heal", "netem", "formation", "frame"}
+FAULTS = LOSSES | RETURNS | {"partition", "heal", "jam", "flap", "netem", "formation", "frame"}
 LOOK_EVERY_S = 1.0
 MAX_ROLE_CHANGES = 3
 Claims = list[tuple[int, int]]

@@ -1,7 +1,7 @@
 """Who can reach whom by radio, over how many hops, and how long news may take to all of them.
 
-From the truth: positions, the conditions in force and the partition in force. A round is one turn
-of the multihop channel.
+From the truth: positions, the conditions in force and what parts, jams or flaps. Two are linked
+where both hear the other. A round is one turn of the multihop channel.
 """
 
 from functools import cache
@@ -12,7 +12,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from netem.messages import Conditions
+from netem.barriers import Barriers
+from netem.chance import WIDEST
+from netem.link import mean_loss, stretch
+from netem.messages import Conditions, Flap, Jam
 from netem.schedule import Schedule
 from netem.wire.frame import MULTIHOP
 from worldsim.judge.tick import Tick
@@ -41,7 +44,8 @@ class Reach:
 
     def __init__(self, scenario: Scenario) -> None:
         self._round_s = 1.0 / scenario.comms.multihop_hz if scenario.comms.multihop_hz else inf
-        self._group = np.zeros(scenario.rows, dtype=np.int64)
+        self._barriers = Barriers()
+        self._together = np.ones((scenario.rows, scenario.rows), dtype=np.bool_)
         self._change(scenario.netem)
 
     def note(self, event: dict[str, Any]) -> None:
@@ -49,9 +53,11 @@ class Reach:
         if event["kind"] == "netem":
             self._change(msgspec.convert(event["conditions"], Conditions))
         elif event["kind"] in {"partition", "heal"}:
-            self._group[:] = 0
-            for index, group in enumerate(event.get("groups", ())):
-                self._group[list(group)] = index + 1
+            self._part(event)
+        elif event["kind"] == "jam":
+            self._barriers.jam(event["number"], msgspec.convert(event["jam"], Jam | None))
+        elif event["kind"] == "flap":
+            self._barriers.flap(event["number"], msgspec.convert(event["flap"], Flap | None))
 
     def components(self, tick: Tick) -> Components:
         """Return the connected components of the living at a tick."""
@@ -67,8 +73,14 @@ class Reach:
         return Components(label, hops)
 
     def everybody_s(self, agents: int, hops: int) -> float:
-        """Return B [s]: how long a record takes to everybody, but for one case in a million."""
-        return rounds_to_all(agents, hops, self.loss) * self._round_s + hops * self._delay_s
+        """Return B [s]: how long a record takes to everybody, but for one case in a million.
+
+        Infinite while links flap: nobody can say.
+        """
+        if self._barriers.flapping:
+            return inf
+        rounds = rounds_to_all(agents, hops, self.loss) * self._stretch
+        return rounds * self._round_s + hops * self._delay_s
 
     def detection_s(self, hops: int) -> float:
         """Return T_d [s]: how long until one who is gone is known to be gone."""
@@ -77,15 +89,30 @@ class Reach:
 
     def _change(self, conditions: Conditions) -> None:
         model = Schedule(msgspec.structs.replace(conditions, link=())).model(MULTIHOP, 0, 0)
-        self.loss = model.loss_percent / 100.0
+        self.loss = mean_loss(model)
+        self._stretch = max(1.0, stretch(model))
         self._range_m = model.range_m
-        self._delay_s = (model.delay_ms + model.jitter_ms) / 1000.0
+        widest = 1.0 if model.distribution == "uniform" else WIDEST
+        self._delay_s = (model.delay_ms + widest * model.jitter_ms) / 1000.0
+
+    def _part(self, event: dict[str, Any]) -> None:
+        if event["kind"] == "heal":
+            self._barriers.heal()
+        else:
+            told = (event["groups"], event.get("parted", "clean"), tuple(event.get("bridge", ())))
+            self._barriers.partition(*told)
+        rows = range(len(self._together))
+        hears = np.array([[not self._barriers.parts(a, b) for a in rows] for b in rows])
+        self._together = hears & hears.T
 
     def _linked(self, tick: Tick) -> NDArray[np.bool_]:
         position = tick.position.astype(np.float64)
         away = position[:, None] - position[None]
         near = np.sqrt(np.sum(away * away, axis=2)) <= self._range_m
-        near &= self._group[:, None] == self._group[None]
+        near &= self._together
+        if self._barriers.raised:
+            free = [not self._barriers.jammed((x, y, z)) for x, y, z in position.tolist()]
+            near &= np.outer(free, free)
         linked: NDArray[np.bool_] = near & tick.alive[:, None] & tick.alive[None]
         return linked
 
