@@ -128,12 +128,15 @@ class Flapping(NamedTuple):
 class Order(NamedTuple):
     """What the team shall form from now on, and where its frame goes.
 
-    kind: formation or frame, what is new.
+    kind: formation or frame, what is new. to: whom it is given to, None the lowest id; version: its
+    own, None the next.
     """
 
     kind: str
     formation: FormationSpec
     path: FramePath
+    to: int | None = None
+    version: int | None = None
 
 
 UponRadio = Change | Partition | Heal | Jamming | Flapping

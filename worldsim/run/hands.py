@@ -9,7 +9,7 @@ import msgspec
 
 from netem.messages import Orders
 from netem.wire.post import Post
-from worldsim.run.faults import Change, Heal, Partition
+from worldsim.run.faults import Change, Flapping, Heal, Jamming, Partition
 from worldsim.run.muster import Muster
 from worldsim.run.outside import Outside
 from worldsim.run.slots import Deed
@@ -39,7 +39,7 @@ class Hands:
                 self._outside.act("start", list(started.items()))
             case Begin(agents=agents):
                 return self._muster.absent(agents)
-            case Change() | Partition() | Heal():
+            case Change() | Partition() | Heal() | Jamming() | Flapping():
                 self._orders(msgspec.json.encode(Orders(slot, (deed.order,))))
         return []
 

@@ -14,11 +14,17 @@ class Orders:
 
     def __init__(self) -> None:
         self.pending: Mission | None = None
+        self.to: int | None = None
         self._issued = 0
+
+    def newest(self, newest_key: int) -> int:
+        """Return the version of the newest mission, issued or told of by an agent."""
+        return max(self._issued, newest_key // ORIGINS)
 
     def issue(self, order: Order, newest_key: int) -> int:
         """Make a mission of an order, newer than any told so far; return its key."""
-        self._issued = max(self._issued, newest_key // ORIGINS) + 1
+        self._issued = order.version or self.newest(newest_key) + 1
+        self.to = order.to
         key = self._issued * ORIGINS
         self.pending = Mission(key, order.path, encode_formation(order.formation))
         return key

@@ -12,7 +12,6 @@ from typing import Any, Protocol
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from agent.messages import Command, Observation, Vector
 from worldsim.judge.tick import Packets, Tick
@@ -35,7 +34,7 @@ from worldsim.run.faults import (
 )
 from worldsim.run.orders import Orders
 from worldsim.run.team import Begin, Hold, Start, Stop, Team
-from worldsim.run.told import UNTOLD, Told, told_by
+from worldsim.run.told import UNTOLD, tick_of, told_by
 from worldsim.run.trace import Trace
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 from worldsim.truth.obstacle import Obstacles
@@ -46,9 +45,6 @@ from worldsim.truth.world import Clock, World
 Event = dict[str, Any]
 Deed = Stop | Hold | Start | Begin | UponRadio | Order
 """What a clock carries out between slots."""
-
-
-NO_LINKS: NDArray[np.int32] = np.zeros((0, 2), dtype=np.int32)
 
 
 class Recorder(Protocol):
@@ -108,9 +104,10 @@ class SlotLoop:
         self.events: list[Event] = []
         self.figures: Figures | None = None
         self.team = Team(scenario)
-        self._timeline = Timeline(scenario)
+        self.timeline = Timeline(scenario)
+        self.orders = Orders()
+        self._planned: dict[str, Any] = {}
         self._formation = scenario.formation
-        self._orders = Orders()
         self._recorder = recorder
         self._packets = packets
         self._places: list[tuple[int, int] | None] = [None] * scenario.rows
@@ -120,7 +117,7 @@ class SlotLoop:
     def due(self) -> Iterator[Deed]:
         """Yield what is to happen before the present slot: do each, and ``take`` it, in turn."""
         time_s = self.world.time_s
-        for action in self._timeline.due(time_s) if self._timeline.next_s <= time_s + 1e-9 else ():
+        for action in self.timeline.due(time_s) if self.timeline.next_s <= time_s + 1e-9 else ():
             yield self.deed(action)
         if self.team.next_boot_s <= time_s + 1e-9:
             yield self.team.booted(time_s)
@@ -137,8 +134,12 @@ class SlotLoop:
             return self.team.joined(action, self.world.fleet.position, self.world.time_s)
         return action
 
-    def take(self, deed: Deed) -> None:
-        """Let a deed count that was done: participants and world change, and it is told."""
+    def take(self, deed: Deed, **signed: str) -> None:
+        """Let a deed count that was done: participants and world change, and it is told.
+
+        signed: what its events say besides, of whose doing it was.
+        """
+        self._planned = {"planned": True, **signed}
         match deed:
             case Stop():
                 self._stop(deed)
@@ -153,9 +154,14 @@ class SlotLoop:
                 self._change(deed)
             case Partition() | Heal() | Jamming() | Flapping():
                 told = msgspec.to_builtins(deed._asdict())
-                self.event(BARRIERS[type(deed)], None, **told, planned=True)
+                self.event(BARRIERS[type(deed)], None, **told, **self._planned)
             case Order():
                 self._order(deed)
+
+    @property
+    def newest(self) -> int:
+        """The highest key of a mission that an agent was heard to fly."""
+        return max(told.mission for told in self._told)
 
     def open(self) -> Opened:
         """Begin the present slot; at a tick, judge and record it first."""
@@ -168,7 +174,7 @@ class SlotLoop:
         observations = list(zip(group, world.observe(group), strict=True)) if group else []
         for agent, observation in observations:
             self._headings[agent] = observation.yaw
-        if self._orders.pending is not None:
+        if self.orders.pending is not None:
             observations = [self._ordered(*each) for each in observations]
         return Opened(world.slot, world.time_s, self._radios(), observations)
 
@@ -178,7 +184,7 @@ class SlotLoop:
             self.trace.command(agent, encoded)
             told = command.telemetry
             self._told[agent] = told_by(told, self._headings[agent])
-            self._orders.heard(told.mission)
+            self.orders.heard(told.mission)
             self._watch_place(agent, told.place)
 
     def close(self, verdicts: bytes) -> None:
@@ -213,9 +219,9 @@ class SlotLoop:
 
     def _tell(self, deed: Stop | Hold) -> None:
         for agent in deed.agents:
-            self.event(deed.kind, agent, planned=True)
+            self.event(deed.kind, agent, **self._planned)
         if not deed.agents:
-            self.event(BARRIERS[type(deed)], None, planned=True, nobody=deed.selectors)
+            self.event(deed.kind, None, **self._planned, nobody=deed.selectors)
 
     def _start(self, start: Start) -> None:
         self.team.take(start, self.world.time_s)
@@ -223,34 +229,40 @@ class SlotLoop:
             self.world.enter(agent, position, yaw)
         for agent, incarnation in start.incarnations.items():
             self._told[agent], self._places[agent] = UNTOLD, None
-            self.event(start.kind, agent, incarnation=incarnation, planned=True)
+            self.event(start.kind, agent, incarnation=incarnation, **self._planned)
         if not start.incarnations:
             refused = start.refused or "nobody to come back"
-            self.event(start.kind, None, planned=True, refused=refused)
+            self.event(start.kind, None, **self._planned, refused=refused)
 
     def _change(self, deed: Change) -> None:
         change = msgspec.to_builtins(deed.change)
         given = {"undone": change} if deed.undone else change
         conditions = msgspec.to_builtins(deed.conditions)
-        self.event("netem", None, **given, planned=True, conditions=conditions)
+        self.event("netem", None, **given, **self._planned, conditions=conditions)
 
     def _order(self, order: Order) -> None:
-        key = self._orders.issue(order, max(told.mission for told in self._told))
+        key = self.orders.issue(order, self.newest)
         self._formation = order.formation
         self.event(
             order.kind,
-            self.team.first,
+            self._addressee,
             formation=order.formation.name,
             mission=key,
             path=msgspec.to_builtins(order.path),
-            planned=True,
+            **self._planned,
             tables=msgspec.to_builtins(order.formation),
         )
 
+    @property
+    def _addressee(self) -> int | None:
+        """Whom a mission is given to: the one it was for, and if that one is gone the lowest id."""
+        to = self.orders.to
+        return to if to is not None and self.team.awake[to] else self.team.first
+
     def _ordered(self, agent: int, observation: Observation) -> tuple[int, Observation]:
-        """Add the pending mission where the lowest living id looks."""
-        mission = self._orders.pending
-        if mission is None or agent != self.team.first:
+        """Add the pending mission where its addressee looks."""
+        mission = self.orders.pending
+        if mission is None or agent != self._addressee:
             return agent, observation
         return agent, msgspec.structs.replace(observation, orders=(mission,))
 
@@ -273,38 +285,8 @@ class SlotLoop:
             self.event("role", agent, role="vertex" if now and now[1] == 0 else "member")
 
     def _show(self) -> None:
-        tick = self._tick()
+        awake, linked = self.team.awake, self._recorder is not None
+        tick = tick_of(self.world, self._told, awake, linked, self._packets())
         self.figures = self.judge.see(tick)
         if self._recorder is not None:
             self._recorder.tick(tick, self.figures)
-
-    def _tick(self) -> Tick:
-        fleet = self.world.fleet
-        told = [
-            row if awake else UNTOLD
-            for row, awake in zip(self._told, self.team.awake.tolist(), strict=True)
-        ]
-        reasons = np.array(
-            [(*row.target, row.force, row.turn_deg) for row in told], dtype=np.float32
-        )
-        attitude = np.empty((len(told), 3), dtype=np.float32)
-        attitude[:, 0], attitude[:, 1:] = fleet.yaw, fleet.tilt
-        return Tick(
-            index=self.world.slot // self.world.clock.slots_per_tick,
-            time_s=self.world.time_s,
-            position=fleet.position.astype(np.float32),
-            attitude=attitude,
-            target=reasons[:, :3],
-            place=np.array([row.place for row in told], dtype=np.int16),
-            force=reasons[:, 3],
-            turn_deg=reasons[:, 4],
-            alive=self.team.awake.copy(),
-            mission=np.array([row.mission for row in told], dtype=np.int64),
-            links=self._links(told) if self._recorder is not None else NO_LINKS,
-            packets=self._packets(),
-        )
-
-    @staticmethod
-    def _links(told: list[Told]) -> NDArray[np.int32]:
-        pairs = [(row, other) for row, each in enumerate(told) for other in each.heard]
-        return np.array(pairs, dtype=np.int32).reshape(-1, 2)

@@ -1,11 +1,17 @@
-"""What agents told of their reasons, as rows of a tick."""
+"""What agents told of their reasons, and beside the truth as rows of a tick."""
 
 from math import atan2, degrees, hypot, nan, pi
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from agent.messages import Telemetry, Vector
+from worldsim.judge.tick import Packets, Tick
+from worldsim.truth.world import World
 
 MOVING_MPS = 0.02
+NO_LINKS: NDArray[np.int32] = np.zeros((0, 2), dtype=np.int32)
 
 
 class Told(NamedTuple):
@@ -32,6 +38,39 @@ def told_by(telemetry: Telemetry, heading: float) -> Told:
         telemetry.heard,
         telemetry.mission,
     )
+
+
+def tick_of(
+    world: World, told: list[Told], awake: NDArray[np.bool_], linked: bool, packets: Packets
+) -> Tick:
+    """Return the present tick; linked: with the links, which cost most.
+
+    awake (N,): who steps; the others tell nothing.
+    """
+    rows = [row if up else UNTOLD for row, up in zip(told, awake.tolist(), strict=True)]
+    fleet = world.fleet
+    reasons = np.array([(*row.target, row.force, row.turn_deg) for row in rows], dtype=np.float32)
+    attitude = np.empty((len(rows), 3), dtype=np.float32)
+    attitude[:, 0], attitude[:, 1:] = fleet.yaw, fleet.tilt
+    return Tick(
+        index=world.slot // world.clock.slots_per_tick,
+        time_s=world.time_s,
+        position=fleet.position.astype(np.float32),
+        attitude=attitude,
+        target=reasons[:, :3],
+        place=np.array([row.place for row in rows], dtype=np.int16),
+        force=reasons[:, 3],
+        turn_deg=reasons[:, 4],
+        alive=awake.copy(),
+        mission=np.array([row.mission for row in rows], dtype=np.int64),
+        links=_links(rows) if linked else NO_LINKS,
+        packets=packets,
+    )
+
+
+def _links(rows: list[Told]) -> NDArray[np.int32]:
+    pairs = [(row, other) for row, each in enumerate(rows) for other in each.heard]
+    return np.array(pairs, dtype=np.int32).reshape(-1, 2)
 
 
 def _turn_deg(wanted: Vector, heading: float) -> float:
