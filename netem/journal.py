@@ -2,10 +2,24 @@
 
 A page for each receiver, so that shards of the medium, each with some of the receivers, have
 together the pages of one medium with all of them: whoever has all pages of a slot has its digest.
+Frames for whom their receiver was out of reach are not noted: that follows from the positions.
 """
 
 from collections.abc import Iterable, Mapping
 from hashlib import sha256
+from struct import Struct as Layout
+
+import numpy as np
+from numpy.typing import NDArray
+
+HEAD = Layout("<4q").pack
+"""A frame's key: source, incarnation, channel, count."""
+FATE = Layout("<BBdd").pack
+"""Its fate: copy (0, or 1 for a duplicate), cause, delay [s], and the share of the bit turned."""
+ENTRY = np.dtype(
+    [(name, "<i8") for name in ("source", "incarnation", "channel", "count")]
+    + [("copy", "u1"), ("cause", "u1"), ("delay_s", "<f8"), ("turned", "<f8")]
+)
 
 
 class Digest:
@@ -52,3 +66,8 @@ def joined(shards: Iterable[Mapping[int, bytes]]) -> list[bytes]:
     """Return the pages of a slot from all shards, in order of the receivers' ids."""
     pages = {receiver: page for shard in shards for receiver, page in shard.items()}
     return [pages[receiver] for receiver in sorted(pages)]
+
+
+def entries(page: bytes) -> NDArray[np.void]:
+    """Return what a page holds as a structured array, an ENTRY each, in order."""
+    return np.frombuffer(page, dtype=ENTRY)

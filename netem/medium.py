@@ -10,13 +10,12 @@ from collections.abc import Iterable, Mapping
 from hashlib import sha256
 from heapq import heappop, heappush
 from math import inf
-from struct import Struct as Layout
 
 import msgspec
 
 from netem.air import Air
 from netem.barriers import Barriers
-from netem.journal import Journal
+from netem.journal import FATE, HEAD, Journal
 from netem.link import LOST_TO_PARTITION, LOST_TO_QUEUE, Cause, LinkModel, Verdict
 from netem.links import Links, Sending
 from netem.messages import (
@@ -42,8 +41,6 @@ from netem.wire.frame import (
     Transmission,
 )
 
-_HEAD = Layout("<4q").pack
-_FATE = Layout("<BBdd").pack
 DELIVERED = Cause.DELIVERED
 FATES = tuple(cause.name.lower() for cause in Cause)
 _InFlight = tuple[float, int, int, int, int, int, Frame]
@@ -191,13 +188,13 @@ class Medium:
         if waited_s is None:
             self._fates[Cause.DROPPED_QUEUE] += self._others[source]
             if source in self._own:
-                self._journal.pages[source] += _HEAD(*sending.key) + _FATE(0, *LOST_TO_QUEUE)
+                self._journal.pages[source] += HEAD(*sending.key) + FATE(0, *LOST_TO_QUEUE)
         return waited_s
 
     def _cross_clean(self, sending: Sending, near: Near, delay_s: float) -> None:
         """Deliver a frame to all who are near, after the same delay [s]."""
         frame, key, sent_s, _ = sending
-        noted = _HEAD(*key) + _FATE(0, DELIVERED, delay_s, -1.0)
+        noted = HEAD(*key) + FATE(0, DELIVERED, delay_s, -1.0)
         entry = (sent_s + delay_s, *key, 0, frame)
         queues, pages = self._queues, self._journal.pages
         for receiver, _ in near:
@@ -207,7 +204,7 @@ class Medium:
 
     def _cross_plain(self, sending: Sending, near: Near, link: LinkModel) -> None:
         """Judge a frame on links that are all alike, and no more than late and lossy."""
-        head = _HEAD(*sending.key)
+        head = HEAD(*sending.key)
         fates = self._links.plain(link, sending, near)
         for (receiver, _), fate in zip(near, fates, strict=True):
             self._note(sending, head, receiver, fate)
@@ -215,7 +212,7 @@ class Medium:
     def _cross(self, sending: Sending, near: Near) -> None:
         """Judge a frame on each link to those who may hear it."""
         source, _, channel, _ = sending.key
-        head, links, barred = _HEAD(*sending.key), self._links, self._barriers.raised
+        head, links, barred = HEAD(*sending.key), self._links, self._barriers.raised
         for receiver, distance_m in near:
             link = self._schedule.model(channel, source, receiver)
             if barred and self._bars(source, receiver, sending.sent_s):
@@ -240,7 +237,7 @@ class Medium:
     ) -> None:
         """Enter a verdict in the books, and a frame that gets across in its receiver's queue."""
         cause, delay_s, turned = fate
-        self._journal.pages[receiver] += head + _FATE(copy, cause, delay_s, turned)
+        self._journal.pages[receiver] += head + FATE(copy, cause, delay_s, turned)
         if cause:
             self._fates[cause] += 1
             return
