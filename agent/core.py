@@ -17,15 +17,8 @@ from agent.comms.mission import Missions
 from agent.comms.neighbours import Neighbours
 from agent.comms.silent import SilentBodies
 from agent.controller import Intent, Peer, Senses
-from agent.guidance.cone import cone_of
-from agent.guidance.safety import (
-    STATIC,
-    PromiseFilter,
-    RangingFilter,
-    Told,
-    limited,
-    shortened,
-)
+from agent.guidance.guard import Guard
+from agent.guidance.safety import Told
 from agent.messages import (
     Beacon,
     Command,
@@ -37,6 +30,7 @@ from agent.messages import (
     Vector,
 )
 from agent.pilot import Pilot
+from agent.sensing.eyes import Eyes
 from agent.setup import AgentSetup
 
 MAX_COST_MM = 2**31 - 1
@@ -65,30 +59,20 @@ class Agent:
 
     def __init__(self, setup: AgentSetup, decoders: Decoders = Decoders()) -> None:  # noqa: B008
         tick_s = 1.0 / setup.tick_hz
-        comms, limits = setup.comms, setup.vehicle
+        comms = setup.comms
         self.id = setup.id
         self.rejected: Counter[str] = Counter()
         self._incarnation = setup.incarnation
         self._decoders = decoders
         self._slack_s = 2.0 * tick_s
         self._command_slots = setup.command_ticks * setup.slots_per_tick
-        self._cone = cone_of(limits)
         self._controller = Pilot(setup)
         self._neighbours = Neighbours(setup.id, comms.local_hz, self._slack_s)
         self._table = Table(setup.id, comms.multihop_hz)
         round_s = 1.0 / comms.multihop_hz if comms.multihop_hz > 0.0 else inf
         self._broadcast = Broadcast(setup.id, setup.incarnation, 1.0 / comms.local_hz, round_s)
-        filtered = (
-            setup.control.separation_m,
-            setup.fleet_max_speed_mps,
-            setup.command_ticks * tick_s,
-        )
-        self._ranging = RangingFilter(*filtered) if "proximity" in limits.sensors else None
-        self._clearing = RangingFilter(
-            setup.control.clearance_m, limits.max_speed_mps, setup.command_ticks * tick_s, STATIC
-        )
-        self._promises = PromiseFilter(*filtered)
-        self._speed_cap = limits.max_speed_mps
+        self._guard = Guard(setup)
+        self._eyes = Eyes(setup)
         self._missions = Missions(setup.id, setup.formation, setup.control.spacing_m, setup.frame)
         self._hierarchy = Hierarchy(setup.id)
         self._standing = ALONE
@@ -115,7 +99,7 @@ class Agent:
             self._obey(mission)
         senses = self._senses(observation)
         intent = self._intent = self._controller.decide(senses)
-        velocity = self._safe(intent, senses)
+        velocity = self._guard.safe(intent.velocity, senses, lambda: self._told(senses))
         command = self._command(observation.slot, senses, intent, velocity)
         own = self._own_state(senses, velocity, intent)
         pieces = self._missions.pieces() if self._lagging else ()
@@ -130,7 +114,7 @@ class Agent:
             velocity,
             intent.heading_for,
             intent.place,
-            self._speed_cap,
+            self._guard.speed_cap,
             missions.flown.key,
             missions.frame_key,
             *missions.told(senses.now_s),
@@ -182,8 +166,15 @@ class Agent:
             mission,
             self._silent,
             self._blocked,
-            observation.obstacles,
+            self._obstacles(observation),
         )
+
+    def _obstacles(self, observation: Observation) -> tuple[Vector, ...]:
+        """Return what is known of obstacles near by; neighbours' bodies are none."""
+        if not self._eyes.scanning:
+            return observation.obstacles
+        heard = [beacon.position for beacon in self._neighbours.beacons()]
+        return self._eyes.near(observation, heard)
 
     def _tidy(self, observation: Observation) -> None:
         """Look after what need not be looked at every tick: who is gone, and one's standing."""
@@ -213,19 +204,6 @@ class Agent:
                 or not mine.isdisjoint(formation.queues_of((beacon.queue, beacon.rank)))
             )
         ]
-
-    def _safe(self, intent: Intent, senses: Senses) -> Vector:
-        """Return the velocity that is safe to fly [m/s]: the filter has the last word."""
-        if self._ranging is not None:
-            bounds = self._ranging.bounds(senses.vehicles)
-            if senses.obstacles:
-                bounds += self._clearing.bounds(senses.obstacles)
-            return limited(intent.velocity, bounds, senses.yaw, self._cone)
-        told = self._told(senses)
-        self._promises.promise(senses.now_s, told)
-        self._speed_cap = self._promises.speed_cap
-        velocity = limited(intent.velocity, self._promises.bounds(told), senses.yaw, self._cone)
-        return shortened(velocity, self._speed_cap)
 
     def _told(self, senses: Senses) -> list[Told]:
         """Return what neighbours last told of themselves, not carried forward."""

@@ -98,6 +98,17 @@ class Mission(Message, frozen=True):
     formation: Annotated[bytes, Meta(max_length=3000)]
 
 
+class Scan(Message, frozen=True):
+    """What a scanning sensor met: for each ray or beam, in the order of its pattern, how far.
+
+    kind: index of agent.sensing.pattern.KINDS. ranges: unsigned 16-bit little-endian [mm]; 65535:
+    nothing, within its range.
+    """
+
+    kind: Annotated[int, Meta(ge=0, lt=8)]
+    ranges: Annotated[bytes, Meta(max_length=60_000)]
+
+
 class Observation(Message, frozen=True):
     """What one vehicle senses at the start of one of its slots; never the truth about others.
 
@@ -106,6 +117,7 @@ class Observation(Message, frozen=True):
     vehicle's centre [m; axes of the world frame]. A body has no name.
     obstacles: of each obstacle within the sensor's 2 m the nearest point of its surface, relative
     likewise; of more than 32, the nearest.
+    scans: of sensors that scan, those made at this time.
     orders: missions that an operator gives to this agent, for the whole team.
     """
 
@@ -117,6 +129,7 @@ class Observation(Message, frozen=True):
     vehicles: Annotated[tuple[Position, ...], Meta(max_length=256)]
     obstacles: Annotated[tuple[Position, ...], Meta(max_length=32)]
     orders: Annotated[tuple[Mission, ...], Meta(max_length=4)]
+    scans: Annotated[tuple[Scan, ...], Meta(max_length=2)]
 
 
 class Telemetry(Message, frozen=True):

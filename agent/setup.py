@@ -10,6 +10,7 @@ from agent.qstructure.formation import FormationSpec
 
 Positive = Annotated[float, Meta(gt=0, le=1e4)]
 Hertz = Annotated[float, Meta(gt=0, le=1000)]
+Noise = Annotated[float, Meta(ge=0, le=1)]
 
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -32,14 +33,61 @@ class Vehicle(Table, frozen=True):
     max_turn_left_deg: Annotated[float, Meta(gt=0, le=90)] | None = None
     max_turn_right_deg: Annotated[float, Meta(gt=0, le=90)] | None = None
     max_tilt_deg: Annotated[float, Meta(ge=0, le=90)] = 0.0
-    sensors: tuple[Literal["proximity"], ...] = ("proximity",)
+    sensors: tuple[Literal["proximity", "laser", "sonar"], ...] = ("proximity",)
+
+
+class Proximity(Table, frozen=True):
+    """Relative positions of vehicles and of obstacles' nearest points within 2 m.
+
+    The noise is normal, per axis [m].
+    """
+
+    noise_m: Noise = 0.0
+
+
+class Laser(Table, frozen=True):
+    """A scanner: ``rays`` over ``field_deg`` ahead, in ``rings`` spread over +-elevation_deg.
+
+    noise_m: normal, along the ray; dropout_percent: rays that meet something and tell nothing.
+    """
+
+    range_m: Annotated[float, Meta(gt=0, le=60)] = 4.0
+    field_deg: Annotated[float, Meta(gt=0, le=350)] = 180.0
+    rays: Annotated[int, Meta(ge=1, le=720)] = 61
+    elevation_deg: Annotated[float, Meta(ge=0, le=85)] = 0.0
+    rings: Annotated[int, Meta(ge=1, le=64)] = 1
+    rate_hz: Hertz = 10.0
+    noise_m: Noise = 0.0
+    dropout_percent: Annotated[float, Meta(ge=0, le=100)] = 0.0
+
+
+class Sonar(Table, frozen=True):
+    """A ring of sonars, and with ``up_down`` one upwards and one downwards.
+
+    Each tells the distance to the nearest thing within its beam, not where in it.
+    """
+
+    range_m: Annotated[float, Meta(gt=0, le=60)] = 2.0
+    ring: Annotated[int, Meta(ge=1, le=64)] = 16
+    up_down: bool = False
+    beam_deg: Annotated[float, Meta(gt=0, le=120)] = 22.5
+    rate_hz: Hertz = 10.0
+    noise_m: Noise = 0.0
+    dropout_percent: Annotated[float, Meta(ge=0, le=100)] = 0.0
+
+
+class Sensors(Table, frozen=True):
+    """What each kind of sensor is like."""
+
+    proximity: Proximity = Proximity()
+    laser: Laser = Laser()
+    sonar: Sonar = Sonar()
 
 
 class Control(Table, frozen=True):
     """The controller and the paper's distances [m]: d_ir, d_ob, d_s, d_c1, d_c2.
 
     clearance_m: from a vehicle's centre to an obstacle's surface, what the safety filter keeps.
-
     ``cast_far_m`` left out follows from the range (Lemma 7, E20).
     """
 
@@ -77,4 +125,5 @@ class AgentSetup(Table, frozen=True):
     control: Control
     comms: Comms
     formation: FormationSpec
+    sensor: Sensors = Sensors()
     frame: FramePath = AT_HOME

@@ -45,17 +45,24 @@ class RangingFilter:
     """Limits approach by the gap to each body sensed.
 
     d_ob: least distance between centres [m]; max_speed [m/s]; horizon_s: H. share: of the gap, what
-    may be closed within H; STATIC for what does not move itself.
+    may be closed within H; STATIC for what does not move itself. creep: how fast one may go across
+    however near [m/s]: noise puts points nearer than they are, and must not hold one for ever.
     """
 
     def __init__(
-        self, d_ob: float, max_speed: float, horizon_s: float, share: float = SHARE
+        self,
+        d_ob: float,
+        max_speed: float,
+        horizon_s: float,
+        share: float = SHARE,
+        creep: float = 0.0,
     ) -> None:
         reach = max_speed * horizon_s
         self._d_ob = d_ob
         self._stop_m = d_ob + reach * reach / d_ob
         self._turning_hz = max_speed / (self._stop_m - d_ob)
         self._rate = share / horizon_s
+        self._creep = creep
         self._ignore_m = self._stop_m + max_speed / self._rate
 
     def bounds(self, vehicles: Sequence[Vector]) -> list[Bound]:
@@ -66,7 +73,8 @@ class RangingFilter:
             if r >= self._ignore_m or r == 0.0:
                 continue
             limit = self._rate * max(0.0, r - self._stop_m)
-            aside = self._turning_hz * max(0.0, r - self._d_ob) if r < self._stop_m else inf
+            turning = self._turning_hz * max(0.0, r - self._d_ob)
+            aside = max(self._creep, turning) if r < self._stop_m else inf
             found.append(Bound((-x / r, -y / r, -z / r), limit, aside))
         return found
 

@@ -33,19 +33,21 @@ from agent.messages import (
     Piece,
     Pose,
     Record,
+    Scan,
     Telemetry,
 )
 
 MANY = 15_000
 VECTOR = (1.0, -2.5, 0.25)
 POSE = Pose(1.0, 2.0, 3.0, 0.5)
+SCAN = Scan(1, bytes(8))
 DRIFT = Drift(1.5, 0.1, 0.2, 0.3, 0.4)
 PATH = FramePath((VECTOR, VECTOR), 0.25, 2.0, 0.5, 0.2, (1.0, 2.0))
 TELEMETRY = Telemetry(VECTOR, 1.0, VECTOR, (1, 2), (3, 4), 5, 6, 1, 3, 0)
 RECORD = Record(4, 0, 77, 1.25, VECTOR, -1, -1, 0, 7, ((0, 0),))
 GOOD = {
     Observation: Observation(
-        7, 1.5, VECTOR, VECTOR, 0.5, (VECTOR, VECTOR), (VECTOR,), (Mission(0, PATH, b""),)
+        7, 1.5, VECTOR, VECTOR, 0.5, (VECTOR, VECTOR), (VECTOR,), (Mission(0, PATH, b""),), (SCAN,)
     ),
     Command: Command(
         7,
@@ -124,6 +126,7 @@ paths = st.builds(
     rates,
     st.lists(seconds, max_size=3).map(tuple),
 )
+scans = st.builds(Scan, st.integers(0, 7), st.binary(max_size=200))
 missions = st.builds(Mission, counts, paths, st.binary(max_size=900))
 pieces = st.builds(Piece, counts, st.integers(0, 15), st.integers(1, 16), st.binary(max_size=900))
 records = st.builds(
@@ -153,6 +156,7 @@ messages = st.one_of(
         st.lists(positions, max_size=9).map(tuple),
         st.lists(positions, max_size=4).map(tuple),
         st.lists(missions, max_size=1).map(tuple),
+        st.lists(scans, max_size=2).map(tuple),
     ),
     st.builds(
         Command, counts, counts, counts, velocities, angles, st.tuples(angles, angles), telemetries

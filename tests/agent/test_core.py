@@ -49,7 +49,9 @@ def agent(who=0, sensors=("proximity",), incarnation=0):
 
 
 def seen(tick, at=(2.0, 1.0, 0.5), vehicles=(), start_s=0.0):
-    return Observation(4 * tick, start_s + tick * TICK_S, at, ORIGIN, 0.3, tuple(vehicles), (), ())
+    return Observation(
+        4 * tick, start_s + tick * TICK_S, at, ORIGIN, 0.3, tuple(vehicles), (), (), ()
+    )
 
 
 def airworthy(outbox, tick):

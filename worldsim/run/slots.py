@@ -38,6 +38,7 @@ from worldsim.run.told import UNTOLD, tick_of, told_by
 from worldsim.run.trace import Trace
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 from worldsim.truth.obstacle import Obstacles
+from worldsim.truth.scan import Scans
 from worldsim.truth.sensor import ProximitySensor
 from worldsim.truth.start import starts_of
 from worldsim.truth.world import Clock, World
@@ -81,6 +82,9 @@ def world_of(scenario: Scenario, command_ticks: int) -> World:
         position=np.concatenate((position, np.full((later, 3), nan))),
         yaw=np.concatenate((yaw, np.full(later, nan))),
         sensor=ProximitySensor(scenario.seed, scenario.sensor.proximity.noise_m, obstacles),
+        scans=Scans(
+            scenario.vehicles, scenario.sensor, scenario.seed, scenario.fleet.tick_hz, obstacles
+        ),
         command_ticks=command_ticks,
     )
 

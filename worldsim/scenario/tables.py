@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from agent.messages import AgentId
 from agent.qstructure.formation import FormationSpec
-from agent.setup import AgentSetup, Comms, Control, Hertz, Positive, Table, Vehicle
+from agent.setup import AgentSetup, Comms, Control, Hertz, Positive, Sensors, Table, Vehicle
 from netem.messages import Conditions, MediumSetup
 from worldsim.scenario.events import EventTable
 from worldsim.scenario.frame import FrameTable, path_of
@@ -43,21 +43,6 @@ class Fleet(Table, frozen=True):
     tick_hz: Hertz = 20.0
     start: BoxStart | ListStart = BoxStart()
     boot_s: Annotated[float, Meta(ge=0, le=3600)] = 1.0
-
-
-class ProximitySensor(Table, frozen=True):
-    """Relative positions of vehicles and of obstacles' nearest points within 2 m.
-
-    The noise is normal, per axis [m].
-    """
-
-    noise_m: Annotated[float, Meta(ge=0, le=1)] = 0.0
-
-
-class Sensors(Table, frozen=True):
-    """What each kind of sensor is like."""
-
-    proximity: ProximitySensor = ProximitySensor()
 
 
 def _optional(table: type[Table]) -> list[tuple[str, Any, None]]:
@@ -181,6 +166,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
             fleet_max_speed_mps=max(vehicle.max_speed_mps for vehicle in self.vehicles),
             control=self._control(),
             comms=self.comms,
+            sensor=self.sensor,
             formation=self.formation,
             frame=path_of(self.frame),
         )

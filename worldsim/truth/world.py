@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agent.messages import Command, Observation, Vector
+from agent.messages import Command, Observation, Scan, Vector
 from agent.setup import Vehicle
+from worldsim.truth.scan import Scans
 from worldsim.truth.sensor import ProximitySensor, Sensed
 from worldsim.truth.vehicle import Fleet, Floats
 
@@ -52,6 +53,7 @@ class World:
         position: Floats,
         yaw: Floats,
         sensor: ProximitySensor,
+        scans: Scans,
         command_ticks: int,
     ) -> None:
         self.clock = clock
@@ -61,6 +63,7 @@ class World:
         self.discarded = 0
         self._senses = ["proximity" in each.sensors for each in limits]
         self._sensor = sensor
+        self._scanning = scans
         self._longest = command_ticks * clock.slots_per_tick
         self._expires = np.zeros(len(yaw), dtype=np.int64)
         self._velocity = np.zeros((len(yaw), 3))
@@ -96,13 +99,26 @@ class World:
             each if self._senses[agent] else NOTHING
             for agent, each in zip(looking, read, strict=True)
         ]
+        scans = self._scans(looking)
         position = self.fleet.position.take(looking, axis=0).tolist()
         velocity = self.fleet.velocity.take(looking, axis=0).tolist()
         yaw = self.fleet.yaw.take(looking).tolist()
         return [
-            Observation(self.slot, self.time_s, tuple(p), tuple(v), heading, *each, ())
-            for p, v, heading, each in zip(position, velocity, yaw, sensed, strict=True)
+            Observation(
+                self.slot, self.time_s, tuple(p), tuple(v), heading, *each, (), scans.get(agent, ())
+            )
+            for agent, p, v, heading, each in zip(
+                looking, position, velocity, yaw, sensed, strict=True
+            )
         ]
+
+    def _scans(self, looking: list[int]) -> dict[int, tuple[Scan, ...]]:
+        """Return what was scanned in the present slot, by agent."""
+        if not self._scanning.any:
+            return {}
+        tick = self.slot // self.clock.slots_per_tick
+        fleet = self.fleet
+        return self._scanning.read(fleet.position, fleet.yaw, looking, tick, self.slot, self.time_s)
 
     def obey(self, agent: int, command: Command) -> bool:
         """Take a command, or discard and count it: too old, not newer than the last, or ahead.

@@ -1,0 +1,100 @@
+"""Rays against obstacles and vehicles, all at once: how far each goes before it meets something.
+
+Only + - * / sqrt and comparisons cross rows here. A ray that begins within a body meets it at once.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worldsim.truth.obstacle import Obstacles
+from worldsim.truth.vehicle import Floats
+
+PARALLEL = 1e-12
+"""A unit vector's part across a face below which the ray is taken to run along it."""
+
+
+def cast(origins: Floats, rays: Floats, obstacles: Obstacles, time_s: float) -> Floats:
+    """Return how far rays go to the first obstacle (P, K) [m]; infinite where they meet none.
+
+    origins: (P, 3) [m; world frame]; rays: (P, K, 3), unit vectors [world axes].
+    """
+    far = np.full(rays.shape[:2], np.inf)
+    centres = obstacles.centres(time_s)
+    start = origins[:, None] - centres
+    for columns, meet in (
+        (obstacles.spheres, _meet_spheres),
+        (obstacles.cylinders, _meet_cylinders),
+        (obstacles.boxes, _meet_boxes),
+    ):
+        for column in columns.tolist():
+            form = (obstacles.radius[column], obstacles.half[column], obstacles.heading[column])
+            far = np.minimum(far, meet(start[:, None, column], rays, *form))
+    return far
+
+
+def cast_at_spheres(start: Floats, rays: Floats, radius: Floats) -> Floats:
+    """Return how far rays go to the first of some spheres (P, K) [m].
+
+    start: (P, M, 3), the rays' origins from each centre [m]; radius (M,) [m]. NaN meets nothing.
+    """
+    far = np.full(rays.shape[:2], np.inf)
+    for column in range(start.shape[1]):
+        far = np.fmin(far, _meet_spheres(start[:, None, column], rays, radius[column]))
+    return far
+
+
+def _meet_spheres(start: Floats, rays: Floats, radius: float, *_: Floats) -> Floats:
+    along = -_dot(start, rays)
+    excess = _dot(start, start) - radius * radius
+    square = along * along - excess
+    root = np.sqrt(np.maximum(square, 0.0))
+    met = (square >= 0.0) & (along + root >= 0.0)
+    return np.where(met, np.maximum(along - root, 0.0), np.inf)
+
+
+def _meet_cylinders(start: Floats, rays: Floats, radius: float, half: Floats, _: Floats) -> Floats:
+    flat_start, flat_rays = start * (1.0, 1.0, 0.0), rays * (1.0, 1.0, 0.0)
+    a, b = _dot(flat_rays, flat_rays), _dot(flat_start, flat_rays)
+    excess = _dot(flat_start, flat_start) - radius * radius
+    square = b * b - a * excess
+    crosses = a > PARALLEL * PARALLEL
+    root, level = np.sqrt(np.maximum(square, 0.0)), np.where(crosses, a, 1.0)
+    upright = np.where(excess <= 0.0, np.inf, -np.inf)
+    enter = np.where(crosses, (-b - root) / level, -upright)
+    leave = np.where(crosses, (-b + root) / level, upright)
+    low, high = _slab(start[..., 2], rays[..., 2], half[2])
+    met = (square >= 0.0) | ~crosses
+    return _first(np.maximum(enter, low), np.minimum(leave, high), met)
+
+
+def _meet_boxes(start: Floats, rays: Floats, _: float, half: Floats, heading: Floats) -> Floats:
+    c, s = heading.tolist()
+    enter, leave = _slab(start[..., 2], rays[..., 2], half[2])
+    for axis, (x, y) in enumerate(((c, s), (-s, c))):
+        low, high = _slab(
+            x * start[..., 0] + y * start[..., 1], x * rays[..., 0] + y * rays[..., 1], half[axis]
+        )
+        enter, leave = np.maximum(enter, low), np.minimum(leave, high)
+    return _first(enter, leave, np.ones(enter.shape, dtype=np.bool_))
+
+
+def _slab(start: Floats, way: Floats, half: float) -> tuple[Floats, Floats]:
+    """Return from where to where a ray is between two faces at +-half [m]."""
+    still = np.abs(way) < PARALLEL
+    pace = np.where(still, 1.0, way)
+    one, other = (-half - start) / pace, (half - start) / pace
+    between = np.where(np.abs(start) <= half, np.inf, -np.inf)
+    low = np.where(still, -between, np.minimum(one, other))
+    high = np.where(still, between, np.maximum(one, other))
+    return low, high
+
+
+def _first(enter: Floats, leave: Floats, met: NDArray[np.bool_]) -> Floats:
+    sound = met & (enter <= leave) & (leave >= 0.0)
+    return np.where(sound, np.maximum(enter, 0.0), np.inf)
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    product = a * b
+    total: Floats = product[..., 0] + product[..., 1] + product[..., 2]
+    return total
