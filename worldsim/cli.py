@@ -1,4 +1,4 @@
-"""The command line: qswarm run | sim | new | check | verify | view | ps.
+"""The command line: qswarm run | sim | new | check | netem | verify | view | ps.
 
 Commands check everything before they start anything. Bad input is one line on stderr and exit
 status 2; what a command needs is imported inside it, so that --help and check stay quick.
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer.main import get_command
 
+from worldsim.netem_cli import netem
 from worldsim.options import (
     Agents,
     Duration,
@@ -206,6 +207,14 @@ def view(
     from worldsim.show.viewer import view as show
 
     return HELD if show(recordings(runs), web) == 0 else NOT_HELD
+
+
+app.command(
+    epilog=_examples(
+        "qswarm netem check deploy/scenarios/bursty-9.toml",
+        "qswarm netem check my.toml --set netem.loss_percent=50 --plot radio.png",
+    )
+)(netem)
 
 
 @app.command(epilog=_examples("qswarm ps runs/wedge-9-20260102T030405Z"))

@@ -1,0 +1,40 @@
+"""The command about the radio: qswarm netem check SCENARIO."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from worldsim.options import Seed, Settings, overrides_of
+
+Words = Annotated[list[str], typer.Argument(metavar="check SCENARIO", help="What to do.")]
+Plot = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Where the picture goes. [runs/SCENARIO-netem-TIME.png]"),
+]
+
+
+def netem(words: Words, seed: Seed = None, settings: Settings = None, plot: Plot = None) -> int:
+    """Try a scenario's radio: 100 000 packets a link, configured against measured; a picture."""
+    match words:
+        case ["check", scenario]:
+            return _check(Path(scenario), overrides_of(settings, None, seed, None), plot)
+    raise typer.BadParameter(f"{' '.join(words)!r}; check SCENARIO", param_hint="netem")
+
+
+def _check(file: Path, overrides: dict[str, str], plot: Path | None) -> int:
+    from worldsim.scenario.file import load
+    from worldsim.scenario.toml import ScenarioError
+    from worldsim.survey.survey import survey
+
+    scenario = load(file, overrides)
+    picture = plot or Path("runs") / f"{scenario.name}-netem-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.png"
+    if picture.exists():
+        raise ScenarioError(picture, "", "exists; nothing is overwritten")
+    try:
+        held = survey(scenario, picture)
+    except OSError as error:
+        raise ScenarioError(picture, "", f"cannot be written: {error.strerror}") from error
+    print(f"{'held' if held else 'BROKEN'}  {picture}")
+    return 0 if held else 1

@@ -1,0 +1,44 @@
+"""The parameter sets of a scenario: each different link that its radio has at some time."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from netem.link import LinkModel
+from netem.messages import Conditions
+from netem.schedule import Schedule, overlaid
+from netem.wire.frame import CHANNELS
+from worldsim.scenario.tables import Scenario
+
+
+class ParameterSet(NamedTuple):
+    """One link model, where and when it holds in words, and the channel on which it is tried."""
+
+    name: str
+    channel: int
+    link: LinkModel
+
+
+def parameter_sets(scenario: Scenario) -> list[ParameterSet]:
+    """Return the different link models of a scenario, each once, in the order of its tables."""
+    found: dict[LinkModel, ParameterSet] = {}
+    for when, conditions in _conditions(scenario):
+        for each in _links(when, conditions):
+            found.setdefault(each.link, each)
+    return list(found.values())
+
+
+def _conditions(scenario: Scenario) -> Iterator[tuple[str, Conditions]]:
+    yield "", scenario.netem
+    for event in scenario.event:
+        if event.netem is not None:
+            yield f", from {event.at_s:g} s on", overlaid(scenario.netem, event.netem)
+
+
+def _links(when: str, conditions: Conditions) -> Iterator[ParameterSet]:
+    schedule = Schedule(conditions)
+    for channel, name in enumerate(CHANNELS):
+        yield ParameterSet(f"{name}{when}", channel, schedule.sender(channel))
+    for link in conditions.link:
+        for channel, name in enumerate(CHANNELS):
+            model = schedule.model(channel, link.source, link.to)
+            yield ParameterSet(f"{link.source} to {link.to}, {name}{when}", channel, model)
