@@ -87,6 +87,8 @@ class Sensors(Table, frozen=True):
 class Control(Table, frozen=True):
     """The controller and the paper's distances [m]: d_ir, d_ob, d_s, d_c1, d_c2.
 
+    avoidance: what leads round obstacles before the filter has to: the bent lines of Algorithm 3, a
+    repulsion straight from what is near, or nothing but the dodge.
     clearance_m: from a vehicle's centre to an obstacle's surface, what the safety filter keeps.
     ``cast_far_m`` left out follows from the range (Lemma 7, E20).
     """
@@ -98,6 +100,7 @@ class Control(Table, frozen=True):
     clearance_m: Positive = 0.5
     cast_near_m: Positive = 0.05
     cast_far_m: Positive | None = None
+    avoidance: Literal["constellation", "direct", "none"] = "constellation"
 
 
 class Comms(Table, frozen=True):

@@ -1,7 +1,7 @@
 """The adaptive Q-structure as a controller: Algorithm 4, line by line.
 
-Target-on-queue (Algorithm 1, at 5 Hz), bobber (Algorithm 2), potentials (18)-(28), then move or
-turn. Plain floats throughout.
+Target-on-queue (Algorithm 1, at 5 Hz), bobber (Algorithm 2), constellation-agents (Algorithm 3),
+potentials (18)-(28), then move or turn. Plain floats throughout.
 """
 
 from math import dist, hypot, pi, radians, sqrt
@@ -9,6 +9,7 @@ from math import dist, hypot, pi, radians, sqrt
 from agent.controller import Intent, Senses
 from agent.guidance.bobber import bobber, cast_zone
 from agent.guidance.cone import azimuth_error, cone_of
+from agent.guidance.constellation import avoidance
 from agent.guidance.dodge import Dodge
 from agent.guidance.movement import DEAD_BAND_MPS, saturated, steer
 from agent.guidance.potential import Potential
@@ -42,6 +43,7 @@ class QStructure:
         )
         self._potential = Potential(control.separation_m)
         self._targets = TargetOnQueue(setup.id, control.spacing_m)
+        self._avoidance = avoidance(control.avoidance, control.safety_m)
         self._dodge = Dodge(setup.id)
         self._mine: OwnTarget | None = None
         self._cost_m = 0.0
@@ -57,7 +59,11 @@ class QStructure:
         q_toq = frame.to_world(mine.slot.point) if mine is not None else q
         q_tg = bobber(q, senses.yaw, _led(q_toq, frame), self._zone)
         x, y, z = self._potential.omega(q, q_tg, senses.neighbours)
-        wanted = self._wanted((-GAIN * x, -GAIN * y, -GAIN * z), senses, q_toq)
+        aside = self._dodge.direction(senses, q_toq)
+        if senses.obstacles and not self._dodge.rounds:
+            a, b, c = self._cleared(senses)
+            x, y, z = x + a, y + b, z + c
+        wanted = self._wanted((-GAIN * x, -GAIN * y, -GAIN * z), aside)
         velocity, yaw = steer(wanted, senses.yaw, self._cone)
         tilt = (0.0, 0.0)
         if mine is not None and dist(q, q_toq) < AT_SLOT_M and velocity == wanted:
@@ -78,6 +84,12 @@ class QStructure:
             blocked=self._blocked,
         )
 
+    def _cleared(self, senses: Senses) -> Vector:
+        """Return what surfaces near by add to Omega [m]; silent while one goes round them."""
+        if self._avoidance is None:
+            return (0.0, 0.0, 0.0)
+        return self._avoidance.omega(senses.yaw, senses.obstacles)
+
     def _heading(self, yaw: float, asked: float | None, velocity: Vector, frame: Frame) -> float:
         """Return the heading at the slot [rad]: the queue's, if one can fly on with it."""
         if asked is None:
@@ -87,10 +99,9 @@ class QStructure:
         flies_on = hypot(u, v) <= DEAD_BAND_MPS or self._cone.holds(error)
         return asked + frame.yaw if flies_on else yaw
 
-    def _wanted(self, u: Vector, senses: Senses, q_toq: Vector) -> Vector:
+    def _wanted(self, u: Vector, aside: Vector | None) -> Vector:
         """Return u of (28) [m/s] within the vehicle's limits, and past what holds it (E23)."""
         wanted = saturated(u, self._max_speed, self._max_climb)
-        aside = self._dodge.direction(senses, q_toq)
         if aside is None:
             return wanted
         v = self._max_speed

@@ -1,0 +1,149 @@
+"""Constellation-agents: guiding lines that bend round what is sensed (Algorithm 3, Fig. 7).
+
+Eight lines open like a cone about the heading, from a common agent behind the vehicle. Each agent
+on a line stands d_cs beyond the one before, in the direction of the last two as they are *bent*, so
+that a bend carries all that follow (lines 4-7, normalised). Where the way from the vehicle to it is
+blocked, it is drawn in to what is free (lines 3 and 5, along the unit vector). What is blocked is
+known from sensed points alone: within d_s of any of them.
+
+As poles of (23) such agents ask for thousands of m/s (E19). Two bounded terms stand for their
+repulsion in Omega of (27): the sum of the displacements, which holds back and turns aside, and the
+sum of the bent lines' directions, weighted by how far they are drawn in, which leads along the
+surface.
+"""
+
+from collections.abc import Sequence
+from math import cos, inf, pi, sin, sqrt
+from typing import Protocol
+
+from agent.messages import Vector
+
+LINES = 8
+AGENTS = 4
+BEHIND_M = 0.3
+FIRST_M, FIRST_RAD = 0.3, 69.0 * pi / 180.0
+STEP_M = 0.2
+"""d_cs."""
+ROLL = 0.1 * pi / 180.0
+"""Breaks the symmetry of an obstacle dead ahead."""
+LEAST_M = 0.1
+REACH_M = 0.9
+"""No agent stands farther than this from the vehicle."""
+DISPLACED, ALONG, CAP = 0.15, 0.075, 2.0
+
+
+def _default_lines() -> list[list[Vector]]:
+    """Return the agents of each line where nothing is sensed [m; heading along x]."""
+    ahead, aside = FIRST_M * cos(FIRST_RAD), FIRST_M * sin(FIRST_RAD)
+    length = sqrt((ahead + BEHIND_M) ** 2 + aside**2)
+    along, out = STEP_M * (ahead + BEHIND_M) / length, STEP_M * aside / length
+    rolls = [2.0 * pi * k / LINES + ROLL for k in range(LINES)]
+    return [
+        [
+            (ahead + k * along, (aside + k * out) * cos(roll), (aside + k * out) * sin(roll))
+            for k in range(AGENTS)
+        ]
+        for roll in rolls
+    ]
+
+
+DEFAULT = _default_lines()
+
+
+class Avoidance(Protocol):
+    """What keeps a vehicle's wishes clear of surfaces, long before the safety filter has to."""
+
+    def omega(self, yaw: float, points: Sequence[Vector]) -> Vector:
+        """Return what points of surfaces add to Omega of (27) [m; world axes].
+
+        yaw: the heading [rad]; points: relative to the vehicle [m; world axes].
+        """
+
+
+class Constellation:
+    """The constellation-agents of one vehicle; safety: d_s [m]."""
+
+    def __init__(self, safety: float) -> None:
+        self._safety = safety
+        self._near = (REACH_M + safety) ** 2
+
+    def omega(self, yaw: float, points: Sequence[Vector]) -> Vector:
+        """Return what the lines add to Omega [m; world axes]; see Avoidance."""
+        near = [p for p in points if p[0] * p[0] + p[1] * p[1] + p[2] * p[2] < self._near]
+        if not near:
+            return (0.0, 0.0, 0.0)
+        c, s = cos(yaw), sin(yaw)
+        x = y = z = 0.0
+        for line in DEFAULT:
+            turned = [(c * a - s * b, s * a + c * b, h) for a, b, h in line]
+            dx, dy, dz = self._line(turned, (-BEHIND_M * c, -BEHIND_M * s, 0.0), near)
+            x, y, z = x + dx, y + dy, z + dz
+        length = sqrt(x * x + y * y + z * z)
+        scale = min(1.0, CAP / max(length, 1e-9))
+        return (-scale * x, -scale * y, -scale * z)
+
+    def _line(self, default: list[Vector], common: Vector, points: list[Vector]) -> Vector:
+        """Return what one line asks for [m]; default: its agents where nothing is sensed."""
+        before, last, drawn_in = common, common, 1.0
+        x = y = z = 0.0
+        for a, (u, v, w) in enumerate(default):
+            ahead = default[0] if a == 0 else _beyond(before, last)
+            f = self._drawn_in(ahead, points)
+            drawn_in = min(drawn_in, f)
+            here = ahead if f == 1.0 else (f * ahead[0], f * ahead[1], f * ahead[2])
+            x += DISPLACED * (here[0] - u)
+            y += DISPLACED * (here[1] - v)
+            z += DISPLACED * (here[2] - w)
+            share = 1.0 - f if f < 1.0 else 0.5 * (1.0 - drawn_in)
+            if a > 0 and share > 0.0:
+                dx, dy, dz = here[0] - last[0], here[1] - last[1], here[2] - last[2]
+                weight = ALONG * share / max(sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
+                x, y, z = x + weight * dx, y + weight * dy, z + weight * dz
+            before, last = last, here
+        return (x, y, z)
+
+    def _drawn_in(self, ahead: Vector, points: list[Vector]) -> float:
+        """Return the share of the way to a point at which its agent stands: 1 where it is free.
+
+        The way is free outside all that is within d_s of a point sensed.
+        """
+        far = sqrt(ahead[0] * ahead[0] + ahead[1] * ahead[1] + ahead[2] * ahead[2])
+        free, safe = inf, self._safety * self._safety
+        for x, y, z in points:
+            along = (x * ahead[0] + y * ahead[1] + z * ahead[2]) / far
+            half = safe - (x * x + y * y + z * z - along * along)
+            if along > 0.0 and half > 0.0:
+                free = min(free, along - sqrt(half))
+        return 1.0 if free >= far else max(LEAST_M, free) / far
+
+
+def _beyond(before: Vector, last: Vector) -> Vector:
+    """Return the point d_cs beyond the last, away from the one before it."""
+    x, y, z = last[0] - before[0], last[1] - before[1], last[2] - before[2]
+    scale = STEP_M / max(sqrt(x * x + y * y + z * z), 1e-9)
+    return (last[0] + scale * x, last[1] + scale * y, last[2] + scale * z)
+
+
+class Repulsion:
+    """The plain repulsion that the lines are compared with: from each point, away; safety: d_s."""
+
+    def __init__(self, safety: float) -> None:
+        self._safety = safety
+
+    def omega(self, yaw: float, points: Sequence[Vector]) -> Vector:
+        """Return what being near adds to Omega [m; world axes]; see Avoidance."""
+        x = y = z = 0.0
+        for p in points:
+            r = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+            s = max(r - self._safety, 0.05)
+            if s < 1.0 and r > 0.0:
+                w = min(2.0, 0.05 * (1.0 / s - 1.0) / s) / r
+                x, y, z = x + w * p[0], y + w * p[1], z + w * p[2]
+        return (x, y, z)
+
+
+def avoidance(kind: str, safety: float) -> Avoidance | None:
+    """Return the avoidance of that name; None for "none". safety: d_s [m]."""
+    if kind == "none":
+        return None
+    return Constellation(safety) if kind == "constellation" else Repulsion(safety)
