@@ -21,6 +21,7 @@ _KEY = Layout("<6q").pack
 _NUMBERS = Layout("<8Q").unpack
 _UNIT = 1.0 / 2**53
 _LEAST = 2.0**-54
+_MOST = 1.0 - 2.0**-53
 _ROOT_2 = sqrt(2.0)
 _normal = NormalDist()
 
@@ -85,4 +86,4 @@ def correlated(share: float, last: float | None, correlation: float) -> tuple[fl
     score = _normal.inv_cdf(max(share, _LEAST))
     if last is not None:
         score = correlation * last + sqrt(1.0 - correlation * correlation) * score
-    return below(score), score
+    return min(below(score), _MOST), score

@@ -171,6 +171,35 @@ def test_fewer_agents_than_vertices() -> None:
     assert load(WEDGE, {"formation.file": lines, "fleet.agents": "3"}).fleet.agents == 3
 
 
+LINKS = [
+    ("loss_percent", "100.5", "up to 100"),
+    ("corrupt_percent", "-1", "from 0"),
+    ("reorder_percent", "101", "up to 100"),
+    ("delay_correlation_percent", "100", "below 100"),
+    ("distribution", "'gamma'", "'normal'"),
+    ("gemodel", "{ p_percent = 5 }", "r_percent: is missing"),
+    ("gemodel", "{ p_percent = 5, r_percent = 120 }", "r_percent: got 120"),
+    ("path_loss", "{ exponent = 3, budget_db = 70 }", "reference_loss_db: is missing"),
+    ("path_loss.shadowing_db", "0", "above 0"),
+    ("rate_kbit", "0", "above 0"),
+    ("limit", "0", "from 1"),
+    ("limit", "1.5", "a whole number"),
+]
+
+
+@pytest.mark.parametrize(("key", "value", "says"), LINKS)
+@pytest.mark.parametrize("table", ["netem", "netem.local", "netem.multihop"])
+def test_a_link_that_cannot_be_is_refused(table: str, key: str, value: str, says: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        load(WEDGE, {f"{table}.{key}": value})
+    assert f": {table}.{key.partition('.')[0]}" in str(caught.value)
+    assert says in str(caught.value)
+
+
+def test_a_correlation_needs_no_jitter() -> None:
+    assert load(WEDGE, {"netem.delay_correlation_percent": "25"}).netem.jitter_ms is None
+
+
 LISTS = [
     ("{ kind = 'list', positions_m = [[0, 0, 0]] }", "positions_m", "one for each"),
     ("{ kind = 'list', positions_m = [[0, 0, 0], [0, 0.2, 0]] }", "positions_m[1]", "agent 0"),

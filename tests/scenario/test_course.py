@@ -25,6 +25,13 @@ SOUND = [
     ["at_s = 5, join = 2", "at_s = 6, kill = [10]", "at_s = 7, restart = ['all', 10]"],
     ["at_s = 5, join = { count = 1, start = { kind = 'box', centre_m = [9, 9, 9] } }"],
     ["at_s = 5, partition = [[0, 1], [2]]", "at_s = 7, heal = true"],
+    ["at_s = 5, for_s = 9, partition = { kind = 'one_way', groups = [[0, 1], [2]] }"],
+    ["at_s = 5, partition = { kind = 'bridge', groups = [[0, 1], [2, 3]], bridge = [8] }"],
+    ["at_s = 5, partition = { kind = 'ring', groups = [[0, 2, 1, 3]] }", "at_s = 6, heal = true"],
+    ["at_s = 5, for_s = 2, jam = { centre_m = [0, 0, 0], radius_m = 2 }"],
+    ["at_s = 5, for_s = 2, flap = { period_s = 0.5 }", "at_s = 6, flap = { period_s = 2 }"],
+    ["at_s = 5, flap = { period_s = 2, links = [[0, 1], [1, 0]] }"],
+    ["at_s = 5, netem = { gemodel = { p_percent = 1, r_percent = 9 }, rate_kbit = 64 }"],
     ["at_s = 5, for_s = 1, netem = { loss_percent = 50, multihop = { delay_ms = 9 } }"],
     [f"at_s = 5, formation = {LINES}", "at_s = 6, kill = ['vertex:V3']"],
     ["at_s = 5, frame = { yaw_deg = 90, waypoints_m = [[1, 2, 3]] }"],
@@ -43,6 +50,43 @@ def test_what_is_sound_reads_back(events: list[str]) -> None:
 
 def test_rows_are_those_at_the_start_and_all_that_join() -> None:
     assert timeline("at_s = 5, join = 2", "at_s = 1, join = { count = 3 }").rows == 14
+
+
+RADIO = [
+    ("partition = [[0, 1], [1]]", "partition[1]", "agent 1 is named twice"),
+    ("partition = [[0, 9]]", "partition[0]", "no agent 9; 0 to 8"),
+    ("partition = [[0, 'x']]", "partition[0][1]", "got the text 'x'"),
+    ("partition = { groups = [[0], [0]] }", "partition.groups[1]", "named twice"),
+    ("partition = { groups = [[0]], kind = 'half' }", "partition.kind", "'clean' or 'one_way'"),
+    ("partition = { kind = 'ring' }", "partition.groups", "is missing"),
+    ("partition = { groups = [[0]], kind = 'bridge' }", "partition.bridge", "with kind = 'bridge'"),
+    ("partition = { groups = [[0]], bridge = [1] }", "partition.bridge", "with kind = 'bridge'"),
+    (
+        "partition = { groups = [[0]], kind = 'bridge', bridge = [0] }",
+        "partition.bridge",
+        "agent 0 is named twice",
+    ),
+    ("heal = true", "heal", "no partition to heal"),
+    ("jam = { centre_m = [0, 0, 0], radius_m = -1 }", "jam.radius_m", "above 0"),
+    ("jam = { centre_m = [0, 0], radius_m = 1 }", "jam.centre_m", "a list of 3"),
+    ("jam = { radius_m = 1 }", "jam.centre_m", "is missing"),
+    ("flap = { period_s = 0 }", "flap.period_s", "above 0"),
+    ("flap = { period_s = 1, links = [[0, 9]] }", "flap.links[0]", "no agent 9; 0 to 8"),
+    ("flap = { period_s = 1, links = [[2, 2]] }", "flap.links[0]", "a link to itself"),
+    ("flap = { period_s = 1, links = [[1, 2], [1, 2]] }", "flap.links[1]", "given before"),
+    ("netem = { gemodel = { p_percent = 1 } }", "netem.gemodel.r_percent", "is missing"),
+    ("netem = { duplicate_percent = 101 }", "netem.duplicate_percent", "up to 100"),
+    ("netem = { link = [{ from = 0, to = 9 }] }", "netem.link[0].to", "no agent 9"),
+]
+
+
+@pytest.mark.parametrize(("event", "key", "says"), RADIO, ids=[event for event, _, _ in RADIO])
+def test_what_the_radio_cannot_do_is_refused(event: str, key: str, says: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        timeline(f"at_s = 5, {event}")
+    assert str(caught.value).startswith(f"{WEDGE}: event[0].{key}: ")
+    assert says in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 BROKEN = [

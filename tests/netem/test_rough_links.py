@@ -1,0 +1,177 @@
+"""Links with all that they may have: rates, copies, turned bits, overtaking, bursts, soft edges."""
+
+from math import sqrt
+from random import Random
+
+import pytest
+
+from netem.air import Air
+from netem.chance import SHAPES, WIDEST, correlated
+from netem.link import Cause, LinkModel, Memory, Verdict, edge_m, received, verdict
+from netem.medium import Medium
+from netem.messages import Conditions, DirectedLink, GilbertElliott, MediumSetup, PathLoss
+from netem.near import LARGE, Neighbourhood
+from netem.wire.frame import LOCAL, MULTIHOP, Outgoing, Transmission
+
+EDGE = PathLoss(3.0, 40.0, 70.0)
+
+
+def radio(agents=3, **keys):
+    made = Medium(MediumSetup(1, agents, 4, 80.0, Conditions(**keys)))
+    made.place(((0.0, 0.0, 0.0),) * agents)
+    return made
+
+
+def say(made, sent_s, *payloads, source=0, channel=LOCAL):
+    frames = tuple(Outgoing(channel, payload) for payload in payloads)
+    made.transmit(source, sent_s, Transmission(0, 0, frames))
+
+
+def test_frames_go_out_one_after_the_other_at_the_rate():
+    """1000 bits at 10 kbit/s take 0.1 s each."""
+    made = radio(rate_kbit=10.0, rate_overhead_b=25)
+    say(made, 0.0, *[bytes(100)] * 3)
+    assert [len(made.collect(1, now_s)) for now_s in (0.0999, 0.1001, 0.1999, 0.2001, 0.3001)] == [
+        0,
+        1,
+        0,
+        1,
+        1,
+    ]
+
+
+def test_a_rate_is_the_senders_and_each_channel_has_its_own():
+    made = radio(rate_kbit=10.0)
+    say(made, 0.0, bytes(125))
+    say(made, 0.0, bytes(125), source=1)
+    say(made, 0.0, bytes(125), channel=MULTIHOP)
+    assert len(made.collect(2, 0.1001)) == 3
+
+
+def test_what_finds_the_queue_full_is_dropped_for_all():
+    made = radio(rate_kbit=10.0, limit=2)
+    say(made, 0.0, *[bytes(125)] * 5)
+    assert made.verdicts(0).fates["dropped_queue"] == 3 * 2
+    assert len(made.collect(1, 1.0)) == 2
+    say(made, 0.15, *[bytes(125)] * 5)
+    assert made.verdicts(0).fates["dropped_queue"] == 3 * 2 + 4 * 2
+
+
+def test_a_link_with_a_rate_of_its_own_has_a_queue_of_its_own():
+    made = radio(link=(DirectedLink(source=0, to=1, rate_kbit=10.0, limit=1),))
+    say(made, 0.0, bytes(125), bytes(125))
+    assert len(made.collect(2, 0.0)) == 2
+    assert [len(made.collect(1, now_s)) for now_s in (0.0999, 0.1001, 9.0)] == [0, 1, 0]
+    assert made.verdicts(0).fates["dropped_queue"] == 1
+
+
+def test_an_idle_queue_starts_anew():
+    air = Air()
+    assert air.enter(1.0, 125, 10.0, 9) == pytest.approx(0.1)
+    assert air.enter(1.05, 125, 10.0, 9) == pytest.approx(0.15)
+    assert air.enter(7.0, 125, 10.0, 9) == pytest.approx(0.1)
+
+
+def test_a_duplicate_is_one_more_and_comes_like_the_first():
+    made = radio(duplicate_percent=100.0, delay_ms=10.0)
+    say(made, 0.0, b"a", b"b")
+    assert [frame.payload for frame in made.collect(1, 1.0)] == [b"a", b"a", b"b", b"b"]
+    told = made.verdicts(0)
+    assert (told.sent, told.addressed, told.duplicated) == (2, 8, 4)
+
+
+def test_a_corrupted_frame_has_one_bit_turned_and_is_delivered():
+    made = radio(corrupt_percent=100.0)
+    whole = bytes(range(100))
+    bits = set()
+    for at in range(500):
+        say(made, at * 1.0, whole)
+        (frame,) = made.collect(1, at * 1.0)
+        turned = int.from_bytes(frame.payload, "big") ^ int.from_bytes(whole, "big")
+        assert turned.bit_count() == 1
+        bits.add(turned)
+    assert len(bits) > 300
+    say(made, 600.0, b"")
+    assert made.collect(1, 600.0)[0].payload == b""
+    assert made.verdicts(0).corrupted == 2 * 500
+
+
+def test_what_is_reordered_skips_the_delay():
+    made = radio(delay_ms=100.0, reorder_percent=50.0)
+    say(made, 0.0, *[bytes([at]) for at in range(100)])
+    soon, late = made.collect(1, 0.0), made.collect(1, 0.1)
+    assert 30 < len(soon) < 70
+    assert len(soon) + len(late) == 100
+
+
+def lost(model, steps):
+    memory, link = Memory(), LinkModel(gemodel=model)
+    draws = [(0.9, 0.5, 0.5, 0.9, step, 0.5, 0.9, 0.9) for step in steps]
+    return [verdict(link, 0.0, each, memory).cause is Cause.DROPPED_LOSS for each in draws]
+
+
+def test_bursts_begin_and_end_by_their_own_steps():
+    model = GilbertElliott(10.0, 50.0)
+    assert lost(model, [0.5, 0.05, 0.9, 0.9, 0.4, 0.2]) == [False, False, True, True, True, False]
+
+
+def test_a_good_link_may_lose_and_a_bad_one_may_not():
+    model = GilbertElliott(10.0, 50.0, loss_bad_percent=40.0, loss_good_percent=60.0)
+    assert lost(model, [0.05, 0.9, 0.4, 0.9]) == [True, False, False, True]
+
+
+def test_a_soft_edge_is_half_at_the_budget_and_nothing_beyond_its_reach():
+    assert received(EDGE, 10.0) == pytest.approx(0.5)
+    assert received(EDGE, 0.0) == received(EDGE, 1.0) > 0.999999
+    assert received(EDGE, edge_m(EDGE)) == pytest.approx(1e-9, rel=0.02)
+    assert LinkModel(path_loss=EDGE, range_m=8.0).reach_m == 8.0
+    assert LinkModel(path_loss=EDGE, range_m=800.0).reach_m == edge_m(EDGE)
+    assert edge_m(PathLoss(3.0, 40.0, 1.0)) == 0.0
+
+
+def test_what_the_edge_loses_is_out_of_range():
+    link, draws = LinkModel(path_loss=EDGE), (0.9, 0.5, 0.5001, 0.9, 0.5, 0.5, 0.9, 0.9)
+    assert verdict(link, 10.0, draws) == Verdict(Cause.DROPPED_RANGE)
+    assert verdict(link, 9.9, draws).cause is Cause.DELIVERED
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_shape_rises_within_the_tables_of_netem(shape):
+    values = [SHAPES[shape](at / 1000.0) for at in range(1000)]
+    assert values == sorted(values)
+    assert max(map(abs, values)) <= WIDEST
+
+
+def test_netems_own_tables_agree():
+    """Some entries of iproute2's pareto.dist and paretonormal.dist, in 1/8192."""
+    assert round(8192 * SHAPES["pareto"](0.0)) == -5461
+    assert round(8192 * SHAPES["pareto"](1.0 - 1.0 / 8.0)) == 5461
+    assert SHAPES["pareto"](0.99) == WIDEST
+    assert round(8192 * SHAPES["paretonormal"](0.875)) == round(0.75 * 5461 + 0.25 * 9423.6)
+
+
+def test_correlated_shares_stay_shares():
+    random, last, shares = Random(1), None, []
+    for _ in range(20_000):
+        share, last = correlated(random.random(), last, 0.9)
+        shares.append(share)
+    assert 0.0 <= min(shares) < 0.01
+    assert 0.99 < max(shares) < 1.0
+    assert correlated(0.999, 40.0, 0.9)[0] < 1.0
+    mean = sum(shares) / len(shares)
+    assert abs(mean - 0.5) < 3.29 * sqrt(1.0 / 12.0 * 19.0 / len(shares))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_walking_and_arrays_find_the_same_neighbours(seed):
+    random, radios = Random(seed), LARGE + 20
+    places = [tuple(random.uniform(-3.0, 3.0) for _ in range(3)) for _ in range(radios)]
+    places[random.randrange(radios)] = None
+    few, many = tuple(range(LARGE - 1)), tuple(range(radios))
+    by_hand, by_array = Neighbourhood(radios, few), Neighbourhood(radios, many)
+    for made in (by_hand, by_array):
+        made.place(tuple(places))
+    for source in range(radios):
+        for reach_m in (2.0, float("inf")):
+            near = by_array.of(source, reach_m)
+            assert [each for each in near if each[0] in few] == by_hand.of(source, reach_m)

@@ -1,0 +1,141 @@
+"""Several mediums that share the receivers out decide together what one would."""
+
+from random import Random
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netem.journal import Digest, joined
+from netem.medium import Medium
+from netem.messages import (
+    Conditions,
+    DirectedLink,
+    Flap,
+    Flapped,
+    GilbertElliott,
+    Healed,
+    Jam,
+    Jammed,
+    LinkKeys,
+    MediumSetup,
+    Parted,
+    PathLoss,
+)
+from netem.wire.frame import Outgoing, Transmission
+
+AGENTS = 6
+SLOT_S = 0.0125
+ROUGH = Conditions(
+    range_m=6.0,
+    delay_ms=30.0,
+    jitter_ms=20.0,
+    distribution="paretonormal",
+    delay_correlation_percent=40.0,
+    loss_percent=5.0,
+    gemodel=GilbertElliott(10.0, 30.0),
+    duplicate_percent=10.0,
+    corrupt_percent=10.0,
+    reorder_percent=10.0,
+    path_loss=PathLoss(3.0, 40.0, 55.0),
+    rate_kbit=60.0,
+    rate_overhead_b=20,
+    limit=3,
+    multihop=LinkKeys(rate_kbit=20.0),
+    link=(DirectedLink(source=0, to=1, rate_kbit=5.0), DirectedLink(source=2, to=3, range_m=9.0)),
+)
+LOSSY = Conditions(range_m=4.0, delay_ms=20.0, jitter_ms=10.0, loss_percent=20.0)
+ORDERS = (
+    Parted(((0, 1), (2,)), "one_way"),
+    Jammed(1, Jam((1.0, 1.0, 0.0), 1.5)),
+    Flapped(2, Flap(0.3, 0.1)),
+    Healed(),
+    Jammed(1, None),
+    Flapped(2, None),
+)
+shares = st.lists(st.integers(0, AGENTS - 1), min_size=AGENTS, max_size=AGENTS).map(
+    lambda owner: [[who for who in range(AGENTS) if owner[who] == shard] for shard in set(owner)]
+)
+
+
+def played(mediums, seed, shuffled=None, slots=60):
+    """Play the same conversation on some mediums; yield after each slot what each handed out."""
+    random = Random(seed)
+    for slot in range(slots):
+        places = [tuple(random.uniform(-2.0, 2.0) for _ in range(3)) for _ in range(AGENTS)]
+        if slot % 10 == 7:
+            places[random.randrange(AGENTS)] = None
+        sizes = [[random.randrange(200) for _ in range(random.randrange(4))] for _ in places]
+        order = list(range(AGENTS))
+        if shuffled is not None:
+            shuffled.shuffle(order)
+        for medium in mediums:
+            if slot % 8 == 4:
+                medium.obey(ORDERS[slot // 8 % len(ORDERS)])
+            medium.place(tuple(places))
+            for who in order:
+                said = tuple(Outgoing(at % 2, bytes(size)) for at, size in enumerate(sizes[who]))
+                medium.transmit(who, slot * SLOT_S, Transmission(slot, 0, said))
+        yield (slot + 1) * SLOT_S
+
+
+def setup(conditions=ROUGH, seed=3):
+    return MediumSetup(seed, AGENTS, 4, 1.0 / SLOT_S, conditions)
+
+
+@settings(derandomize=True, deadline=None, max_examples=25)
+@given(shares, st.integers(0, 99), st.sampled_from([ROUGH, LOSSY, Conditions()]))
+def test_shards_have_the_verdicts_the_frames_and_the_digest_of_one_medium(owners, seed, conditions):
+    whole = Medium(setup(conditions))
+    shards = [Medium(setup(conditions), receivers) for receivers in owners]
+    digest = Digest()
+    for now_s in played([whole, *shards], seed):
+        for shard, receivers in zip(shards, owners, strict=True):
+            for who in receivers:
+                assert shard.collect(who, now_s) == whole.collect(who, now_s)
+        digest.take(joined(shard.pages() for shard in shards))
+        assert digest.value == whole.digest()
+    told = whole.verdicts(0)
+    parts = [shard.verdicts(0) for shard in shards]
+    assert all(part.sent == told.sent for part in parts)
+    for name in ("addressed", "in_flight", "duplicated", "corrupted"):
+        assert sum(getattr(part, name) for part in parts) == getattr(told, name)
+    for fate, count in told.fates.items():
+        assert sum(part.fates[fate] for part in parts) == count
+
+
+@settings(derandomize=True, deadline=None, max_examples=25)
+@given(st.integers(0, 99), st.integers(0, 99))
+def test_verdicts_do_not_depend_on_the_order_in_which_agents_speak(seed, shuffle_seed):
+    plain, mixed = Medium(setup()), Medium(setup())
+    heard = []
+    for medium, shuffled in ((plain, None), (mixed, Random(shuffle_seed))):
+        heard.append(
+            [
+                [medium.collect(who, now_s) for who in range(AGENTS)]
+                for now_s in played([medium], seed, shuffled)
+            ]
+        )
+    assert heard[0] == heard[1]
+    one, other = plain.verdicts(0), mixed.verdicts(0)
+    assert (one.fates, one.in_flight, one.duplicated) == (
+        other.fates,
+        other.in_flight,
+        other.duplicated,
+    )
+
+
+@settings(derandomize=True, deadline=None, max_examples=25)
+@given(st.integers(0, 99))
+def test_under_all_conditions_every_frame_has_one_fate_or_is_in_flight(seed):
+    medium, came, books = Medium(setup()), 0, []
+    for now_s in played([medium], seed, slots=100):
+        came += sum(len(medium.collect(who, now_s)) for who in range(AGENTS))
+        told = medium.verdicts(0)
+        books.append(told)
+        assert told.addressed == sum(told.fates.values()) + told.in_flight
+        assert told.addressed == told.sent * (AGENTS - 1) + told.duplicated
+        assert told.fates["delivered"] == came
+    met = {fate for told in books for fate, count in told.fates.items() if count}
+    assert met == set(books[0].fates)
+    assert books[-1].duplicated > 0
+    assert books[-1].corrupted > 0
