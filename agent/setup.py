@@ -20,14 +20,18 @@ class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 class Vehicle(Table, frozen=True):
     """The vehicle's limits and senses.
 
+    kind: "kinematic" takes up any velocity at once; "accelerating" changes it by max_accel_mps2 at
+    most; "forward" flies where it points, climbs and turns, and cannot move sideways or back.
+
     max_turn_deg: theta, half angle of the cast-zone in azimuth; to the left and to the right it may
     differ. max_tilt_deg: how far it can roll and pitch at its slot; 0: it stays level.
     """
 
-    kind: Literal["kinematic"] = "kinematic"
+    kind: Literal["kinematic", "accelerating", "forward"] = "kinematic"
     radius_m: Annotated[float, Meta(gt=0, le=100)] = 0.1
     max_speed_mps: Annotated[float, Meta(gt=0, le=50)] = 0.5
     max_climb_mps: Annotated[float, Meta(gt=0, le=50)] = 0.5
+    max_accel_mps2: Annotated[float, Meta(gt=0, le=100)] = 2.0
     max_yaw_rate_dps: Annotated[float, Meta(gt=0, le=10_000)] = 180.0
     max_turn_deg: Annotated[float, Meta(gt=0, le=90)] = 45.0
     max_turn_left_deg: Annotated[float, Meta(gt=0, le=90)] | None = None

@@ -47,6 +47,7 @@ class RangingFilter:
     d_ob: least distance between centres [m]; max_speed [m/s]; horizon_s: H. share: of the gap, what
     may be closed within H; STATIC for what does not move itself. creep: how fast one may go across
     however near [m/s]: noise puts points nearer than they are, and must not hold one for ever.
+    latency_s: H without the time to brake, which makes the margin; left out: horizon_s.
     """
 
     def __init__(
@@ -56,8 +57,9 @@ class RangingFilter:
         horizon_s: float,
         share: float = SHARE,
         creep: float = 0.0,
+        latency_s: float | None = None,
     ) -> None:
-        reach = max_speed * horizon_s
+        reach = max_speed * (horizon_s if latency_s is None else latency_s)
         self._d_ob = d_ob
         self._stop_m = d_ob + reach * reach / d_ob
         self._turning_hz = max_speed / (self._stop_m - d_ob)
@@ -162,12 +164,12 @@ def shortened(velocity: Vector, max_speed: float) -> Vector:
 def _keeps(velocity: Vector, bound: Bound) -> bool:
     if bound.aside < inf and _across(velocity, bound) > bound.aside + ROUNDING_MPS:
         return False
-    return _approach(velocity, bound) <= bound.limit + ROUNDING_MPS
+    return approach_of(velocity, bound) <= bound.limit + ROUNDING_MPS
 
 
 def _slid(velocity: Vector, bound: Bound) -> Vector:
     """Return a velocity with the parts towards the body and across cut to its limits [m/s]."""
-    n, approach = bound.away, _approach(velocity, bound)
+    n, approach = bound.away, approach_of(velocity, bound)
     kept, share = -min(approach, bound.limit), 1.0
     if bound.aside < inf:
         share = min(1.0, bound.aside / max(_across(velocity, bound), 1e-12))
@@ -181,7 +183,7 @@ def _slid(velocity: Vector, bound: Bound) -> Vector:
 def _kept(velocity: Vector, bounds: Sequence[Bound]) -> Vector:
     scale = 1.0
     for bound in bounds:
-        approach = _approach(velocity, bound)
+        approach = approach_of(velocity, bound)
         if approach * scale > bound.limit + ROUNDING_MPS:
             scale = bound.limit / approach
         across = _across(velocity, bound) if bound.aside < inf else 0.0
@@ -192,13 +194,14 @@ def _kept(velocity: Vector, bounds: Sequence[Bound]) -> Vector:
 
 def _across(velocity: Vector, bound: Bound) -> float:
     """Return the speed across the line to the body [m/s]."""
-    n, approach = bound.away, _approach(velocity, bound)
+    n, approach = bound.away, approach_of(velocity, bound)
     return hypot(
         velocity[0] + approach * n[0], velocity[1] + approach * n[1], velocity[2] + approach * n[2]
     )
 
 
-def _approach(velocity: Vector, bound: Bound) -> float:
+def approach_of(velocity: Vector, bound: Bound) -> float:
+    """Return the speed towards a body [m/s]."""
     n = bound.away
     return -(velocity[0] * n[0] + velocity[1] * n[1] + velocity[2] * n[2])
 

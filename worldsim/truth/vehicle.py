@@ -4,7 +4,7 @@ Only + - * / sqrt and rounding cross rows here, so that a trace is the same in e
 """
 
 from collections.abc import Sequence
-from math import sqrt
+from math import cos, isnan, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ def wrapped(angle: Floats) -> Floats:
 
 
 class Fleet:
-    """Kinematic vehicles: they take up any velocity at once, within speed, climb and yaw rate.
+    """Vehicles of all kinds, within speed, climb, yaw rate and acceleration.
 
     position (N, 3) [m], velocity (N, 3) [m/s], yaw (N,) [rad], tilt (N, 2): pitch and roll [rad]; a
     row of NaN is not in the world.
@@ -35,6 +35,11 @@ class Fleet:
         self.tilt = np.zeros((len(yaw), 2))
         self._max_tilt = np.radians([[each.max_tilt_deg] for each in limits])
         self._tilts = bool(self._max_tilt.any())
+        self._max_change = np.array(
+            [[each.max_accel_mps2 if each.kind == "accelerating" else np.inf] for each in limits]
+        )
+        self._forward = [row for row, each in enumerate(limits) if each.kind == "forward"]
+        self._accelerates = bool(np.isfinite(self._max_change).any())
         self._max_speed = [each.max_speed_mps for each in limits]
         self._max_climb = [each.max_climb_mps for each in limits]
         self._max_yaw_rate = np.radians([each.max_yaw_rate_dps for each in limits])
@@ -57,7 +62,12 @@ class Fleet:
 
         The velocities are within the vehicles' limits.
         """
-        self.velocity = velocity.copy()
+        velocity = velocity.copy()
+        for row in self._forward:
+            velocity[row] = self._along(row, velocity[row])
+        if self._accelerates:
+            velocity = self._changed(velocity, dt)
+        self.velocity = velocity
         self.position = self.position + velocity * dt
         reach = self._max_yaw_rate * dt
         turn = np.minimum(np.maximum(wrapped(yaw - self.yaw), -reach), reach)
@@ -71,6 +81,26 @@ class Fleet:
         speed = self._max_speed[row] / max(sqrt(x * x + y * y + z * z), 1e-12)
         scale = min(1.0, speed, self._max_climb[row] / max(abs(z), 1e-12))
         return x * scale, y * scale, z * scale
+
+    def _along(self, row: int, velocity: Floats) -> Vector:
+        """Return what of a velocity [m/s] a vehicle flies that moves only where it points."""
+        x, y, z = velocity.tolist()
+        yaw = float(self.yaw[row])
+        c, s = (0.0, 0.0) if isnan(yaw) else (cos(yaw), sin(yaw))
+        forward = max(0.0, c * x + s * y)
+        return c * forward, s * forward, z
+
+    def _changed(self, velocity: Floats, dt: float) -> Floats:
+        """Return velocities [m/s] after ``dt`` on the straight way to those asked for."""
+        change = velocity - self.velocity
+        size = np.sqrt(
+            change[:, :1] * change[:, :1]
+            + change[:, 1:2] * change[:, 1:2]
+            + change[:, 2:] * change[:, 2:]
+        )
+        share = np.minimum(1.0, self._max_change * dt / np.maximum(size, 1e-12))
+        # A share of one would bring rounding to vehicles that take up any velocity at once.
+        return np.where(share < 1.0, self.velocity + share * change, velocity)
 
     def _tilt_towards(self, tilt: Floats, reach: Floats) -> None:
         tilt = np.minimum(np.maximum(tilt, -self._max_tilt), self._max_tilt)

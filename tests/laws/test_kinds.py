@@ -1,0 +1,80 @@
+"""Every kind of vehicle keeps its distance from every other, and from what stands."""
+
+from math import cos, hypot, pi, sin
+from random import Random
+
+import pytest
+
+from agent.guidance import guard
+from agent.guidance.forward import forward_kept
+from agent.guidance.safety import Bound, approach_of
+from agent.setup import Vehicle
+from tests.laws.kinds import Craft, anything, least_distance, straight
+
+D_OB, CLEARANCE = 0.25, 0.5
+
+
+def craft(kind, ticks=1, speed=0.5, **more):
+    return Craft(Vehicle(kind=kind, max_speed_mps=speed, max_climb_mps=speed, **more), ticks)
+
+
+CRAFTS = {
+    "kinematic": craft("kinematic", 2),
+    "forward": craft("forward", 1),
+    "forward, late": craft("forward", 2, 1.0),
+    "slow to brake": craft("accelerating", 1, 0.5, max_accel_mps2=1.0),
+    "slow to brake, late": craft("accelerating", 2, 1.0, max_accel_mps2=2.0),
+    "fast": craft("accelerating", 1, 2.0, max_accel_mps2=2.0),
+}
+FLEETS = [
+    *[(name, name) for name in CRAFTS],
+    ("kinematic", "forward, late"),
+    ("kinematic", "slow to brake"),
+    ("forward", "slow to brake"),
+]
+
+
+@pytest.mark.parametrize("names", FLEETS, ids=str)
+def test_no_two_come_nearer_than_d_ob(names):
+    crafts = [CRAFTS[name] for name in names]
+    flown = [least_distance(Random(seed), crafts) for seed in range(120)]
+    assert min(least for _, least in flown) >= D_OB - 1e-9
+    assert min(least for began, least in flown if began > 0.5) < 0.45
+
+
+@pytest.mark.parametrize("name", CRAFTS)
+def test_nobody_comes_nearer_to_what_stands_than_its_clearance(name):
+    crafts = [CRAFTS[name], CRAFTS["kinematic"]]
+    flown = [least_distance(Random(seed), crafts, standing=True) for seed in range(120)]
+    assert min(least for _, least in flown) >= CLEARANCE - 1e-9
+    assert min(least for began, least in flown if began > 0.75) < 0.7
+
+
+def test_without_reckoning_the_brakes_they_collide(monkeypatch):
+    monkeypatch.setattr(guard.Guard, "_stopping_s", lambda self, speed: 0.0)
+    crafts = [CRAFTS["fast"]] * 2
+    assert min(least_distance(Random(seed), crafts)[1] for seed in range(60)) < D_OB - 0.01
+
+
+def test_a_way_ahead_keeps_its_bounds_wherever_it_may_turn():
+    random = Random(7)
+    for _ in range(2000):
+        yaw, sway = random.uniform(-pi, pi), random.uniform(0.0, 0.5)
+        x, y, z = straight(random, tuple(random.gauss(0, 1) for _ in range(3)), 0)
+        bound = Bound((x, y, z), random.uniform(0.0, 0.3))
+        u, v, w = forward_kept(anything(random, None, 0), [bound], yaw, sway)
+        forward = hypot(u, v)
+        for turn in (-sway, -0.4 * sway, 0.0, 0.7 * sway, sway):
+            there = (forward * cos(yaw + turn), forward * sin(yaw + turn), w)
+            assert approach_of(there, bound) <= bound.limit + 1e-9
+
+
+def test_a_way_ahead_is_only_shortened():
+    random = Random(8)
+    for _ in range(500):
+        yaw = random.uniform(-pi, pi)
+        wanted = anything(random, None, 0)
+        u, v, w = forward_kept(wanted, [Bound((1.0, 0.0, 0.0), 0.1)], yaw, 0.2)
+        assert hypot(u, v, w) <= 1.0 + 1e-9
+        assert abs(cos(yaw) * v - sin(yaw) * u) <= 1e-12
+        assert cos(yaw) * u + sin(yaw) * v >= 0.0
