@@ -1,6 +1,7 @@
 """The world by hand: ``python -m worldsim SCENARIO --connect tcp/127.0.0.1:7447 --out DIR``."""
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
@@ -8,8 +9,10 @@ from netem.wire.keys import Keys
 from worldsim.run.admission import PROCESS_COMMAND_TICKS, admit
 from worldsim.run.outside import ByHand
 from worldsim.run.process import Terms, run
+from worldsim.run.roster import Roster
 from worldsim.run.rundir import RunDirectory
 from worldsim.scenario.file import load
+from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
 
 MAX_SPEED = 1000.0
@@ -60,10 +63,19 @@ def main(arguments: list[str] | None = None) -> int:
     return run(
         options.connect,
         scenario,
-        lambda: RunDirectory.create(options.out, scenario),
+        lambda: _directory(options, scenario),
         Terms(options.run or scenario.name, options.speed, not options.no_recording),
         lambda muster: ByHand(muster.gone),
     )
+
+
+def _directory(options: argparse.Namespace, scenario: Scenario) -> RunDirectory:
+    """Make the run's folder, with the endpoint in it. Raises RunDirectoryError."""
+    directory = RunDirectory.create(options.out, scenario)
+    roster = Roster(directory.path, options.run or scenario.name, options.connect)
+    roster.add("world", os.getpid())
+    roster.write()
+    return directory
 
 
 def _run_name(text: str) -> str:

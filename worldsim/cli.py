@@ -1,4 +1,4 @@
-"""The command line: qswarm run | sim | new | check | netem | verify | view | ps.
+"""The command line: qswarm run | sim | new | check | netem | fault | mission | verify | view | ps.
 
 Commands check everything before they start anything. Bad input is one line on stderr and exit
 status 2; what a command needs is imported inside it, so that --help and check stay quick.
@@ -16,6 +16,7 @@ import typer
 from typer.main import get_command
 
 from worldsim.netem_cli import netem
+from worldsim.operating import attach
 from worldsim.options import (
     Agents,
     Duration,
@@ -28,6 +29,7 @@ from worldsim.options import (
     Schema,
     Seed,
     Settings,
+    examples,
     overrides_of,
     seeds_of,
 )
@@ -38,15 +40,11 @@ if TYPE_CHECKING:
 HELD, NOT_HELD, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
-def _examples(*lines: str) -> str:
-    return "\n".join(("\b", "Examples:", *(f"  {line}" for line in lines)))
-
-
 app = typer.Typer(
     name="qswarm",
     help="Chaos testing for swarm controllers: a fleet of real processes or the same fleet in"
     " virtual time, an emulated radio between the agents, and a verdict.",
-    epilog=_examples(
+    epilog=examples(
         "qswarm run deploy/scenarios/wedge-9.toml",
         "qswarm sim deploy/scenarios/wedge-9.toml --seeds 0:20",
         "qswarm COMMAND --help",
@@ -60,7 +58,7 @@ app = typer.Typer(
 
 
 @app.command(
-    epilog=_examples(
+    epilog=examples(
         "qswarm run deploy/scenarios/wedge-9.toml",
         "qswarm run deploy/scenarios/wedge-9.toml --seed 7 --set netem.loss_percent=50",
         "qswarm run deploy/scenarios/wedge-9.toml --agents 20 --duration 40 --speed 2",
@@ -94,7 +92,7 @@ def run(
 
 
 @app.command(
-    epilog=_examples(
+    epilog=examples(
         "qswarm sim deploy/scenarios/wedge-9.toml",
         "qswarm sim deploy/scenarios/wedge-9.toml --seeds 0:20 --jobs 2 --out runs/twenty",
         "qswarm sim deploy/scenarios/wedge-9.toml --set netem.delay_ms=200 --no-recording",
@@ -133,7 +131,7 @@ def sim(
     return fly_many(flown, out, not no_recording, jobs or len(os.sched_getaffinity(0)))
 
 
-@app.command(epilog=_examples("qswarm new my-wedge", "qswarm sim my-wedge.toml"))
+@app.command(epilog=examples("qswarm new my-wedge", "qswarm sim my-wedge.toml"))
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="The scenario's name.")],
 ) -> int:
@@ -146,7 +144,7 @@ def new(
 
 
 @app.command(
-    epilog=_examples(
+    epilog=examples(
         "qswarm check deploy/scenarios/wedge-9.toml",
         "qswarm check my.toml --agents 50 --set fleet.tick_hz=40 > resolved.toml",
         "qswarm check --schema > scenario.schema.json",
@@ -176,7 +174,7 @@ def check(
     return HELD
 
 
-@app.command(epilog=_examples("qswarm verify runs/wedge-9-20260102T030405Z"))
+@app.command(epilog=examples("qswarm verify runs/wedge-9-20260102T030405Z"))
 def verify(run: RunFolder) -> int:
     """Judge a run again from its recording alone, and compare with its summary."""
     from worldsim.show.telling import verified
@@ -191,7 +189,7 @@ def verify(run: RunFolder) -> int:
 
 
 @app.command(
-    epilog=_examples("qswarm view runs/wedge-9-20260102T030405Z", "qswarm view runs/twenty --web")
+    epilog=examples("qswarm view runs/wedge-9-20260102T030405Z", "qswarm view runs/twenty --web")
 )
 def view(
     runs: Annotated[
@@ -210,14 +208,19 @@ def view(
 
 
 app.command(
-    epilog=_examples(
+    epilog=examples(
         "qswarm netem check deploy/scenarios/bursty-9.toml",
         "qswarm netem check my.toml --set netem.loss_percent=50 --plot radio.png",
+        "qswarm netem runs/mine set loss_percent=50 multihop.delay_ms=200 --for 10",
+        "qswarm netem runs/mine partition 0,1/2,3",
+        "qswarm netem runs/mine partition groups=[[0,1]] kind=one_way --for 5",
+        "qswarm netem runs/mine jam centre_m=[0,0,0] radius_m=2",
+        "qswarm netem runs/mine show",
     )
 )(netem)
 
 
-@app.command(epilog=_examples("qswarm ps runs/wedge-9-20260102T030405Z"))
+@app.command(epilog=examples("qswarm ps runs/wedge-9-20260102T030405Z"))
 def ps(run: RunFolder) -> int:
     """List the processes of a fleet: name, pid, and whether it is alive."""
     from worldsim.run.fleet import processes
@@ -225,6 +228,9 @@ def ps(run: RunFolder) -> int:
     for name, pid, alive in processes(run):
         print(f"{name:12} {pid:>8}  {'alive' if alive else 'gone'}")
     return HELD
+
+
+attach(app)
 
 
 def main() -> None:
@@ -237,13 +243,14 @@ def main() -> None:
 def command(arguments: list[str]) -> int:
     """Run one command line; return its exit status. Bad input is told in one line."""
     from agent.pilot import FaultyControllerError
+    from worldsim.run.roster import OperatorError
     from worldsim.run.rundir import RunDirectoryError, RunWriteError
     from worldsim.scenario.toml import ScenarioError
     from worldsim.show.viewer import ViewerError
 
     try:
         status = get_command(app)(arguments, prog_name="qswarm", standalone_mode=False)
-    except (ScenarioError, RunDirectoryError, ViewerError) as error:
+    except (ScenarioError, RunDirectoryError, ViewerError, OperatorError) as error:
         _say(str(error))
         return NOT_HELD if isinstance(error, RunWriteError) else BAD_INPUT
     except typer.TyperException as error:

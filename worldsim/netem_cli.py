@@ -1,4 +1,4 @@
-"""The command about the radio: qswarm netem check SCENARIO."""
+"""The command about the radio: qswarm netem check SCENARIO, and netem RUN for a running fleet."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -6,21 +6,41 @@ from typing import Annotated
 
 import typer
 
+from worldsim.operating import ForSeconds, radio
 from worldsim.options import Seed, Settings, overrides_of
 
-Words = Annotated[list[str], typer.Argument(metavar="check SCENARIO", help="What to do.")]
+Words = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="(check SCENARIO | RUN VERB [WORD]...)",
+        help="VERB: show, set, partition, heal, jam or flap; WORD: KEY=VALUE.",
+    ),
+]
 Plot = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Where the picture goes. [runs/SCENARIO-netem-TIME.png]"),
 ]
 
 
-def netem(words: Words, seed: Seed = None, settings: Settings = None, plot: Plot = None) -> int:
-    """Try a scenario's radio: 100 000 packets a link, configured against measured; a picture."""
+def netem(
+    words: Words,
+    seed: Seed = None,
+    settings: Settings = None,
+    plot: Plot = None,
+    for_s: ForSeconds = None,
+) -> int:
+    """Try a scenario's radio, or change that of a running fleet.
+
+    check: 100 000 packets a link, configured against measured; a picture.
+    """
     match words:
         case ["check", scenario]:
             return _check(Path(scenario), overrides_of(settings, None, seed, None), plot)
-    raise typer.BadParameter(f"{' '.join(words)!r}; check SCENARIO", param_hint="netem")
+        case [run, verb, *rest]:
+            return radio(Path(run), verb, rest, for_s)
+    raise typer.BadParameter(
+        f"{' '.join(words)!r}; check SCENARIO, or RUN and a verb", param_hint="netem"
+    )
 
 
 def _check(file: Path, overrides: dict[str, str], plot: Path | None) -> int:

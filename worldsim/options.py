@@ -9,6 +9,11 @@ import typer
 MAX_RUNS = 1_000_000
 
 
+def examples(*lines: str) -> str:
+    """Return examples as the end of a command's help."""
+    return "\n".join(("\b", "Examples:", *(f"  {line}" for line in lines)))
+
+
 def _print_gallery(wanted: bool) -> None:
     if wanted:
         from worldsim.scenario.gallery import gallery

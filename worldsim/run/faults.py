@@ -4,6 +4,7 @@ An action says what shall happen; whom it strikes is found when it happens (``te
 deed that a clock carries out.
 """
 
+from bisect import insort
 from math import inf
 from typing import NamedTuple
 
@@ -147,7 +148,10 @@ Action = Strike | Revival | Holding | Joining | UponRadio | Order
 
 
 class Timeline:
-    """A scenario's events in order of their times; ``next_s``: when the next is due [s]."""
+    """A scenario's events in order of their times, and an operator's as they come.
+
+    formation, frame: those that the last mission asked for.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         self._steps = steps(scenario)
@@ -156,13 +160,43 @@ class Timeline:
         self._conditions = scenario.netem
         self._changes: dict[int, Conditions] = {}
         self._parted_by: int | None = None
-        self._formation = scenario.formation
-        self._frame = scenario.frame
+        self._number = len(scenario.event)
+        self.formation = scenario.formation
+        self.frame = scenario.frame
 
     @property
     def next_s(self) -> float:
         """When the next action is due [s]; infinite after the last."""
         return self._steps[self._next].at_s if self._next < len(self._steps) else inf
+
+    @property
+    def conditions(self) -> Conditions:
+        """The radio's conditions: the scenario's, under all changes in force."""
+        conditions = self._conditions
+        for held in self._changes.values():
+            conditions = overlaid(conditions, held)
+        return conditions
+
+    @property
+    def parted(self) -> bool:
+        """Whether a partition is in force."""
+        return self._parted_by is not None
+
+    @property
+    def joiners(self) -> int:
+        """How many are still to join by the events to come."""
+        return sum(step.event.joiners for step in self._steps[self._next :] if not step.undo)
+
+    def sudden(self, event: EventTable) -> Action | None:
+        """Return the action of an event that happens now, at its ``at_s``."""
+        self._number += 1
+        return self._action(Step(event.at_s, self._number, event, False))
+
+    def undo_later(self, event: EventTable) -> None:
+        """Let the last sudden event be undone after its ``for_s``, if it has one."""
+        if event.for_s is not None:
+            step = Step(event.at_s + event.for_s, self._number, event, True)
+            insort(self._steps, step, lo=self._next, key=lambda each: each.at_s)
 
     def due(self, time_s: float) -> list[Action]:
         """Return what is due by a time [s] and was not returned before, in order."""
@@ -194,10 +228,7 @@ class Timeline:
             del self._changes[step.number]
         else:
             self._changes[step.number] = change
-        conditions = self._conditions
-        for held in self._changes.values():
-            conditions = overlaid(conditions, held)
-        return Change(conditions, change, step.undo)
+        return Change(self.conditions, change, step.undo)
 
     def _partition(self, step: Step) -> Partition | Heal | None:
         """Let a partition take the place of the one before; only its own end heals it."""
@@ -212,10 +243,10 @@ class Timeline:
 
     def _order(self, event: EventTable) -> Order:
         if event.formation is not None:
-            self._formation = event.formation
+            self.formation = event.formation
         if event.frame is not None:
-            self._frame = changed(self._frame, event.frame, event.at_s)
-        return Order(event.kind, self._formation, path_of(self._frame))
+            self.frame = changed(self.frame, event.frame, event.at_s)
+        return Order(event.kind, self.formation, path_of(self.frame))
 
 
 def _barrier(step: Step) -> Jamming | Flapping:

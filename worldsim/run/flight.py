@@ -17,6 +17,7 @@ from netem.wire.post import Post
 from worldsim.judge.phase import CONVERGED_M
 from worldsim.judge.tick import Packets
 from worldsim.run.admission import PROCESS_COMMAND_TICKS
+from worldsim.run.control import Control, Reception
 from worldsim.run.hands import Hands
 from worldsim.run.muster import Muster
 from worldsim.run.outside import Loss, Outside, Progress
@@ -56,6 +57,7 @@ class Flight:
         self._outside = outside
         self._muster = muster
         self._hands = Hands(post, muster, outside)
+        self._reception = Reception(post, Control(scenario, self.loop, outside.launches))
         self.begun = self._landed = False
         self._unreadable = 0
         self._pacer = Pacer(1.0 / (scenario.slot_hz * speed))
@@ -106,6 +108,7 @@ class Flight:
         self._muster.instruct_agents()
         for deed in self.loop.due():
             self._do(deed)
+        self._reception.attend(lambda deed: self._do(deed, by="operator"))
         self._send(self.loop.open())
         self._strike_out()
         while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not unwanted():
@@ -119,10 +122,10 @@ class Flight:
         self.loop.close(b"")
         self._say_progress()
 
-    def _do(self, deed: Deed) -> None:
+    def _do(self, deed: Deed, **signed: str) -> None:
         """Carry out what happens between slots, and let it count at once."""
         late = self._hands.do(deed, self.loop.world.slot, self.loop.team.incarnations)
-        self.loop.take(deed)
+        self.loop.take(deed, **signed)
         if isinstance(deed, Stop | Hold | Begin):
             self.punctuality.forget(deed.agents)
         for agent in late:

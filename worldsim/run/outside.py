@@ -49,6 +49,9 @@ class Progress(NamedTuple):
 class Outside(Protocol):
     """What a flight needs of whoever started it."""
 
+    launches: bool
+    """Whether processes can be started and ended."""
+
     @property
     def stopped(self) -> str | None:
         """Why the flight must end now, or None."""
@@ -74,6 +77,8 @@ class Outside(Protocol):
 
 class Conducted:
     """Under a launcher, at the other end of ``lines``."""
+
+    launches = True
 
     def __init__(self, lines: Lines) -> None:
         self._lines = lines
@@ -111,6 +116,8 @@ class Conducted:
 
 class ByHand:
     """Without a launcher; ``gone`` tells which names stopped showing signs of life."""
+
+    launches = False
 
     def __init__(self, gone: Callable[[], list[str]]) -> None:
         self.stopped: str | None = None

@@ -9,6 +9,10 @@ from worldsim.run.rundir import RunDirectoryError, write_json
 FILE = "fleet.json"
 
 
+class OperatorError(Exception):
+    """A request to a fleet that came to nothing; one line that says why."""
+
+
 class ProcessRow(NamedTuple):
     """One process of a fleet; not ``alive`` when it ended, whoever has its pid now."""
 
@@ -38,16 +42,30 @@ class Roster:
         write_json(self._path, {**self._content, "processes": rows})
 
 
-def processes(run: Path) -> list[ProcessRow]:
-    """Return the processes of the run in a folder, or raise RunDirectoryError."""
+class Fleet(NamedTuple):
+    """A fleet as fleet.json tells of it: the run's name, its router, its processes."""
+
+    run: str
+    endpoint: str
+    processes: list[ProcessRow]
+
+
+def fleet_of(run: Path) -> Fleet:
+    """Return the fleet of the run in a folder, or raise RunDirectoryError."""
     path = run / FILE
     try:
-        rows = json.loads(path.read_text(encoding="utf-8"))["processes"]
-        return [ProcessRow(row["name"], row["pid"], _alive(row)) for row in rows]
+        told = json.loads(path.read_text(encoding="utf-8"))
+        rows = [ProcessRow(row["name"], row["pid"], _alive(row)) for row in told["processes"]]
+        return Fleet(str(told["run"]), str(told["endpoint"]), rows)
     except OSError as error:
         raise RunDirectoryError(run, f"no {FILE} in it: no run of processes") from error
     except (ValueError, KeyError, TypeError) as error:
         raise RunDirectoryError(path, "cannot be read as a fleet's list of processes") from error
+
+
+def processes(run: Path) -> list[ProcessRow]:
+    """Return the processes of the run in a folder, or raise RunDirectoryError."""
+    return fleet_of(run).processes
 
 
 def _alive(row: dict[str, int]) -> bool:

@@ -71,7 +71,7 @@ class VirtualFleet:
     def slot(self) -> None:
         """Run one slot: what is due before it, truth, batches, steps, verdicts, flight."""
         for deed in self.loop.due():
-            self._do(deed)
+            self.do(deed)
             self.loop.take(deed)
         opened = self.loop.open()
         self._medium.place(opened.positions)
@@ -80,7 +80,7 @@ class VirtualFleet:
         self._deliver(opened.slot + 1)
         self.loop.close(self._medium.digest())
 
-    def _do(self, deed: Deed) -> None:
+    def do(self, deed: Deed) -> None:
         """Carry out what happens between slots."""
         match deed:
             case Stop(agents=agents):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from agent.codec import encode_formation
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from worldsim.scenario.events import ACTIONS, UNDONE, EventTable
-from worldsim.scenario.frame import broken_key, changed
+from worldsim.scenario.frame import FrameTable, broken_key, changed
 from worldsim.scenario.radio import flap_faults, partition_faults
 from worldsim.scenario.rules import TARGET_FLOOR_M, Finding, tilts_where_asked
 from worldsim.scenario.starting import BoxStart, ListStart
@@ -23,6 +23,8 @@ MAX_ORDER_B = 3000
 """What a Mission may hold of a formation [bytes]."""
 COME_BACK = frozenset({"restart", "resume"})
 """Who comes back holds no place by which to be found."""
+NOBODY = -1
+"""By whom a partition is whose event is not known."""
 _SELECTOR = re.compile(r"all|random:[1-9]\d{0,3}|(vertex|queue):(.+)", re.DOTALL)
 
 
@@ -76,6 +78,34 @@ def check_course(scenario: Scenario, file: Path, whose: dict[int, Whose]) -> Non
         course.take(step)
 
 
+class Present(NamedTuple):
+    """The fleet that an event meets which nobody foresaw.
+
+    known: how many ids are given; living: who steps; room: for how many more there are rows.
+    """
+
+    formation: FormationSpec
+    frame: FrameTable
+    parted: bool
+    known: int
+    living: frozenset[int]
+    room: int
+
+
+def broken_now(scenario: Scenario, event: EventTable, present: Present) -> Finding | None:
+    """Return what is wrong with an event that happens now, or None."""
+    broken = _one_action(event)
+    if broken is not None:
+        return broken
+    if event.joiners > present.room:
+        return Finding("join", f"{event.joiners}; fleet.spare leaves room for {present.room}")
+    course = _Course(scenario, present)
+    try:
+        return next(course.findings(Step(event.at_s, 0, event, False)), None)
+    except FormationError as error:
+        return Finding(f"formation.{error.key}", error.detail)
+
+
 def _error(file: Path, index: int, broken: Finding) -> ScenarioError:
     key = f"event[{index}].{broken.key}" if broken.key else f"event[{index}]"
     return ScenarioError(file, key, broken.detail)
@@ -103,15 +133,19 @@ def _in_time(scenario: Scenario, event: EventTable) -> Finding | None:
 class _Course:
     """The fleet as it will be: who is there, in which formation, parted or not."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, present: Present | None = None) -> None:
+        agents = scenario.fleet.agents
+        now = present or Present(
+            scenario.formation, scenario.frame, False, agents, frozenset(range(agents)), 0
+        )
         self._scenario = scenario
-        self._spec = scenario.formation
-        self._frame = scenario.frame
-        self._formation = self._made(scenario.formation)
-        self._known = scenario.fleet.agents
-        self._living = set(range(self._known))
+        self._spec = now.formation
+        self._frame = now.frame
+        self._formation = self._made(now.formation)
+        self._known = now.known
+        self._living = set(now.living)
         self._fewer = 0
-        self._parted_by: int | None = None
+        self._parted_by = NOBODY if now.parted else None
 
     def findings(self, step: Step) -> Iterator[Finding]:
         """Return what is wrong with a step. Raises FormationError."""

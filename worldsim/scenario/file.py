@@ -52,8 +52,19 @@ def parse(
 
 def dump(scenario: Scenario) -> str:
     """Return a scenario as TOML with every default filled in; ``parse`` gives it back, equal."""
-    text = tomli_w.dumps(_without_none(msgspec.to_builtins(scenario)))
-    return _PLAIN_ARRAY.sub(_on_one_line, text)
+    return as_toml(msgspec.to_builtins(scenario))
+
+
+def as_toml(plain: Data) -> str:
+    """Return plain tables as people write them; what is None is left out."""
+    return _PLAIN_ARRAY.sub(_on_one_line, tomli_w.dumps(_without_none(plain)))
+
+
+def formation_tables(path: Path) -> Data:
+    """Return the tables of a formation's file. Raises ScenarioError."""
+    formation = tables(read(path), path)
+    decode(formation, FormationSpec, path)
+    return formation
 
 
 def _place_formation(data: Data, file: Path) -> Whose:
@@ -88,9 +99,7 @@ def _formation_file(file: Path, key: str, named: str) -> tuple[Path, Data]:
     path = file.parent / named
     if "\0" in named or not path.is_file():
         raise ScenarioError(file, key, f"no such file: {path}")
-    formation = tables(read(path), path)
-    decode(formation, FormationSpec, path)
-    return path, formation
+    return path, formation_tables(path)
 
 
 def _with_field(scenario: Scenario, file: str | Path) -> Scenario:

@@ -36,13 +36,15 @@ RunName = Annotated[
 class Fleet(Table, frozen=True):
     """How many agents, how fast they think, and where they start.
 
-    boot_s: simulated time from a restart or a join to the agent's first step.
+    boot_s: simulated time from a restart or a join to the agent's first step. spare: how many may
+    join besides the timeline's, told by ``qswarm fault RUN join``.
     """
 
     agents: Annotated[int, Meta(ge=1, le=MAX_AGENTS)]
     tick_hz: Hertz = 20.0
     start: BoxStart | ListStart = BoxStart()
     boot_s: Annotated[float, Meta(ge=0, le=3600)] = 1.0
+    spare: Annotated[int, Meta(ge=0, le=MAX_AGENTS)] = 0
 
 
 def _optional(table: type[Table]) -> list[tuple[str, Any, None]]:
@@ -121,8 +123,9 @@ class Scenario(Table, frozen=True, omit_defaults=False):
 
     @property
     def rows(self) -> int:
-        """How many agents there are in all: those at the start, and all that join."""
-        return self.fleet.agents + sum(event.joiners for event in self.event)
+        """How many agents there may be in all: those at the start, and all that join."""
+        joiners = sum(event.joiners for event in self.event)
+        return self.fleet.agents + joiners + self.fleet.spare
 
     def vehicle_of(self, agent: int) -> Vehicle:
         """Return one agent's vehicle: [vehicle], with what [[agent]] says differs."""

@@ -1,0 +1,56 @@
+"""An operator at a running fleet: missions, faults and the radio by command."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.processes.harness import QSWARM, Started, events_of, eventually
+
+pytestmark = pytest.mark.processes
+
+Start = Callable[..., Started]
+COLUMN = """
+name = "column"
+vertices = { V1 = [0, 0, 1] }
+queue = [{ name = "Q1", vertices = ["V1"], shape = { kind = "ray", direction = [0, 0, 1] } }]
+"""
+
+
+def test_a_flying_fleet_does_what_it_is_told_and_refuses_what_cannot_be(
+    start: Start, scenario: Callable[[float], str], tmp_path: Path
+) -> None:
+    run = tmp_path / "run"
+    (tmp_path / "column.toml").write_text(COLUMN)
+    options = ("--out", str(run), "--no-recording", "--speed", "2")
+    fleet = start(*QSWARM, "run", scenario(40.0), *options)
+    fleet.says("in place 4/4")
+
+    def told(*words: str) -> tuple[int, str]:
+        command, *rest = words
+        operator = start(*QSWARM, command, str(run), *rest)
+        return operator.status(15.0), operator.text
+
+    assert told("fault", "kill", "7") == (
+        2,
+        f"{run}: refused: kill[0]: no agent 7; 0 to 3 by then\n",
+    )
+    assert told("netem", "set", "loss_percent=101")[0] == 2
+    assert told("netem", "set", "loss_percent=20", "--for", "2")[0] == 0
+    status, said = told("mission", "column.toml", "--to", "2")
+    assert (status, "formation agent 2: formation column" in said) == (0, True)
+    assert told("fault", "kill", "3", "--for", "1")[0] == 0
+    assert "range_m = 6" in told("netem", "show")[1]
+
+    def converged() -> bool:
+        back = any(event["kind"] == "restart" for event in events_of(run))
+        return back and fleet.text.rstrip().splitlines()[-1].count("in place 4/4") == 1
+
+    eventually(converged, 25.0, lambda: fleet.text)
+    assert fleet.status(50.0) in (0, 1), fleet.text
+    phases = json.loads((run / "summary.json").read_text())["phases"]
+    assert [phase["formation"] for phase in phases] == ["line", "column"]
+    assert phases[1]["residual_m"] < 0.12
+    by_operator = [e["kind"] for e in events_of(run) if e.get("by") == "operator"]
+    assert by_operator == ["netem", "formation", "kill"]
