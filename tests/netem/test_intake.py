@@ -1,0 +1,64 @@
+"""What the medium's process lets in: anything may come, and what is refused has a cause."""
+
+from collections import Counter
+from random import Random
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netem.messages import Conditions, MediumSetup
+from netem.process import Intake
+from netem.wire.frame import (
+    MAX_OUTGOING,
+    MAX_PAYLOAD_B,
+    MAX_TRANSMISSION_B,
+    Outgoing,
+    Transmission,
+    pack,
+)
+
+CAUSES = {"oversize", "malformed", "ahead", "stale", "repeated"}
+
+
+def intake():
+    return Intake(MediumSetup(1, 3, 4, 80.0, Conditions()))
+
+
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(st.lists(st.tuples(st.integers(0, 2), st.binary(max_size=60)), max_size=20))
+def test_junk_is_refused_and_counted(junk):
+    desk = intake()
+    taken = [desk.take(sender, data, 40) for sender, data in junk]
+    assert sum(each is None for each in taken) == desk.rejected.total()
+    assert set(desk.rejected) <= CAUSES
+
+
+def test_mutated_transmissions_are_refused_or_keep_every_limit():
+    random, refused = Random(5), Counter()
+    for slot in range(5_000):
+        said = tuple(Outgoing(at % 2, random.randbytes(30)) for at in range(3))
+        data = bytearray(pack(Transmission(slot, 0, said)))
+        for _ in range(random.randrange(3)):
+            data[random.randrange(len(data))] = random.randrange(256)
+        desk = intake()
+        taken = desk.take(slot % 3, bytes(data), slot)
+        refused.update(desk.rejected)
+        if taken is not None:
+            assert slot - 4 <= taken.slot <= slot
+            assert all(each.channel in (0, 1) for each in taken.frames)
+            assert all(len(each.payload) <= MAX_PAYLOAD_B for each in taken.frames)
+    assert 500 < refused.total() < 4_500
+    assert {"malformed", "ahead", "stale"} <= set(refused) <= CAUSES
+
+
+def test_what_is_too_much_is_refused_before_it_is_read():
+    desk = intake()
+    assert desk.take(0, bytes(MAX_TRANSMISSION_B + 1), 40) is None
+    assert desk.rejected == {"oversize": 1}
+    many = Transmission(40, 0, (Outgoing(0, b""),) * (MAX_OUTGOING + 1))
+    large = Transmission(40, 0, (Outgoing(0, bytes(MAX_PAYLOAD_B + 1)),))
+    for message in (many, large):
+        assert desk.take(0, pack(message), 40) is None
+    assert desk.rejected == {"oversize": 1, "malformed": 2}
+    greatest = Transmission(40, 2**53 - 1, (Outgoing(1, bytes(MAX_PAYLOAD_B)),) * MAX_OUTGOING)
+    assert desk.take(0, pack(greatest), 40) == greatest
