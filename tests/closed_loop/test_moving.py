@@ -1,0 +1,48 @@
+"""A formation under way: slots are held while the frame moves, and won back behind obstacles."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from worldsim.run.virtual import VirtualFleet, fly
+from worldsim.scenario.file import load
+
+DEPLOY = Path(__file__).parents[2] / "deploy" / "scenarios"
+STARTS_S, TURNS_S = 10.0, 21.5
+SETTLED_S = 3.0
+"""After the frame's start, until a slot error counts."""
+
+
+@pytest.mark.parametrize("change", ["", "'path'"])
+def test_a_moving_slot_is_held(change):
+    overrides = {
+        "duration_s": "40",
+        "frame.waypoints_m": "[[0, 0, 0], [3, 0, 0], [3, 2, 1]]",
+        "frame.speed_mps": "0.25",
+        "frame.start_s": "10",
+        **({"frame.yaw": change} if change else {}),
+    }
+    fleet, straight_m, worst_m = VirtualFleet(load(DEPLOY / "wedge-9.toml", overrides)), 0.0, 0.0
+    while fleet.loop.world.time_s < 40.0:
+        fleet.slot()
+        time_s, error_m = fleet.loop.world.time_s, float(np.max(fleet.loop.figures.slot_error))
+        if time_s > STARTS_S + SETTLED_S:
+            worst_m = max(worst_m, error_m)
+        if STARTS_S + SETTLED_S < time_s < TURNS_S:
+            straight_m = max(straight_m, error_m)
+    assert straight_m < 0.03
+    assert worst_m < 0.3, "where the frame takes another direction, vehicles turn first"
+    assert fleet.loop.judge.phases[0].residual_m < 0.01
+
+
+@pytest.mark.parametrize("mode", ["constellation", "direct", "none"])
+@pytest.mark.parametrize("seed", range(2))
+def test_the_wedge_passes_the_field_and_closes_again(seed, mode):
+    scenario = load(DEPLOY / "field-6.toml", {"seed": str(seed), "control.avoidance": mode})
+    judge = fly(scenario).loop.judge
+    assert [each.name for each in judge.expectations() if not each.held] == []
+    assert judge.min_obstacle_distance_m > 0.5
+    assert judge.min_separation_m >= 0.25
+    assert judge.phases[0].residual_m < 0.1
+    assert judge.turns_over_limit_fraction <= 0.05
