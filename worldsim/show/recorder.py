@@ -100,12 +100,14 @@ class RunRecorder:
     def _open(self, path: Path, run_id: str, mode: str) -> None:
         rr.set_strict_mode(True)
         self._spool = Spool(path, self._say)
+        self._track = Track(path_of(self._scenario.frame))
         scenery = Scenery(
             self._scenario,
             self._formation,
             self._scenario.fleet.agents,
-            Track(path_of(self._scenario.frame)).at(0.0),
+            self._track.at(0.0),
         )
+        self._scenery = scenery
         # Without an id of our own: a viewer takes two recordings of one id for one.
         self._stream = rr.RecordingStream(
             "qswarm",
@@ -147,6 +149,8 @@ class RunRecorder:
             sheets = self._sheets.of(self._ticks, self._figures)
             for sheet in (*sheets, *self._shapes.sheets(self._ticks)):
                 self._send(sheet)
+        if not self._track.rests:
+            self._move_slots()
         if self._events:
             self._send_events()
         for event in self._events:
@@ -154,12 +158,20 @@ class RunRecorder:
                 self._show_phase(event)
         self._stream.flush(timeout_sec=FLUSH_S)
 
+    def _move_slots(self) -> None:
+        """Show where the slots of a frame under way are, tick by tick."""
+        for tick in self._ticks:
+            self._stream.set_time(layout.SIM_TIME, duration=tick.time_s)
+            self._stream.set_time(layout.TICK, sequence=tick.index)
+            self._stream.log(layout.SLOTS, self._scenery.slots_in(self._track.at(tick.time_s)))
+
     def _show_phase(self, event: Event) -> None:
         """Draw the formation that a mission asks for, from its time on."""
         spec = msgspec.convert(event["tables"], FormationSpec)
         formation = Formation(spec, self._scenario.control.spacing_m)
-        track = Track(msgspec.convert(event["path"], FramePath))
-        scenery = Scenery(self._scenario, formation, self._team, track.at(event["t_s"]))
+        self._track = Track(msgspec.convert(event["path"], FramePath))
+        here = self._track.at(event["t_s"])
+        self._scenery = scenery = Scenery(self._scenario, formation, self._team, here)
         self._stream.set_time(layout.SIM_TIME, duration=event["t_s"])
         self._stream.set_time(layout.TICK, sequence=self._tick_at(event["t_s"]))
         for entity, part in scenery.formation():

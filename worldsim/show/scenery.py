@@ -34,8 +34,9 @@ class Scenery:
         filled = formation.layout(team)
         self._places = filled.places
         self._stands = {place: slot.arc_length for place, slot in filled.slots.items()}
+        self._points = [filled.slots[place].point for place in self._places]
         self.slots: NDArray[np.float64] = np.array(
-            [self._frame.to_world(filled.slots[place].point) for place in self._places]
+            [self._frame.to_world(point) for point in self._points]
         )
 
     def lasting(self) -> Iterator[tuple[str, list[Any]]]:
@@ -73,6 +74,11 @@ class Scenery:
         )
         strips, tints = self._edges()
         yield layout.QUEUES, rr.LineStrips3D(strips, colors=tints, radii=[0.008])
+
+    def slots_in(self, frame: Frame) -> rr.Points3D:
+        """Return where the places are once the target's frame has moved on."""
+        where = [frame.to_world(point) for point in self._points]
+        return rr.Points3D.from_fields(positions=where)
 
     def _bodies(self, names: list[str]) -> rr.Boxes3D:
         r = self._scenario.vehicle.radius_m
