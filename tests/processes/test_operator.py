@@ -6,11 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes.harness import QSWARM, Started, events_of, eventually
+from tests.processes.harness import QSWARM, Started, events_of, eventually, pids
 
 pytestmark = pytest.mark.processes
 
 Start = Callable[..., Started]
+REPOSITORY = Path(__file__).parents[2]
 COLUMN = """
 name = "column"
 vertices = { V1 = [0, 0, 1] }
@@ -42,6 +43,11 @@ def test_a_flying_fleet_does_what_it_is_told_and_refuses_what_cannot_be(
     assert (status, "formation agent 2: formation column" in said) == (0, True)
     assert told("fault", "kill", "3", "--for", "1")[0] == 0
     assert "range_m = 6" in told("netem", "show")[1]
+    paused = pids(run)["agent-1"]
+    assert told("fault", "pause", "1")[0] == 0
+    eventually(lambda: state(paused) == "T", 5.0, lambda: state(paused))
+    assert told("fault", "resume", "all")[0] == 0
+    eventually(lambda: state(paused) in "RS", 5.0, lambda: state(paused))
 
     def converged() -> bool:
         back = any(event["kind"] == "restart" for event in events_of(run))
@@ -53,4 +59,22 @@ def test_a_flying_fleet_does_what_it_is_told_and_refuses_what_cannot_be(
     assert [phase["formation"] for phase in phases] == ["line", "column"]
     assert phases[1]["residual_m"] < 0.12
     by_operator = [e["kind"] for e in events_of(run) if e.get("by") == "operator"]
-    assert by_operator == ["netem", "formation", "kill"]
+    assert by_operator == ["netem", "formation", "kill", "pause", "resume"]
+
+
+def test_of_a_fleet_by_hand_the_radio_is_changed_and_no_process(
+    start: Start, scenario: Callable[[float], str], tmp_path: Path
+) -> None:
+    run = tmp_path / "run"
+    fleet = start("bash", str(REPOSITORY / "deploy/by-hand.sh"), scenario(15.0), str(run))
+    fleet.says("in place 4/4")
+    refused = start(*QSWARM, "fault", str(run), "kill", "2")
+    assert refused.status(15.0) == 2
+    assert refused.text == f"{run}: refused: kill: this fleet has no launcher; do it by hand\n"
+    assert start(*QSWARM, "netem", str(run), "partition", "0,1", "--for", "1").status(15.0) == 0
+    assert fleet.status(30.0) in (0, 1), fleet.text
+    assert json.loads((run / "summary.json").read_text())["packets"]["dropped_partition"] > 0
+
+
+def state(pid: int) -> str:
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
