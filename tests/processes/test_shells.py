@@ -219,7 +219,7 @@ def test_under_a_launcher_losses_come_by_lines_and_its_end_is_the_end() -> None:
     assert outside.losses() == [Loss(3, incarnation=1, signal=9)]
     outside.act("pause", [(2, 0)])
     outside.act("resume", [])
-    assert near.receive() == [{"do": "pause", "whom": [[2, 0]]}]
+    assert near.receive() == [{"do": "pause", "whom": [[2, 0]], "after_s": 0.0}]
     assert outside.stopped is None
     near.close()
     outside.wait(5.0)

@@ -151,7 +151,7 @@ class Launch:
             self._roster.add(name, pid)
         self._kin.listen(self._zygote, self._hear_zygote)
         self._kin.listen(self._world, self._hear_world)
-        self._zygote.send(do="start", whom=[(agent, 0) for agent in agents])
+        self._zygote.send(do="start", whom=[(agent, 0) for agent in agents], after_s=0.0)
 
     def _be_zygote(self) -> int:
         for end in (self._zygote, self._world, self._world_end):

@@ -56,7 +56,7 @@ class Flight:
         self._scenario = scenario
         self._outside = outside
         self._muster = muster
-        self._hands = Hands(post, muster, outside)
+        self._hands = Hands(post, muster, outside, scenario.fleet.boot_s / speed)
         self._reception = Reception(post, Control(scenario, self.loop, outside.launches))
         self.begun = self._landed = False
         self._unreadable = 0

@@ -15,14 +15,18 @@ from worldsim.run.outside import Outside
 from worldsim.run.slots import Deed
 from worldsim.run.team import Begin, Hold, Start, Stop
 
+START_WITHIN_S = 5.0
+"""So long before the end of a long boot a process begins, which waits 30 s for word and no more."""
+
 
 class Hands:
-    """What a flight reaches the other processes with."""
+    """What a flight reaches the other processes with; boot_s: on the wall clock."""
 
-    def __init__(self, post: Post, muster: Muster, outside: Outside) -> None:
+    def __init__(self, post: Post, muster: Muster, outside: Outside, boot_s: float) -> None:
         self._orders = post.putter("orders")
         self._muster = muster
         self._outside = outside
+        self._after_s = max(0.0, boot_s - START_WITHIN_S)
 
     def do(self, deed: Deed, slot: int, incarnations: Sequence[int]) -> list[int]:
         """Carry out a deed before a slot; return the agents that should be there, and are not.
@@ -36,7 +40,7 @@ class Hands:
                 self._outside.act(kind, _named(agents, incarnations))
             case Start(incarnations=started):
                 self._muster.expect(started)
-                self._outside.act("start", list(started.items()))
+                self._outside.act("start", list(started.items()), self._after_s)
             case Begin(agents=agents):
                 return self._muster.absent(agents)
             case Change() | Partition() | Heal() | Jamming() | Flapping():

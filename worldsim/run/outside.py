@@ -62,8 +62,11 @@ class Outside(Protocol):
     def losses(self) -> list[Loss]:
         """Return whose process ended since the last call, planned or not."""
 
-    def act(self, deed: str, whom: list[tuple[int, int]]) -> None:
-        """Ask for a deed on processes, (agent, incarnation) each: start, kill, pause or resume."""
+    def act(self, deed: str, whom: list[tuple[int, int]], after_s: float = 0.0) -> None:
+        """Ask for a deed on processes, (agent, incarnation) each: start, kill, pause or resume.
+
+        after_s: how long a process that starts sleeps first [s].
+        """
 
     def missing(self, names: list[str]) -> None:
         """Say who is not there yet."""
@@ -96,10 +99,10 @@ class Conducted:
         """Return the exits that the launcher told."""
         return [Loss(*line["lost"]) for line in self._lines.receive() if "lost" in line]
 
-    def act(self, deed: str, whom: list[tuple[int, int]]) -> None:
+    def act(self, deed: str, whom: list[tuple[int, int]], after_s: float = 0.0) -> None:
         """Ask the launcher for it."""
         if whom:
-            self._lines.send(do=deed, whom=whom)
+            self._lines.send(do=deed, whom=whom, after_s=after_s)
 
     def missing(self, names: list[str]) -> None:
         """Tell the launcher who is not there yet; an empty list when everybody is."""
@@ -139,7 +142,7 @@ class ByHand:
             print(f"agent-{agent} is gone", flush=True)
         return [Loss(agent) for agent in agents]
 
-    def act(self, deed: str, whom: list[tuple[int, int]]) -> None:
+    def act(self, deed: str, whom: list[tuple[int, int]], after_s: float = 0.0) -> None:
         """Refuse: what was started by hand is stopped by hand. Raises LookupError."""
         raise LookupError(f"nobody can {deed} {whom}: these processes were started by hand")
 

@@ -75,7 +75,7 @@ class Zygote:
             return
         for agent, incarnation in line["whom"]:
             if line["do"] == "start":
-                self._spawn(agent, incarnation)
+                self._spawn(agent, incarnation, line["after_s"])
             else:
                 self._signal(agent, incarnation, SIGNALS[line["do"]])
         self._lines.send(done=line["do"], whom=line["whom"])
@@ -88,9 +88,9 @@ class Zygote:
                 if number in ARRIVED:
                     os.waitid(os.P_PID, pid, ARRIVED[number] | os.WEXITED | os.WNOWAIT)
 
-    def _spawn(self, agent: int, incarnation: int) -> None:
+    def _spawn(self, agent: int, incarnation: int, after_s: float) -> None:
         log = self._brood.logs / f"agent-{agent}.log"
-        pid = fork(log, signal.SIGKILL, lambda: self._live(agent))
+        pid = fork(log, signal.SIGKILL, lambda: self._live(agent, after_s))
         exit_descriptor = os.pidfd_open(pid)
         self._agents[pid] = (agent, incarnation)
         self._watch.register(
@@ -98,8 +98,9 @@ class Zygote:
         )
         self._lines.send(spawned=agent, pid=pid, incarnation=incarnation)
 
-    def _live(self, agent: int) -> int:
+    def _live(self, agent: int, after_s: float) -> int:
         self._lines.close()
+        time.sleep(after_s)
         return agent_process.run(agent, self._brood.run, self._brood.endpoint)
 
     def _bury(self, exit_descriptor: int, pid: int) -> None:
