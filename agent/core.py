@@ -17,7 +17,7 @@ from agent.comms.mission import Missions
 from agent.comms.neighbours import Neighbours
 from agent.comms.silent import SilentBodies
 from agent.controller import Intent, Peer, Senses
-from agent.guidance.guard import Guard
+from agent.guidance.guard import STAND, Guard
 from agent.guidance.safety import Told
 from agent.messages import (
     Beacon,
@@ -100,6 +100,8 @@ class Agent:
         senses = self._senses(observation)
         intent = self._intent = self._controller.decide(senses)
         velocity = self._guard.safe(intent.velocity, senses, lambda: self._told(senses))
+        if not self._eyes.trust.note(observation):
+            velocity = STAND
         command = self._command(observation.slot, senses, intent, velocity)
         own = self._own_state(senses, velocity, intent)
         pieces = self._missions.pieces() if self._lagging else ()
@@ -183,6 +185,7 @@ class Agent:
         heard = [beacon.position for beacon in self._neighbours.beacons()]
         here, team = observation.position, self._table.members(now_s)
         self._silent = self._bodies.look(now_s, here, observation.vehicles, heard, team)
+        self._eyes.trust.compare(observation, self._neighbours.beacons())
         self._lagging = self._neighbours.behind(self._missions.flown.key)
         self._blocked = self._table.blocked(self._missions.flown.key)
         vertex = self._intent is not None and self._intent.vertex

@@ -3,6 +3,7 @@
 from agent.messages import Observation, Vector
 from agent.sensing.pattern import KINDS, pattern_of
 from agent.sensing.points import PointMap
+from agent.sensing.trust import Trust
 from agent.setup import AgentSetup
 
 
@@ -13,6 +14,8 @@ class Eyes:
         kinds = [kind for kind in KINDS if kind in setup.vehicle.sensors]
         patterns = [pattern_of(kind, setup.sensor, setup.tick_hz) for kind in kinds]
         self._map = PointMap(patterns) if patterns else None
+        ranging = "proximity" in setup.vehicle.sensors
+        self.trust = Trust(patterns, ranging, setup.tick_hz, setup.fleet_max_speed_mps)
 
     def near(self, observation: Observation, others: list[Vector]) -> tuple[Vector, ...]:
         """Return points of obstacles within 2 m, relative [m; world axes].

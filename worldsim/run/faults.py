@@ -6,7 +6,7 @@ deed that a clock carries out.
 
 from bisect import insort
 from math import inf
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from agent.messages import FramePath
 from agent.qstructure.formation import FormationSpec
@@ -24,7 +24,7 @@ from netem.messages import (
 )
 from netem.schedule import overlaid
 from worldsim.scenario.course import Step, steps
-from worldsim.scenario.events import EventTable
+from worldsim.scenario.events import EventTable, SensorFault
 from worldsim.scenario.frame import changed, path_of
 from worldsim.scenario.radio import partition_of
 from worldsim.scenario.starting import BoxStart, ListStart
@@ -57,6 +57,15 @@ class Holding(NamedTuple):
     number: int
     kind: str
     selectors: tuple[int | str, ...]
+
+
+class Failing(NamedTuple):
+    """Sensors are to fail, those of a kind or all; with no mode, those ``number`` struck work."""
+
+    number: int
+    selectors: tuple[int | str, ...]
+    sensor: str | None
+    mode: Literal["stuck", "silent", "wrong"] | None
 
 
 class Joining(NamedTuple):
@@ -144,7 +153,7 @@ UponRadio = Change | Partition | Heal | Jamming | Flapping
 """What the medium carries out: each has its ``order``."""
 BARRIERS = {Partition: "partition", Heal: "heal", Jamming: "jam", Flapping: "flap"}
 """Of these, what lets frames across or not, and the kind of event that each is."""
-Action = Strike | Revival | Holding | Joining | UponRadio | Order
+Action = Strike | Revival | Holding | Failing | Joining | UponRadio | Order
 
 
 class Timeline:
@@ -220,7 +229,7 @@ class Timeline:
             return self._order(event)
         if event.joiners:
             return Joining(step.number, event.joiners, event.start or self._fleet_start)
-        return _upon_agents(step)
+        return _failing(step, event.sensor) if event.sensor is not None else _upon_agents(step)
 
     def _change(self, step: Step, change: Conditions) -> Change:
         """Lay the changes in force over the scenario's conditions, the later over the earlier."""
@@ -254,6 +263,12 @@ def _barrier(step: Step) -> Jamming | Flapping:
     if event.flap is not None:
         return Flapping(step.number, None if step.undo else event.flap.from_s(event.at_s))
     return Jamming(step.number, None if step.undo else event.jam)
+
+
+def _failing(step: Step, fault: SensorFault) -> Failing:
+    if step.undo:
+        return Failing(step.number, (), fault.kind, None)
+    return Failing(step.number, fault.agents, fault.kind, fault.mode)
 
 
 def _upon_agents(step: Step) -> Strike | Revival | Holding:

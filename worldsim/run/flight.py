@@ -19,10 +19,11 @@ from worldsim.judge.tick import Packets
 from worldsim.run.admission import PROCESS_COMMAND_TICKS
 from worldsim.run.control import Control, Reception
 from worldsim.run.hands import Hands
+from worldsim.run.meaning import Deed
 from worldsim.run.muster import Muster
 from worldsim.run.outside import Loss, Outside, Progress
 from worldsim.run.pace import Pacer, Punctuality
-from worldsim.run.slots import Deed, Opened, Recorder, SlotLoop, world_of
+from worldsim.run.slots import Opened, Recorder, SlotLoop, world_of
 from worldsim.run.team import Begin, Hold, Stop
 from worldsim.scenario.tables import Scenario
 

@@ -10,9 +10,9 @@ import msgspec
 from netem.messages import Orders
 from netem.wire.post import Post
 from worldsim.run.faults import Change, Flapping, Heal, Jamming, Partition
+from worldsim.run.meaning import Deed
 from worldsim.run.muster import Muster
 from worldsim.run.outside import Outside
-from worldsim.run.slots import Deed
 from worldsim.run.team import Begin, Hold, Start, Stop
 
 START_WITHIN_S = 5.0

@@ -22,18 +22,14 @@ from worldsim.run.faults import (
     Change,
     Flapping,
     Heal,
-    Holding,
     Jamming,
-    Joining,
     Order,
     Partition,
-    Revival,
-    Strike,
     Timeline,
-    UponRadio,
 )
+from worldsim.run.meaning import Deed, deed_of
 from worldsim.run.orders import Orders
-from worldsim.run.team import Begin, Hold, Start, Stop, Team
+from worldsim.run.team import Begin, Fail, Hold, Start, Stop, Team
 from worldsim.run.told import UNTOLD, tick_of, told_by
 from worldsim.run.trace import Trace
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
@@ -44,8 +40,6 @@ from worldsim.truth.start import starts_of
 from worldsim.truth.world import Clock, World
 
 Event = dict[str, Any]
-Deed = Stop | Hold | Start | Begin | UponRadio | Order
-"""What a clock carries out between slots."""
 
 
 class Recorder(Protocol):
@@ -128,15 +122,7 @@ class SlotLoop:
 
     def deed(self, action: Action) -> Deed:
         """Find out whom an action means now; return what a clock has to do."""
-        if isinstance(action, Strike):
-            return self.team.struck(action, self._places, self._formation)
-        if isinstance(action, Holding):
-            return self.team.held(action, self._places, self._formation)
-        if isinstance(action, Revival):
-            return self.team.revived(action, self.world.fleet.position, self.world.time_s)
-        if isinstance(action, Joining):
-            return self.team.joined(action, self.world.fleet.position, self.world.time_s)
-        return action
+        return deed_of(action, self.team, self.world, self._places, self._formation)
 
     def take(self, deed: Deed, **signed: str) -> None:
         """Let a deed count that was done: participants and world change, and it is told.
@@ -150,6 +136,8 @@ class SlotLoop:
             case Hold():
                 self.team.take(deed, self.world.time_s)
                 self._tell(deed)
+            case Fail():
+                self._fail(deed)
             case Start():
                 self._start(deed)
             case Begin():
@@ -226,6 +214,12 @@ class SlotLoop:
             self.event(deed.kind, agent, **self._planned)
         if not deed.agents:
             self.event(deed.kind, None, **self._planned, nobody=deed.selectors)
+
+    def _fail(self, deed: Fail) -> None:
+        told = {"sensor": deed.sensor or "all", "mode": deed.mode or "works again"}
+        for agent in deed.agents:
+            self.world.failures.set(agent, deed.sensor, deed.mode)
+            self.event("sensor", agent, **told, **self._planned)
 
     def _start(self, start: Start) -> None:
         self.team.take(start, self.world.time_s)

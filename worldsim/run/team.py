@@ -3,13 +3,13 @@
 A row belongs to one agent for the whole run. Rows of those who have not joined yet are the last.
 """
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation, FormationSpec
-from worldsim.run.faults import Holding, Joining, Revival, Strike
+from worldsim.run.faults import Failing, Holding, Joining, Revival, Strike
 from worldsim.scenario.starting import BoxStart, ListStart
 from worldsim.scenario.tables import Scenario
 from worldsim.truth.obstacle import Obstacles
@@ -26,6 +26,14 @@ class Stop(NamedTuple):
     kind: str
     agents: tuple[int, ...]
     selectors: tuple[int | str, ...]
+
+
+class Fail(NamedTuple):
+    """Agents whose sensors, of a kind or all, fail in a mode; with none they work again."""
+
+    agents: tuple[int, ...]
+    sensor: str | None
+    mode: Literal["stuck", "silent", "wrong"] | None
 
 
 class Hold(NamedTuple):
@@ -116,6 +124,17 @@ class Team:
         if action.selectors:
             agents = self._selected(action.number, action.selectors, among, places, formation)
         return Hold(action.number, action.kind, agents, action.selectors)
+
+    def failed(
+        self, action: Failing, places: list[tuple[int, int] | None], formation: FormationSpec
+    ) -> Fail:
+        """Find whose sensors fail, or work again."""
+        among = list(range(self.known))
+        agents = self._struck.get(action.number, ())
+        if action.selectors:
+            agents = self._selected(action.number, action.selectors, among, places, formation)
+        self._struck[action.number] = agents
+        return Fail(agents, action.sensor, action.mode)
 
     def revived(self, action: Revival, position: Floats, time_s: float = 0.0) -> Start:
         """Find who comes back at a time [s], and where.

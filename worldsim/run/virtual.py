@@ -25,7 +25,8 @@ from netem.wire.frame import (
 )
 from worldsim.judge.tick import Packets
 from worldsim.run.faults import Change, Flapping, Heal, Jamming, Partition
-from worldsim.run.slots import Deed, Event, Opened, Recorder, SlotLoop, world_of
+from worldsim.run.meaning import Deed
+from worldsim.run.slots import Event, Opened, Recorder, SlotLoop, world_of
 from worldsim.run.team import Start, Stop
 from worldsim.scenario.tables import Scenario
 

@@ -203,10 +203,12 @@ class _Course:
         return sum(index in self._formation.queues_of(place) for place in places)
 
     def _selectors(self, event: EventTable) -> Iterator[Finding]:
-        for index, selector in enumerate(event.selectors):
+        sensor = event.sensor
+        where = "sensor.agents" if sensor is not None else event.kind
+        for index, selector in enumerate(sensor.agents if sensor is not None else event.selectors):
             detail = self._selector(selector, event.kind)
             if detail is not None:
-                yield Finding(f"{event.kind}[{index}]", detail)
+                yield Finding(f"{where}[{index}]", detail)
 
     def _selector(self, selector: int | str, kind: str) -> str | None:
         """Say what is wrong with a selector."""

@@ -3,7 +3,7 @@
 An event is one action at one time. What must hold between events is said in ``course``.
 """
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
@@ -29,6 +29,17 @@ class JoinTable(Table, frozen=True):
     start: BoxStart | ListStart | None = None
 
 
+class SensorFault(Table, frozen=True):
+    """Whose sensor fails, and how; ``kind`` left out: every sensor that they have.
+
+    stuck: it tells its last reading for ever; silent: nothing; wrong: anything.
+    """
+
+    agents: Selectors
+    mode: Literal["stuck", "silent", "wrong"]
+    kind: Literal["proximity", "laser", "sonar"] | None = None
+
+
 class EventTable(Table, frozen=True):
     """One action at ``at_s``; ``for_s`` later it is undone, where it can be.
 
@@ -37,7 +48,7 @@ class EventTable(Table, frozen=True):
     vehicles hover when the last command has expired; resume: they go on. partition: groups that
     hear only themselves, agents not named form one more, or a table for other kinds; heal ends it.
     jam: a sphere where no radio works; flap: links that go down and up. netem: keys of [netem] that
-    change. formation, frame: a mission for the team.
+    change. sensor: sensors fail. formation, frame: a mission for the team.
     """
 
     at_s: Time
@@ -53,6 +64,7 @@ class EventTable(Table, frozen=True):
     jam: Jam | None = None
     flap: FlapTable | None = None
     netem: Conditions | None = None
+    sensor: SensorFault | None = None
     formation: FormationSpec | None = None
     frame: FrameChange | None = None
 
@@ -85,7 +97,7 @@ class EventTable(Table, frozen=True):
 
 
 ACTIONS = tuple(name for name in EventTable.__struct_fields__ if name not in {"at_s", "for_s"})
-UNDONE = ("kill", "leave", "pause", "partition", "jam", "flap", "netem")
+UNDONE = ("kill", "leave", "pause", "partition", "jam", "flap", "netem", "sensor")
 """Actions that ``for_s`` can undo."""
 UPON_PROCESSES = ("kill", "leave", "restart", "join", "pause", "resume")
 """Actions that need somebody who starts and signals processes."""

@@ -29,7 +29,7 @@ class ProximitySensor:
     """
 
     def __init__(self, seed: int, noise_m: float, obstacles: Obstacles) -> None:
-        self._seed = seed
+        self.seed = seed
         self._noise_m = noise_m
         self._obstacles = obstacles
 
@@ -75,6 +75,6 @@ class ProximitySensor:
 
     def _told(self, sensed: Floats, agent: int, slot: int) -> tuple[Vector, ...]:
         if self._noise_m > 0.0 and len(sensed):
-            generator = np.random.Generator(np.random.Philox(key=[self._seed, agent << 40 | slot]))
+            generator = np.random.Generator(np.random.Philox(key=[self.seed, agent << 40 | slot]))
             sensed = sensed + self._noise_m * generator.standard_normal(sensed.shape)
         return tuple(map(tuple, sensed.tolist()))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from agent.messages import Command, Observation, Scan, Vector
 from agent.setup import Vehicle
+from worldsim.truth.failing import Failures
 from worldsim.truth.scan import Scans
 from worldsim.truth.sensor import ProximitySensor, Sensed
 from worldsim.truth.vehicle import Fleet, Floats
@@ -64,6 +65,7 @@ class World:
         self._senses = ["proximity" in each.sensors for each in limits]
         self._sensor = sensor
         self._scanning = scans
+        self.failures = Failures(sensor.seed)
         self._longest = command_ticks * clock.slots_per_tick
         self._expires = np.zeros(len(yaw), dtype=np.int64)
         self._velocity = np.zeros((len(yaw), 3))
@@ -100,6 +102,12 @@ class World:
             for agent, each in zip(looking, read, strict=True)
         ]
         scans = self._scans(looking)
+        if self.failures:
+            sensed = [
+                self.failures.sensed(agent, each, self.slot)
+                for agent, each in zip(looking, sensed, strict=True)
+            ]
+            scans = {a: self.failures.scans(a, each, self.slot) for a, each in scans.items()}
         position = self.fleet.position.take(looking, axis=0).tolist()
         velocity = self.fleet.velocity.take(looking, axis=0).tolist()
         yaw = self.fleet.yaw.take(looking).tolist()

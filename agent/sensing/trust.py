@@ -1,0 +1,81 @@
+"""Whether an agent may believe its sensors: one that doubts them stops.
+
+Stuck: a reading stays the very same while the vehicle moves. Silent: scans that are due do not
+come. Silent or wrong: nothing is sensed where a neighbour near by says it is.
+"""
+
+from collections.abc import Sequence
+from math import dist
+
+from agent.messages import Beacon, Observation, Vector
+from agent.sensing.pattern import Pattern
+
+MOVED_M = 0.03
+"""By so much a vehicle moves before a reading must have changed."""
+LOST_SCANS = 3
+NEAR_M = 1.2
+FRESH_S = 0.5
+SLACK_M = 0.3
+LOOKS = 3
+"""So many looks in a row miss a neighbour before the sensor is doubted."""
+
+
+class Trust:
+    """Watches one agent's sensors; max_speed: of any vehicle [m/s]."""
+
+    def __init__(
+        self, patterns: Sequence[Pattern], ranging: bool, tick_hz: float, max_speed: float
+    ):
+        self._due_s = {p.kind: LOST_SCANS * p.every / tick_hz for p in patterns}
+        self._scanned_s: dict[int, float] = {}
+        self._ranging = ranging
+        self._max_speed = max_speed
+        self._reading: tuple[object, ...] = ()
+        self._read_at: Vector | None = None
+        self._stuck = False
+        self._missed = 0
+
+    def note(self, observation: Observation) -> bool:
+        """Take what is sensed now; return whether it may be believed."""
+        self._note_change(observation)
+        late = False
+        if self._due_s:
+            late = self._late(observation)
+        return not (self._stuck or late or self._missed >= LOOKS)
+
+    def compare(self, observation: Observation, neighbours: Sequence[Beacon]) -> None:
+        """Look whether neighbours near by are sensed where they say they are."""
+        if not self._ranging:
+            return
+        missed = any(self._is_missed(observation, beacon) for beacon in neighbours)
+        self._missed = self._missed + 1 if missed else 0
+
+    def _note_change(self, observation: Observation) -> None:
+        echoes = tuple(scan.ranges for scan in observation.scans if scan.ranges.strip(b"\xff"))
+        reading = (observation.vehicles, observation.obstacles, echoes)
+        if self._due_s and not observation.scans:
+            return
+        if reading == NO_READING or reading != self._reading or self._read_at is None:
+            self._reading, self._read_at, self._stuck = reading, observation.position, False
+        elif dist(observation.position, self._read_at) > MOVED_M:
+            self._stuck = True
+
+    def _late(self, observation: Observation) -> bool:
+        now_s = observation.time_s
+        for scan in observation.scans:
+            self._scanned_s[scan.kind] = now_s
+        return any(
+            now_s - self._scanned_s.setdefault(kind, now_s) > due_s + 1e-9
+            for kind, due_s in self._due_s.items()
+        )
+
+    def _is_missed(self, observation: Observation, beacon: Beacon) -> bool:
+        age_s = max(0.0, observation.time_s - beacon.stamp_s)
+        away = tuple(b - a for a, b in zip(observation.position, beacon.position, strict=True))
+        if age_s > FRESH_S or dist(away, (0.0, 0.0, 0.0)) > NEAR_M:
+            return False
+        slack = SLACK_M + self._max_speed * age_s
+        return all(dist(away, body) > slack for body in observation.vehicles)
+
+
+NO_READING: tuple[object, ...] = ((), (), ())

@@ -1,0 +1,66 @@
+"""What an agent doubts: readings that never change, scans that do not come, neighbours unseen."""
+
+from array import array
+
+import pytest
+
+from agent.messages import Observation, Scan
+from agent.sensing.pattern import pattern_of
+from agent.sensing.trust import LOOKS, Trust
+from agent.setup import Sensors
+from tests.agent.comms.making import beacon
+
+LASER = pattern_of("laser", Sensors(), 20.0)
+ECHO = Scan(0, array("H", [1000] * 61).tobytes())
+NONE = Scan(0, array("H", [0xFFFF] * 61).tobytes())
+
+
+def seen(tick, x=0.0, vehicles=(), scans=()):
+    at = (x, 0.0, 0.0)
+    return Observation(4 * tick, 0.05 * tick, at, (0.0,) * 3, 0.0, vehicles, (), (), scans)
+
+
+def trust(patterns=(), ranging=True):
+    return Trust(patterns, ranging, 20.0, 0.5)
+
+
+def test_a_reading_that_stays_while_one_moves_is_doubted_until_it_changes():
+    watch, body = trust(), ((1.0, 0.0, 0.0),)
+    believed = [watch.note(seen(tick, 0.01 * tick, body)) for tick in range(8)]
+    assert believed == [True] * 4 + [False] * 4
+    assert watch.note(seen(9, 0.1, ((0.9, 0.0, 0.0),)))
+
+
+def test_who_stands_may_read_the_same_for_ever_and_so_may_who_sees_nothing():
+    watch = trust()
+    assert all(watch.note(seen(tick, 0.0, ((1.0, 0.0, 0.0),))) for tick in range(50))
+    assert all(trust().note(seen(tick, 0.1 * tick)) for tick in range(50))
+    scanning = trust((LASER,))
+    assert all(scanning.note(seen(tick, 0.1 * tick, scans=(NONE,))) for tick in range(50))
+
+
+def test_scans_that_do_not_come_are_missed():
+    watch = trust((LASER,), ranging=False)
+    assert watch.note(seen(0, scans=(ECHO,)))
+    assert [watch.note(seen(tick)) for tick in (2, 6, 7, 20)] == [True, True, False, False]
+    assert watch.note(seen(21, 0.5, scans=(NONE,)))
+
+
+@pytest.mark.parametrize(("bodies", "believed"), [((), False), (((1.0, 0.1, 0.0),), True)])
+def test_a_neighbour_near_by_must_be_sensed(bodies, believed):
+    watch = trust()
+    there = beacon(1, 1, stamp_s=0.0, at=(1.0, 0.0, 0.0))
+    for _ in range(LOOKS):
+        watch.compare(seen(0, vehicles=bodies), [there])
+    assert watch.note(seen(0, vehicles=bodies)) is believed
+
+
+def test_old_word_and_far_neighbours_prove_nothing():
+    watch = trust()
+    old, far = (
+        beacon(1, 1, stamp_s=0.0, at=(1.0, 0.0, 0.0)),
+        beacon(2, 1, stamp_s=2.0, at=(1.5, 0.0, 0.0)),
+    )
+    for _ in range(2 * LOOKS):
+        watch.compare(seen(40), [old, far])
+    assert watch.note(seen(40))

@@ -1,0 +1,45 @@
+"""A sensor that fails by the timeline: what is refused, and what the fleet does about it."""
+
+from pathlib import Path
+
+import pytest
+
+from worldsim.run.virtual import fly
+from worldsim.scenario.file import load
+from worldsim.scenario.toml import ScenarioError
+
+WEDGE = Path("deploy/scenarios/wedge-9.toml")
+
+
+@pytest.mark.parametrize(
+    ("fault", "key", "says"),
+    [
+        ("{ agents = [0] }", "sensor.mode", "is missing"),
+        ("{ mode = 'silent' }", "sensor.agents", "is missing"),
+        ("{ agents = [0], mode = 'tired' }", "sensor.mode", "'stuck' or 'wrong'"),
+        ("{ agents = [0], mode = 'stuck', kind = 'nose' }", "sensor.kind", "'proximity'"),
+        ("{ agents = [9], mode = 'stuck' }", "sensor.agents[0]", "no agent 9; 0 to 8"),
+        ("{ agents = ['vertex:X'], mode = 'stuck' }", "sensor.agents[0]", "no vertex 'X'"),
+    ],
+)
+def test_a_fault_that_cannot_be_is_refused(fault: str, key: str, says: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        load(WEDGE, {"event": f"[{{ at_s = 1, sensor = {fault} }}]"})
+    assert str(caught.value).startswith(f"{WEDGE}: event[0].{key}: ")
+    assert says in str(caught.value)
+
+
+@pytest.mark.parametrize("sensors", ["['proximity']", "['laser', 'sonar']"])
+@pytest.mark.parametrize("mode", ["stuck", "silent", "wrong"])
+def test_nobody_collides_and_it_is_told(mode: str, sensors: str) -> None:
+    event = f"[{{ at_s = 1.5, for_s = 2, sensor = {{ agents = [0], mode = '{mode}' }} }}]"
+    scenario = load(WEDGE, {"event": event, "vehicle.sensors": sensors, "duration_s": "6"})
+    loop = fly(scenario).loop
+    told = [
+        (each["t_s"], each["agent"], each["mode"])
+        for each in loop.events
+        if each["kind"] == "sensor"
+    ]
+    assert told == [(1.5, 0, mode), (3.5, 0, "works again")]
+    assert loop.judge.min_separation_m is not None
+    assert loop.judge.min_separation_m >= 0.25
