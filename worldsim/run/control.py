@@ -13,7 +13,8 @@ import zenoh
 
 from netem.wire.post import Post, Waiting, drained
 from worldsim.run.faults import Order
-from worldsim.run.slots import Deed, Event, SlotLoop
+from worldsim.run.meaning import Deed
+from worldsim.run.slots import Event, SlotLoop
 from worldsim.run.team import Hold, Start, Stop
 from worldsim.scenario.course import Present, broken_now
 from worldsim.scenario.decoding import decode
