@@ -3,8 +3,8 @@
 from agent.messages import Observation, Vector
 from agent.sensing.pattern import KINDS, pattern_of
 from agent.sensing.points import PointMap
-from agent.sensing.trust import Trust
-from agent.setup import AgentSetup
+from agent.sensing.trust import PROXIMITY, Trust
+from agent.setup import AgentSetup, Sensors
 
 
 class Eyes:
@@ -15,7 +15,9 @@ class Eyes:
         patterns = [pattern_of(kind, setup.sensor, setup.tick_hz) for kind in kinds]
         self._map = PointMap(patterns) if patterns else None
         ranging = "proximity" in setup.vehicle.sensors
-        self.trust = Trust(patterns, ranging, setup.tick_hz, setup.fleet_max_speed_mps)
+        self.trust = Trust(
+            patterns, ranging, _noisy(setup.sensor), setup.tick_hz, setup.fleet_max_speed_mps
+        )
 
     def near(self, observation: Observation, others: list[Vector]) -> tuple[Vector, ...]:
         """Return points of obstacles within 2 m, relative [m; world axes].
@@ -33,3 +35,13 @@ class Eyes:
     def scanning(self) -> bool:
         """Whether there is a sensor that scans."""
         return self._map is not None
+
+
+def _noisy(sensors: Sensors) -> frozenset[int]:
+    """Return the sensors whose readings have noise: kinds of scans, and PROXIMITY."""
+    noise_m = {
+        PROXIMITY: sensors.proximity.noise_m,
+        KINDS.index("laser"): sensors.laser.noise_m,
+        KINDS.index("sonar"): sensors.sonar.noise_m,
+    }
+    return frozenset(kind for kind, noise in noise_m.items() if noise > 0.0)

@@ -13,6 +13,9 @@ from agent.sensing.pattern import Pattern
 MOVED_M = 0.03
 """By so much a vehicle moves before a reading must have changed."""
 LOST_SCANS = 3
+PROXIMITY = -1
+"""Stands for the proximity sensor beside the kinds of scans."""
+NOWHERE = b"\xff"
 NEAR_M = 1.2
 FRESH_S = 0.5
 SLACK_M = 0.3
@@ -21,11 +24,21 @@ LOOKS = 3
 
 
 class Trust:
-    """Watches one agent's sensors; max_speed: of any vehicle [m/s]."""
+    """Watches one agent's sensors; max_speed: of any vehicle [m/s].
+
+    noisy: sensors of which no two readings are the same. Without noise, those who fly side by side
+    see one another at the very same place for ever; then only what does not move shows it.
+    """
 
     def __init__(
-        self, patterns: Sequence[Pattern], ranging: bool, tick_hz: float, max_speed: float
-    ):
+        self,
+        patterns: Sequence[Pattern],
+        ranging: bool,
+        noisy: frozenset[int],
+        tick_hz: float,
+        max_speed: float,
+    ) -> None:
+        self._noisy = noisy
         self._due_s = {p.kind: LOST_SCANS * p.every / tick_hz for p in patterns}
         self._scanned_s: dict[int, float] = {}
         self._ranging = ranging
@@ -38,9 +51,7 @@ class Trust:
     def note(self, observation: Observation) -> bool:
         """Take what is sensed now; return whether it may be believed."""
         self._note_change(observation)
-        late = False
-        if self._due_s:
-            late = self._late(observation)
+        late = bool(self._due_s) and self._late(observation)
         return not (self._stuck or late or self._missed >= LOOKS)
 
     def compare(self, observation: Observation, neighbours: Sequence[Beacon]) -> None:
@@ -51,10 +62,17 @@ class Trust:
         self._missed = self._missed + 1 if missed else 0
 
     def _note_change(self, observation: Observation) -> None:
-        echoes = tuple(scan.ranges for scan in observation.scans if scan.ranges.strip(b"\xff"))
-        reading = (observation.vehicles, observation.obstacles, echoes)
         if self._due_s and not observation.scans:
             return
+        reading = (
+            observation.vehicles if PROXIMITY in self._noisy else (),
+            observation.obstacles,
+            tuple(
+                scan.ranges
+                for scan in observation.scans
+                if scan.kind in self._noisy and scan.ranges.strip(NOWHERE)
+            ),
+        )
         if reading == NO_READING or reading != self._reading or self._read_at is None:
             self._reading, self._read_at, self._stuck = reading, observation.position, False
         elif dist(observation.position, self._read_at) > MOVED_M:

@@ -6,7 +6,7 @@ import pytest
 
 from agent.messages import Observation, Scan
 from agent.sensing.pattern import pattern_of
-from agent.sensing.trust import LOOKS, Trust
+from agent.sensing.trust import LOOKS, PROXIMITY, Trust
 from agent.setup import Sensors
 from tests.agent.comms.making import beacon
 
@@ -20,8 +20,8 @@ def seen(tick, x=0.0, vehicles=(), scans=()):
     return Observation(4 * tick, 0.05 * tick, at, (0.0,) * 3, 0.0, vehicles, (), (), scans)
 
 
-def trust(patterns=(), ranging=True):
-    return Trust(patterns, ranging, 20.0, 0.5)
+def trust(patterns=(), ranging=True, noisy=(PROXIMITY, 0)):
+    return Trust(patterns, ranging, frozenset(noisy), 20.0, 0.5)
 
 
 def test_a_reading_that_stays_while_one_moves_is_doubted_until_it_changes():
@@ -37,6 +37,11 @@ def test_who_stands_may_read_the_same_for_ever_and_so_may_who_sees_nothing():
     assert all(trust().note(seen(tick, 0.1 * tick)) for tick in range(50))
     scanning = trust((LASER,))
     assert all(scanning.note(seen(tick, 0.1 * tick, scans=(NONE,))) for tick in range(50))
+
+
+def test_without_noise_who_flies_side_by_side_reads_the_same():
+    watch = trust(noisy=())
+    assert all(watch.note(seen(tick, 0.1 * tick, ((1.0, 0.0, 0.0),))) for tick in range(50))
 
 
 def test_scans_that_do_not_come_are_missed():
