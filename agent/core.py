@@ -181,10 +181,11 @@ class Agent:
     def _tidy(self, observation: Observation) -> None:
         """Look after what need not be looked at every tick: who is gone, and one's standing."""
         now_s = observation.time_s
-        self._table.forget_silent(now_s, self._neighbours.forget_silent(now_s))
+        lost = self._neighbours.forget_silent(now_s)
+        departed = self._table.forget_silent(now_s, self._neighbours.ids, lost)
         heard = [beacon.position for beacon in self._neighbours.beacons()]
         here, team = observation.position, self._table.members(now_s)
-        self._silent = self._bodies.look(now_s, here, observation.vehicles, heard, team)
+        self._silent = self._bodies.look(now_s, here, observation.vehicles, heard, team, departed)
         self._eyes.trust.compare(observation, self._neighbours.beacons())
         self._lagging = self._neighbours.behind(self._missions.flown.key)
         self._blocked = self._table.blocked(self._missions.flown.key)

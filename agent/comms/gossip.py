@@ -5,10 +5,12 @@ subject, and that number outlives the record; otherwise the departed would circu
 version of a record is its subject's beacon sequence, so a beacon heard directly is a record too.
 """
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from math import inf
+from types import MappingProxyType
 
 from agent.codec import MAX_RADIO_B, SEAL_B, encode, sealed
-from agent.comms.silent import Member
+from agent.comms.silent import Departed, Member
 from agent.controller import Peer
 from agent.messages import Beacon, Gossip, Piece, Place, Record
 
@@ -17,6 +19,7 @@ RELAYED_SILENCE_ROUNDS = 12
 hops at that loss, is twice the age at which a subject's records are measured to come."""
 LAG_SMOOTHING = 0.25
 LEAST_RELAYED_SILENCE_S = 2.5
+NOBODY: Mapping[int, float] = MappingProxyType({})
 MAX_FRAME_B = MAX_RADIO_B - SEAL_B
 FRAME_HEAD_B = 17
 """What a Gossip takes besides its records, with the greatest numbers it may hold."""
@@ -59,11 +62,14 @@ class Table:
                 age_s = max(0.0, now_s - record.stamp_s)
                 self._lag_s[record.id] = lag_s + LAG_SMOOTHING * (age_s - lag_s)
 
-    def forget_silent(self, now_s: float, heard: Collection[int]) -> None:
-        """Drop the records of those who are gone.
+    def forget_silent(
+        self, now_s: float, heard: Collection[int], lost: Mapping[int, float] = NOBODY
+    ) -> list[Departed]:
+        """Drop the records of those who are gone, and return where they were.
 
-        heard: the direct neighbours who are not. One whose last word was passed on may be silent
-        for as long as relays take.
+        heard: the direct neighbours who are not; lost: those given up just now, see
+        :meth:`Neighbours.forget_silent`. One of whom others tell later than that, or who never was
+        a neighbour, may be silent for as long as relays take.
         """
         gone = [
             who
@@ -71,12 +77,16 @@ class Table:
             if (
                 who not in heard
                 if isinstance(newest, Beacon)
-                else now_s - newest.stamp_s > self._may_be_silent_s(who)
+                else newest.stamp_s <= lost.get(who, -inf)
+                or now_s - newest.stamp_s > self._may_be_silent_s(who)
             )
         ]
+        departed = []
         for who in gone:
-            del self._newest[who]
+            last = self._newest.pop(who)
+            departed.append(Departed(last.position, last.stamp_s))
             self._lag_s.pop(who, None)
+        return departed
 
     def team(self, own: Peer, mission: int = 0) -> tuple[Peer, ...]:
         """Return all who are known, oneself included, sorted by id.

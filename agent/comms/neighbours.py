@@ -18,6 +18,8 @@ FORWARD_S = 1.0
 LEAST_SILENCE_S = 1.5
 NONE_YET = (-1, -1)
 FALSE_ALARM = log(1e-6)
+HEARD_BY_OTHERS = 0.25
+"""Share of T_lost by which others hear the last word of one who is gone later than oneself."""
 SMOOTHING = 0.05
 MARGIN = 1.2
 """The loss is known from the last 39 gaps or so: n (1e6^(1/n) - 1) / ln 1e6 at n = 39."""
@@ -98,19 +100,28 @@ class Neighbours:
         else:
             known.hear(beacon, latency_s)
 
-    def forget_silent(self, now_s: float) -> Collection[int]:
-        """Drop those who have been silent for longer than chance explains; return who stay."""
-        gone = [
-            who
+    @property
+    def ids(self) -> Collection[int]:
+        """Who is heard directly."""
+        return self._known.keys()
+
+    def forget_silent(self, now_s: float) -> dict[int, float]:
+        """Drop those who have been silent for longer than chance explains.
+
+        Returns for each of them until when word passed on says no more than its own did: somebody
+        else may have heard its last beacons, but not many more of them [s].
+        """
+        gone = {
+            who: stamp_s + HEARD_BY_OTHERS * known.silence_s(self._beacon_hz)
             for who, known in self._known.items()
-            if (age_s := now_s - known.beacon.stamp_s) > LEAST_SILENCE_S
-            and age_s > known.silence_s(self._beacon_hz)
-        ]
+            if now_s - (stamp_s := known.beacon.stamp_s) > LEAST_SILENCE_S
+            and now_s - stamp_s > known.silence_s(self._beacon_hz)
+        }
         for who in gone:
             del self._known[who]
         if gone:
             self._put_in_order()
-        return self._known.keys()
+        return gone
 
     def silences_s(self) -> dict[int, float]:
         """Return for each neighbour how long it may be silent [s]."""

@@ -41,12 +41,20 @@ class Member(NamedTuple):
     age_s: float
 
 
+class Departed(NamedTuple):
+    """A member that fell silent: where it was [m; world frame] when it last spoke [s]."""
+
+    position: Vector
+    stamp_s: float
+
+
 class SilentBodies:
     """The silent bodies that one agent knows of. max_speed: the fastest vehicle's limit [m/s]."""
 
     def __init__(self, max_speed: float) -> None:
         self._max_speed = max_speed
         self._bodies: list[_Body] = []
+        self._departed: list[Departed] = []
 
     def look(
         self,
@@ -55,12 +63,17 @@ class SilentBodies:
         sensed: Sequence[Vector],
         heard: Sequence[Vector],
         team: Sequence[Member],
+        departed: Sequence[Departed] = (),
     ) -> tuple[Vector, ...]:
         """Return where silent bodies stand [m; world frame].
 
         sensed: bodies relative to ``position`` [m; world axes]; heard: where those are who are
-        heard directly [m; world frame]; team: all members known.
+        heard directly [m; world frame]; team: all members known; departed: who was one until now.
         """
+        if departed or self._departed:
+            self._departed = [
+                gone for gone in (*self._departed, *departed) if now_s - gone.stamp_s <= MEMORY_S
+            ]
         unknown = [body for body in _in_world(position, sensed) if not self._explained(body, team)]
         if unknown:
             reach = max((dist(position, other) for other in heard), default=0.0) + SAME_BODY_M
@@ -73,12 +86,20 @@ class SilentBodies:
             if body.seen_s == now_s or self._remembered(body, now_s, position, team)
         ]
         new = [
-            _Body(seen, now_s, now_s)
+            self._found(seen, now_s)
             for seen in unknown
             if all(dist(body.position, seen) >= SAME_BODY_M for body in kept)
         ]
         self._bodies = kept + new
-        return tuple(body.position for body in kept if now_s - body.since_s >= SILENCE_S)
+        return tuple(body.position for body in self._bodies if now_s - body.since_s >= SILENCE_S)
+
+    def _found(self, body: Vector, now_s: float) -> _Body:
+        """Return a body found now; where a member fell silent, it is as silent as that one."""
+        since_s = min(
+            (gone.stamp_s for gone in self._departed if dist(gone.position, body) < NEIGHBOUR_M),
+            default=now_s,
+        )
+        return _Body(body, since_s, now_s)
 
     def _remembered(
         self, body: _Body, now_s: float, position: Vector, team: Sequence[Member]

@@ -8,21 +8,19 @@ from math import dist, hypot, pi, radians, sqrt
 
 from agent.controller import Intent, Senses
 from agent.guidance.bobber import bobber, cast_zone
+from agent.guidance.choice import Choice
 from agent.guidance.cone import azimuth_error, cone_of
 from agent.guidance.constellation import avoidance
 from agent.guidance.dodge import Dodge
 from agent.guidance.movement import DEAD_BAND_MPS, saturated, steer
 from agent.guidance.potential import Potential
-from agent.guidance.target_on_queue import OwnTarget, TargetOnQueue
-from agent.messages import Place, Vector
+from agent.messages import Vector
 from agent.qstructure.frame import Frame
 from agent.setup import AgentSetup
 
 GAIN = 2.0
 """c of (28) [1/s]."""
-CHOICE_HZ = 5.0
 CAST_FAR_M = 0.5
-LISTEN_S = 0.4
 AT_SLOT_M = 0.02
 """So near its slot an agent takes up the queue's orientation."""
 
@@ -42,20 +40,13 @@ class QStructure:
             radians(vehicle.max_yaw_rate_dps),
         )
         self._potential = Potential(control.separation_m)
-        self._targets = TargetOnQueue(setup.id, control.spacing_m)
+        self._choice = Choice(setup)
         self._avoidance = avoidance(control.avoidance, control.safety_m)
         self._dodge = Dodge(setup.id)
-        self._mine: OwnTarget | None = None
-        self._cost_m = 0.0
-        self._listening, self._known, self._new_at_s = True, 0, 0.0
-        self._blocked: tuple[Place, ...] = ()
-        self._chosen_for = -1
-        self._choose_at_s = -1.0
 
     def decide(self, senses: Senses) -> Intent:
         """Return what to do now; without a place, stay and give way."""
-        self._choose(senses)
-        q, mine, frame = senses.position, self._mine, senses.mission.frame
+        q, mine, frame = senses.position, self._choice.made(senses), senses.mission.frame
         q_toq = frame.to_world(mine.slot.point) if mine is not None else q
         q_tg = bobber(q, senses.yaw, _led(q_toq, frame), self._zone)
         x, y, z = self._potential.omega(q, q_tg, senses.neighbours)
@@ -79,9 +70,9 @@ class QStructure:
             target=q_toq if mine is not None else None,
             place=mine.place if mine is not None else None,
             tilt=tilt,
-            cost_m=self._cost_m,
+            cost_m=self._choice.cost_m,
             vertex=mine is not None and mine.vertex,
-            blocked=self._blocked,
+            blocked=self._choice.blocked,
         )
 
     def _cleared(self, senses: Senses) -> Vector:
@@ -107,35 +98,6 @@ class QStructure:
         v = self._max_speed
         past = (wanted[0] + v * aside[0], wanted[1] + v * aside[1], wanted[2] + v * aside[2])
         return saturated(past, self._max_speed, self._max_climb)
-
-    def _choose(self, senses: Senses) -> None:
-        """Choose the own place anew: at 5 Hz (Algorithm 1), and at once in a new mission."""
-        mission = senses.mission
-        new = mission.key != self._chosen_for
-        if senses.now_s >= self._choose_at_s or new:
-            team = senses.team()
-            if self._listens(senses.now_s, len(team)):
-                return
-            self._choose_at_s = senses.now_s + 1.0 / CHOICE_HZ - 1e-9
-            self._chosen_for = mission.key
-            self._blocked = self._targets.blocked(mission, len(team), senses.silent)
-            blocked = senses.blocked.union(self._blocked)
-            before = self._mine.place if self._mine is not None else None
-            self._mine = self._targets.choose(mission, team, blocked)
-            if self._mine is not None and (before != self._mine.place or new):
-                self._cost_m = dist(senses.position, mission.frame.to_world(self._mine.slot.point))
-
-    def _listens(self, now_s: float, known: int) -> bool:
-        """Whether an agent that just began still hears of members it did not know.
-
-        Until nobody new turns up it claims nothing (E24): a claim made knowing nobody is a vertex.
-        """
-        if not self._listening:
-            return False
-        if known > self._known:
-            self._known, self._new_at_s = known, now_s
-        self._listening = now_s - self._new_at_s < LISTEN_S - 1e-6
-        return self._listening
 
 
 def _led(q_toq: Vector, frame: Frame) -> Vector:

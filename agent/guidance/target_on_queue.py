@@ -6,10 +6,11 @@ beyond noise. A vertex shared by queues has one agent (E16); slots stand by arc 
 """
 
 from collections.abc import Sequence
-from math import dist
+from math import dist, hypot
 from typing import NamedTuple
 
 from agent.comms.allocation import own_place
+from agent.comms.silent import SURE_RANGE_M
 from agent.controller import Flown, Peer
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Layout, Slot
@@ -66,6 +67,33 @@ class TargetOnQueue:
                 break
             found |= new
         return tuple(sorted(found))[:MAX_BLOCKED]
+
+    def believed(
+        self,
+        mission: Flown,
+        agents: int,
+        told: frozenset[Place],
+        here: Vector,
+        near: Sequence[Vector],
+    ) -> frozenset[Place]:
+        """Return which places that others tell of as blocked may be so, by what one sees oneself.
+
+        here [m; world frame]: where one is; near: the bodies sensed from there, relative to it [m].
+        """
+        return frozenset(
+            place for place in told if not self._is_empty(mission, agents, place, here, near)
+        )
+
+    def _is_empty(
+        self, mission: Flown, agents: int, place: Place, here: Vector, near: Sequence[Vector]
+    ) -> bool:
+        slot = mission.formation.slot(place, agents)
+        if slot is None:
+            return False
+        x, y, z = mission.frame.to_world(slot.point)
+        away = (x - here[0], y - here[1], z - here[2])
+        in_sight = hypot(*away) <= SURE_RANGE_M - self._blocking_m
+        return in_sight and all(dist(away, body) > self._blocking_m for body in near)
 
     def _points(self, layout: Layout, frame: Frame) -> list[Vector]:
         """Return where a layout's places are [m; world frame]; remembered while both stay."""

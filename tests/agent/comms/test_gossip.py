@@ -151,6 +151,13 @@ def test_a_neighbour_that_fell_silent_is_dropped():
     assert content(known) == {}
 
 
+def test_one_given_up_is_dropped_unless_others_tell_of_it_later():
+    known = adopted(table(), record(3, 7, 10.0), record(4, 7, 10.5), now_s=11.0)
+    departed = known.forget_silent(12.0, (), {3: 10.2, 4: 10.2})
+    assert set(content(known)) == {4}
+    assert [gone.stamp_s for gone in departed] == [10.0]
+
+
 def test_one_known_by_relay_may_be_silent_for_as_long_as_relays_take():
     known = adopted(table(), record(3, 7, 10.0), now_s=10.0)
     known.forget_silent(10.0 + RELAYED_SILENCE_S - 0.01, ())
