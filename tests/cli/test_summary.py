@@ -121,7 +121,7 @@ def test_a_doubtful_run_is_never_a_pass(
 
 
 def test_no_slow_host_excuses_a_collision(small: Path, flight: Flight) -> None:
-    flight.loop.judge.separation_violations = 1
+    flight.loop.judge.safety_violations = 1
     told = summary(small, flight, host_too_slow=True, interrupted=True)
     assert (told["outcome"], told["reason"]) == ("fail", "violated: I1")
 

@@ -52,7 +52,7 @@ def test_a_scenario_is_admitted_and_says_what_it_shows(name: str) -> None:
 
 def test_every_formation_of_the_library_is_flown() -> None:
     library = {file.stem for file in (DEPLOY / "formations").glob("*.toml")}
-    assert library == {scenario(name).formation.name for name in GALLERY}
+    assert library <= {scenario(name).formation.name for name in GALLERY}
 
 
 @pytest.mark.parametrize("name", SMALL)

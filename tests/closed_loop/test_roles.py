@@ -76,6 +76,8 @@ def test_who_hears_nobody_makes_for_the_vertex():
     fly(fleet, 0.3)
     assert [each.role for each in told(fleet)] == [DISTRESS] * 3, "they listen first"
     fly(fleet, 1.2)
+    assert [each.role for each in told(fleet)] == [VERTEX, MEMBER, DISTRESS], "beacons may be late"
+    fly(fleet, 0.8)
     assert [each.role for each in told(fleet)] == [VERTEX, MEMBER, VERTEX]
     assert told(fleet)[2].target == (0.0, 0.0, 0.0), "in its own world it is the vertex agent"
 
