@@ -183,10 +183,10 @@ class Agent:
         now_s = observation.time_s
         lost = self._neighbours.forget_silent(now_s)
         departed = self._table.forget_silent(now_s, self._neighbours.ids, lost)
-        heard = [beacon.position for beacon in self._neighbours.beacons()]
+        beacons = self._neighbours.beacons()
         here, team = observation.position, self._table.members(now_s)
-        self._silent = self._bodies.look(now_s, here, observation.vehicles, heard, team, departed)
-        self._eyes.trust.compare(observation, self._neighbours.beacons())
+        self._silent = self._bodies.look(now_s, here, observation.vehicles, beacons, team, departed)
+        self._eyes.trust.compare(observation, beacons)
         self._lagging = self._neighbours.behind(self._missions.flown.key)
         self._blocked = self._table.blocked(self._missions.flown.key)
         vertex = self._intent is not None and self._intent.vertex
@@ -227,7 +227,7 @@ class Agent:
             intent.force,
             intent.target,
             intent.place,
-            tuple(other.id for other in senses.neighbours[:MAX_TOLD]),
+            tuple([other.id for other in senses.neighbours[:MAX_TOLD]]),
             self.rejected.total(),
             self._missions.flown.key,
             self._standing.tier,

@@ -4,6 +4,7 @@ Commands check everything before they start anything. Bad input is one line on s
 status 2; what a command needs is imported inside it, so that --help and check stay quick.
 """
 
+import gc
 import os
 import sys
 import traceback
@@ -235,6 +236,8 @@ attach(app)
 
 def main() -> None:
     """Run the command line and exit with the contract's status."""
+    # Little that a fleet makes holds a cycle: the collector may look more rarely.
+    gc.set_threshold(50_000)
     # A controller of the user's own is looked for last where the command is given.
     sys.path.append(str(Path.cwd()))
     sys.exit(command(sys.argv[1:]))

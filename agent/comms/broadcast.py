@@ -5,7 +5,8 @@ Fig. 3's two layers: high frequency to whoever hears it, low frequency to be pas
 
 from collections.abc import Sequence
 from math import inf
-from typing import NamedTuple
+
+import msgspec
 
 from agent.codec import encode, sealed
 from agent.comms.gossip import Table
@@ -20,7 +21,7 @@ MAX_ECHOES = 67
 """So many fit beside the greatest numbers of a Beacon: 317 B with its seal, and 13 B each."""
 
 
-class OwnState(NamedTuple):
+class OwnState(msgspec.Struct, frozen=True, gc=False):
     """What an agent says of itself: SI units, world frame; see Beacon."""
 
     position: Vector

@@ -43,8 +43,9 @@ class Table:
 
     def adopt_beacon(self, beacon: Beacon) -> None:
         """Take what a neighbour said of itself just now."""
-        if self._is_news(beacon.id, beacon.incarnation, beacon.sequence):
-            self._newest[beacon.id] = beacon
+        who = beacon.id
+        if self._is_news(who, beacon.incarnation, beacon.sequence):
+            self._newest[who] = beacon
 
     def adopt(self, gossip: Gossip, now_s: float, slack_s: float) -> None:
         """Take what is news in a frame of the multihop channel.
@@ -103,19 +104,12 @@ class Table:
 
     def members(self, now_s: float) -> list[Member]:
         """Return where each member last said it was, and how long ago."""
-        return [
-            Member(newest.position, max(0.0, now_s - newest.stamp_s))
-            for newest in self._newest.values()
-        ]
+        return [Member(newest.position, now_s - newest.stamp_s) for newest in self._newest.values()]
 
     def blocked(self, mission: int) -> frozenset[Place]:
         """Return the places that others see taken by a silent body (E18)."""
-        return frozenset(
-            Place(*place)
-            for newest in self._newest.values()
-            if newest.mission == mission
-            for place in newest.blocked
-        )
+        told = [each for each in self._newest.values() if each.blocked and each.mission == mission]
+        return frozenset(Place(*place) for newest in told for place in newest.blocked)
 
     def frames(self, own: Record, pieces: Sequence[Piece] = ()) -> list[bytes]:
         """Return the whole table, the own record first, in frames of at most 1200 B.

@@ -69,6 +69,7 @@ class Missions:
         self._pieces: dict[int, dict[int, bytes]] = {}
         self._path = path
         self._frame: Track | Glimpse = Track(path)
+        self._resting: tuple[Frame, Pose] | None = None
         self.frame_key = 0
         self.flown = Flown(0, Formation(formation, spacing), self._frame.at(0.0))
 
@@ -104,12 +105,13 @@ class Missions:
 
     def is_news(self, beacon: Beacon) -> bool:
         """Whether a beacon knows better where the frame is: by a newer mission, or a newer look."""
-        if beacon.frame_key != self.frame_key or beacon.drift is None:
-            return beacon.frame_key > self.frame_key
+        key, drift = beacon.frame_key, beacon.drift
+        if key != self.frame_key or drift is None:
+            return key > self.frame_key
         mine = self._frame
         if isinstance(mine, Track) or mine.drift is None:
             return False
-        return beacon.drift.stamp_s > mine.drift.stamp_s
+        return drift.stamp_s > mine.drift.stamp_s
 
     def glimpse(self, beacon: Beacon) -> None:
         """Take the frame from a beacon that is news, before its mission has come.
@@ -127,9 +129,11 @@ class Missions:
         if isinstance(self._frame, Glimpse):
             return self._frame.pose, self._frame.drift
         frame = self.flown.frame
-        pose = Pose(*frame.origin, frame.yaw)
         if self._frame.rests:
-            return pose, None
+            if self._resting is None or self._resting[0] is not frame:
+                self._resting = frame, Pose(*frame.origin, frame.yaw)
+            return self._resting[1], None
+        pose = Pose(*frame.origin, frame.yaw)
         return pose, Drift(now_s, *frame.velocity, frame.yaw_rate)
 
     def _adopt(self, key: int, path: FramePath, encoded: bytes) -> None:

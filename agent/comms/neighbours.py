@@ -136,7 +136,7 @@ class Neighbours:
 
     def behind(self, mission: int) -> bool:
         """Whether somebody who is heard flies an older mission."""
-        return any(known.beacon.mission < mission for known in self._known.values())
+        return any(known.beacon.mission < mission for known in self._in_order)
 
     def beacons(self) -> list[Beacon]:
         """Return each neighbour's last beacon, sorted by id."""

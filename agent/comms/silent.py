@@ -11,7 +11,9 @@ from collections.abc import Sequence
 from math import dist
 from typing import NamedTuple
 
-from agent.messages import Vector
+import msgspec
+
+from agent.messages import Beacon, Vector
 
 SAME_BODY_M = 0.2
 NEIGHBOUR_M = 0.4
@@ -34,7 +36,7 @@ class _Body(NamedTuple):
         return self._replace(seen_s=now_s) if near else self
 
 
-class Member(NamedTuple):
+class Member(msgspec.Struct, frozen=True, gc=False):
     """A member of the team as last told of: where it was [m; world frame], and how long ago [s]."""
 
     position: Vector
@@ -61,14 +63,14 @@ class SilentBodies:
         now_s: float,
         position: Vector,
         sensed: Sequence[Vector],
-        heard: Sequence[Vector],
+        heard: Sequence[Beacon],
         team: Sequence[Member],
         departed: Sequence[Departed] = (),
     ) -> tuple[Vector, ...]:
         """Return where silent bodies stand [m; world frame].
 
-        sensed: bodies relative to ``position`` [m; world axes]; heard: where those are who are
-        heard directly [m; world frame]; team: all members known; departed: who was one until now.
+        sensed: bodies relative to ``position`` [m; world axes]; heard: the last beacons of those
+        who are heard directly; team: all members known; departed: who was one until now.
         """
         if departed or self._departed:
             self._departed = [
@@ -76,7 +78,8 @@ class SilentBodies:
             ]
         unknown = [body for body in _in_world(position, sensed) if not self._explained(body, team)]
         if unknown:
-            reach = max((dist(position, other) for other in heard), default=0.0) + SAME_BODY_M
+            reach = max((dist(position, each.position) for each in heard), default=0.0)
+            reach += SAME_BODY_M
             unknown = [body for body in unknown if dist(position, body) <= reach]
         if not unknown and not self._bodies:
             return ()
@@ -111,8 +114,8 @@ class SilentBodies:
 
     def _explained(self, body: Vector, team: Sequence[Member]) -> bool:
         """Whether a member may be there by now: told of long ago, it may have moved on."""
-        for there, age_s in team:
-            if dist(body, there) < NEIGHBOUR_M + self._max_speed * age_s:
+        for member in team:
+            if dist(body, member.position) < NEIGHBOUR_M + self._max_speed * member.age_s:
                 return True
         return False
 

@@ -104,7 +104,7 @@ class Formation:
         self.vertex_places = {name: places[0] for name, places in holders.items()}
         self.common = tuple(places[0] for places in holders.values() if len(places) > 1)
         self._own = self._own_vertices(holders)
-        self._through = {
+        self._through: dict[tuple[int, int], frozenset[int]] = {
             places[0]: frozenset(place.queue for place in places) for places in holders.values()
         }
         self.layout = cache(self._layout)
@@ -125,7 +125,7 @@ class Formation:
 
     def queues_of(self, place: Place | tuple[int, int]) -> frozenset[int]:
         """Return the queues that a place belongs to: of a vertex, all that pass through it."""
-        return self._through.get(Place(*place)) or frozenset(place[:1])
+        return self._through.get(place) or frozenset(place[:1])
 
     def divide(self, agents: int, blocked: frozenset[Place] = NOTHING) -> tuple[int, ...]:
         """Return how many agents each queue gets besides the common ones of shared vertices.

@@ -58,8 +58,11 @@ class Trust:
         """Look whether neighbours near by are sensed where they say they are."""
         if not self._ranging:
             return
-        missed = any(self._is_missed(observation, beacon) for beacon in neighbours)
-        self._missed = self._missed + 1 if missed else 0
+        for beacon in neighbours:
+            if self._is_missed(observation, beacon):
+                self._missed += 1
+                return
+        self._missed = 0
 
     def _note_change(self, observation: Observation) -> None:
         if self._due_s and not observation.scans:
@@ -88,11 +91,14 @@ class Trust:
         )
 
     def _is_missed(self, observation: Observation, beacon: Beacon) -> bool:
+        here, there = observation.position, beacon.position
+        if dist(here, there) > NEAR_M:
+            return False
         age_s = max(0.0, observation.time_s - beacon.stamp_s)
-        away = tuple(b - a for a, b in zip(observation.position, beacon.position, strict=True))
-        if age_s > FRESH_S or dist(away, (0.0, 0.0, 0.0)) > NEAR_M:
+        if age_s > FRESH_S:
             return False
         slack = SLACK_M + self._max_speed * age_s
+        away = (there[0] - here[0], there[1] - here[1], there[2] - here[2])
         return all(dist(away, body) > slack for body in observation.vehicles)
 
 

@@ -18,8 +18,8 @@ def swept_separation(before: Singles, after: Singles) -> Floats:
     start = _between_rows(before)
     change = _between_rows(after) - start
     along = _dot(change, change)
-    when = -_dot(start, change) / np.where(along > 0.0, along, 1.0)
-    when = np.minimum(np.maximum(when, 0.0), 1.0)
+    along[along == 0.0] = 1.0
+    when = np.minimum(np.maximum(-_dot(start, change) / along, 0.0), 1.0)
     nearest = start + when * change
     square = _dot(nearest, nearest)
     square.flat[:: len(before) + 1] = np.nan

@@ -41,6 +41,7 @@ class Phase:
         self._since_s: float | None = None
         self._slots: dict[tuple[int, int, int], Slot | None] = {}
         self._owned: dict[int, Slot] = {}
+        self._stood: tuple[dict[int, Slot], Frame | None, Floats] = ({}, None, np.empty(0))
         self._owned_by: tuple[bytes, bytes, bytes] | None = None
 
     def frame(self, time_s: float) -> Frame:
@@ -52,16 +53,23 @@ class Phase:
 
         Two that claim the same slot have none: neither counts as arrived.
         """
-        error = np.full(len(tick.place), np.inf)
-        slots = self._own_slots(tick)
-        if slots:
-            rows = list(slots)
-            frame = self.frame(tick.time_s)
-            stands = [frame.to_world(slot.point) for slot in slots.values()]
-            off = tick.position[rows].astype(np.float64) - np.array(stands)
-            error[rows] = np.sqrt(np.sum(off * off, axis=1))
-        error[np.isnan(tick.position[:, 0])] = np.nan
+        off = tick.position - self._stands(tick)
+        square = off * off
+        error: Floats = np.sqrt(square[:, 0] + square[:, 1] + square[:, 2])
         return error
+
+    def _stands(self, tick: Tick) -> Floats:
+        """Return where each agent's slot is (N, 3) [m; world frame], infinitely far without one.
+
+        Remembered while slots and frame stay.
+        """
+        slots, frame = self._own_slots(tick), self.frame(tick.time_s)
+        if slots is not self._stood[0] or frame is not self._stood[1]:
+            stands = np.full(tick.position.shape, np.inf)
+            for row, slot in slots.items():
+                stands[row] = frame.to_world(slot.point)
+            self._stood = slots, frame, stands
+        return self._stood[2]
 
     def attitude_error_deg(self, tick: Tick) -> float | None:
         """Return the largest angle by which an agent misses its slot's orientation [deg].

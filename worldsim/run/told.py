@@ -1,8 +1,8 @@
 """What agents told of their reasons, and beside the truth as rows of a tick."""
 
 from math import atan2, degrees, hypot, nan, pi
-from typing import NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +14,7 @@ MOVING_MPS = 0.02
 NO_LINKS: NDArray[np.int32] = np.zeros((0, 2), dtype=np.int32)
 
 
-class Told(NamedTuple):
+class Told(msgspec.Struct, frozen=True, gc=False):
     """What an agent last told of its reasons, as a row of a tick; see Telemetry and Tick."""
 
     target: Vector

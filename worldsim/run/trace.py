@@ -13,15 +13,12 @@ class Trace:
 
     def poses(self, slot: int, fleet: Fleet) -> None:
         """Take the poses at the start of a slot."""
-        self._hash.update(slot.to_bytes(8, "little"))
-        self._hash.update(fleet.position.tobytes())
-        self._hash.update(fleet.yaw.tobytes())
-        self._hash.update(fleet.tilt.tobytes())
+        rows = fleet.position.tobytes() + fleet.yaw.tobytes() + fleet.tilt.tobytes()
+        self._hash.update(slot.to_bytes(8, "little") + rows)
 
     def command(self, agent: int, command: bytes) -> None:
         """Take one agent's command, as it was encoded; agents come in order of their ids."""
-        self._hash.update(agent.to_bytes(4, "little"))
-        self._hash.update(command)
+        self._hash.update(agent.to_bytes(4, "little") + command)
 
     def verdicts(self, digest: bytes) -> None:
         """Take the digest of all the medium's verdicts so far."""

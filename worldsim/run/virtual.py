@@ -115,12 +115,11 @@ class VirtualFleet:
     def _deliver(self, slot: int) -> None:
         """Hand what is due by a slot to the group that steps in it."""
         clock = self.loop.world.clock
-        alive = self.loop.team.alive
+        alive, time_s = self.loop.team.alive.tolist(), clock.time_s(slot)
         for agent in range(slot % clock.slots_per_tick, len(alive), clock.slots_per_tick):
-            if not alive[agent]:
-                continue
-            frames = self._medium.collect(agent, clock.time_s(slot))
-            self._inboxes[agent].append(pack(Batch(slot, frames)))
+            if alive[agent]:
+                batch = Batch(slot, self._medium.collect(agent, time_s))
+                self._inboxes[agent].append(pack(batch))
 
     def _packets(self) -> Packets:
         return self.verdicts.packets()

@@ -5,6 +5,7 @@ A pure state machine over slots; ``slot`` counts them, ``time_s`` is slot / slot
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isnan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,10 +80,7 @@ class World:
 
     def positions(self) -> tuple[Vector | None, ...]:
         """Return true positions, row i = agent i [m; world frame], None where there is none."""
-        return tuple(
-            None if row[0] != row[0] else (row[0], row[1], row[2])
-            for row in self.fleet.position.tolist()
-        )
+        return tuple([None if isnan(x) else (x, y, z) for x, y, z in self.fleet.position.tolist()])
 
     def enter(self, agent: int, position: Vector, yaw: float) -> None:
         """Put an agent's vehicle into the world [m; world frame, rad]; it hovers."""
@@ -108,14 +106,15 @@ class World:
                 for agent, each in zip(looking, sensed, strict=True)
             ]
             scans = {a: self.failures.scans(a, each, self.slot) for a, each in scans.items()}
+        slot, time_s = self.slot, self.time_s
         position = self.fleet.position.take(looking, axis=0).tolist()
         velocity = self.fleet.velocity.take(looking, axis=0).tolist()
         yaw = self.fleet.yaw.take(looking).tolist()
         return [
             Observation(
-                self.slot, self.time_s, tuple(p), tuple(v), heading, *each, (), scans.get(agent, ())
+                slot, time_s, (x, y, z), (u, v, w), heading, *each, (), scans.get(agent, ())
             )
-            for agent, p, v, heading, each in zip(
+            for agent, (x, y, z), (u, v, w), heading, each in zip(
                 looking, position, velocity, yaw, sensed, strict=True
             )
         ]

@@ -3,11 +3,11 @@
 import pytest
 
 from agent.comms.silent import MEMORY_S, SILENCE_S, Departed, Member, SilentBodies
-from tests.agent.comms.making import ORIGIN
+from tests.agent.comms.making import ORIGIN, beacon
 
 BODY = (1.0, 0.0, 0.0)
 FAR_MEMBER = Member((-2.0, 0.0, 0.0), 0.0)
-HEARD = [FAR_MEMBER.position]
+HEARD = [beacon(5, 1, 10.0, at=FAR_MEMBER.position)]
 
 
 def looked(bodies, now_s, sensed=(BODY,), team=(FAR_MEMBER,), departed=(), here=ORIGIN):
@@ -42,7 +42,12 @@ def test_a_member_explains_a_body_as_far_as_it_may_have_flown_since():
 def test_a_body_beyond_whom_one_hears_may_be_out_of_the_radios_range():
     bodies = SilentBodies(0.5)
     for now_s in (10.0, 12.0, 14.0):
-        assert bodies.look(now_s, ORIGIN, [BODY], [(0.5, 0.0, 0.0)], (FAR_MEMBER,)) == ()
+        assert (
+            bodies.look(
+                now_s, ORIGIN, [BODY], [beacon(5, 1, 10.0, at=(0.5, 0.0, 0.0))], (FAR_MEMBER,)
+            )
+            == ()
+        )
 
 
 @pytest.mark.parametrize(
