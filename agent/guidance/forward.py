@@ -1,7 +1,8 @@
 """Vehicles that move only where they point: the filter may only shorten what they fly.
 
 Until a command expires such a vehicle may have turned by its yaw rate, whatever it was told last:
-each bound is kept for every heading within that.
+each bound is kept for every heading within that. They cannot fly back: before what comes nearer by
+itself they stand.
 """
 
 from collections.abc import Sequence
@@ -36,8 +37,9 @@ def _scale(forward: float, climb: float, bounds: Sequence[Bound], yaw: float, sw
     scale = 1.0
     for bound in bounds:
         approach = _worst_approach(forward, climb, bound.away, yaw, sway)
-        if approach * scale > bound.limit + ROUNDING_MPS:
-            scale = max(0.0, bound.limit) / approach
+        limit = max(0.0, bound.limit)
+        if approach * scale > limit + ROUNDING_MPS:
+            scale = limit / approach
         if bound.aside < inf:
             square = forward * forward + climb * climb
             retreat = max(0.0, -approach)

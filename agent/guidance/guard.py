@@ -1,7 +1,8 @@
 """The last word before the vehicle: which bounds hold for one agent, and how it keeps them.
 
 Bodies are limited by what is sensed where there is a ranging sensor, else by what neighbours told;
-obstacles by the points near by, however they are known.
+obstacles by the points near by, however they are known. To what comes nearer by itself it gives
+way, where nearest points are sensed: points that were scanned are taken to stand.
 """
 
 from collections.abc import Callable
@@ -10,6 +11,7 @@ from math import hypot, radians
 from agent.controller import Senses
 from agent.guidance.cone import cone_of
 from agent.guidance.forward import forward_kept
+from agent.guidance.retreat import retreated
 from agent.guidance.safety import (
     ROUNDING_MPS,
     SHARE,
@@ -22,6 +24,7 @@ from agent.guidance.safety import (
     shortened,
 )
 from agent.messages import Vector
+from agent.sensing.motion import Motion
 from agent.sensing.pattern import KINDS
 from agent.setup import AgentSetup
 
@@ -51,6 +54,8 @@ class Guard:
         scans = any(kind in limits.sensors for kind in KINDS)
         scanned_m, creep = (SCANNED_M, CREEP * limits.max_speed_mps) if scans else (0.0, 0.0)
         self._cone = cone_of(limits)
+        self._limits = limits
+        self._motion = None if scans else Motion(setup.sensor.proximity.noise_m)
         self._ranging = None
         if "proximity" in limits.sensors:
             self._ranging = RangingFilter(*filtered, share, latency_s=self._latency_s)
@@ -67,7 +72,7 @@ class Guard:
 
     def safe(self, wanted: Vector, senses: Senses, told: Callable[[], list[Told]]) -> Vector:
         """Return the velocity that is safe to fly [m/s]; told: what neighbours last told."""
-        bounds = self._clearing.bounds(senses.obstacles) if senses.obstacles else []
+        bounds = self._cleared(senses) if senses.obstacles else []
         if self._ranging is not None:
             bounds += self._ranging.bounds(senses.vehicles)
             return self._kept(wanted, bounds, senses)
@@ -77,11 +82,23 @@ class Guard:
         bounds += self._promises.bounds(known)
         return shortened(self._kept(wanted, bounds, senses), self.speed_cap)
 
+    def _cleared(self, senses: Senses) -> list[Bound]:
+        """Return the limits from obstacles; negative where something comes too fast."""
+        points = senses.obstacles
+        if self._motion is not None:
+            coming = self._motion.coming(senses.now_s, senses.position, points)
+            if coming:
+                return self._clearing.from_moving(points, coming)
+        return self._clearing.bounds(points)
+
     def _kept(self, wanted: Vector, bounds: list[Bound], senses: Senses) -> Vector:
+        limits = self._limits
         if self._forward:
             return forward_kept(wanted, bounds, senses.yaw, self._sway)
         if self._accelerates and self._too_fast(senses.velocity, bounds):
             return STAND
+        if senses.obstacles and any(bound.limit < 0.0 for bound in bounds):
+            return retreated(wanted, bounds, limits.max_speed_mps, limits.max_climb_mps)
         return limited(wanted, bounds, senses.yaw, self._cone)
 
     def _too_fast(self, velocity: Vector, bounds: list[Bound]) -> bool:
@@ -90,6 +107,7 @@ class Guard:
         return any(
             approach_of(velocity, bound) * needs_s > bound.limit * self._horizon_s + ROUNDING_MPS
             for bound in bounds
+            if bound.limit >= 0.0
         )
 
     def _stopping_s(self, speed: float) -> float:

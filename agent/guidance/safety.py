@@ -33,12 +33,14 @@ ROUNDING_MPS = 1e-12
 class Bound(NamedTuple):
     """One body's limits: the speed towards it and the speed across [m/s].
 
-    away: the unit vector away from the body.
+    away: the unit vector away from the body. A negative limit asks for a retreat from what comes at
+    ``coming`` [m/s; world axes] by itself.
     """
 
     away: Vector
     limit: float
     aside: float = inf
+    coming: Vector = (0.0, 0.0, 0.0)
 
 
 class RangingFilter:
@@ -60,6 +62,7 @@ class RangingFilter:
         latency_s: float | None = None,
     ) -> None:
         reach = max_speed * (horizon_s if latency_s is None else latency_s)
+        self._max_speed = max_speed
         self._d_ob = d_ob
         self._stop_m = d_ob + reach * reach / d_ob
         self._turning_hz = max_speed / (self._stop_m - d_ob)
@@ -78,6 +81,23 @@ class RangingFilter:
             turning = self._turning_hz * max(0.0, r - self._d_ob)
             aside = max(self._creep, turning) if r < self._stop_m else inf
             found.append(Bound((-x / r, -y / r, -z / r), limit, aside))
+        return found
+
+    def from_moving(self, points: Sequence[Vector], coming: Sequence[Vector]) -> list[Bound]:
+        """Return the limits from points of which some come nearer by themselves [m/s].
+
+        These do not share the duty, so their speed counts whole: -n.v <= share gap/H - n.coming.
+        Where it is negative, nothing holds one from going aside.
+        """
+        found = []
+        for (x, y, z), (u, v, w) in zip(points, coming, strict=True):
+            r = max(hypot(x, y, z), 1e-9)
+            speed = -(x * u + y * v + z * w) / r
+            limit = self._rate * (r - self._stop_m) - speed
+            if speed <= 0.0:
+                found += self.bounds([(x, y, z)])
+            elif limit < self._max_speed:
+                found.append(Bound((-x / r, -y / r, -z / r), limit, coming=(u, v, w)))
         return found
 
 
@@ -141,15 +161,16 @@ def limited(velocity: Vector, bounds: Sequence[Bound], yaw: float, cone: Cone) -
     """
     if all(_keeps(velocity, bound) for bound in bounds):
         return velocity
-    sliding = velocity
-    for _ in range(PASSES):
-        for bound in bounds:
-            if not _keeps(sliding, bound):
-                sliding = _slid(sliding, bound)
+    sliding = _slid_along(velocity, bounds)
     if _in_cone(sliding, yaw, cone):
         return _kept(sliding, bounds)
     climbing = _kept((0.0, 0.0, sliding[2]), bounds)
     return max(climbing, _kept(velocity, bounds), key=lambda v: hypot(*v))
+
+
+def slid(velocity: Vector, bounds: Sequence[Bound]) -> Vector:
+    """Return a velocity slid along every bound; those that are not negative it keeps [m/s]."""
+    return _kept(_slid_along(velocity, bounds), [each for each in bounds if each.limit >= 0.0])
 
 
 def shortened(velocity: Vector, max_speed: float) -> Vector:
@@ -159,6 +180,14 @@ def shortened(velocity: Vector, max_speed: float) -> Vector:
         return velocity
     scale = max_speed / speed
     return (velocity[0] * scale, velocity[1] * scale, velocity[2] * scale)
+
+
+def _slid_along(velocity: Vector, bounds: Sequence[Bound]) -> Vector:
+    for _ in range(PASSES):
+        for bound in bounds:
+            if not _keeps(velocity, bound):
+                velocity = _slid(velocity, bound)
+    return velocity
 
 
 def _keeps(velocity: Vector, bound: Bound) -> bool:
