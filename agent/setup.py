@@ -119,7 +119,8 @@ class AgentSetup(Table, frozen=True):
 
     command_ticks: for how many ticks a command is valid; H of docs/method.md follows from it.
     fleet_max_speed_mps: the fastest vehicle's limit, which is what the others must reckon with.
-    frame: where the target's frame goes, until a mission says otherwise.
+    frame: where the target's frame goes, until a mission says otherwise. lockstep: whether its
+    process waits for what each of its slots brings.
     """
 
     id: Annotated[int, Meta(ge=0, lt=2**16)]
@@ -134,3 +135,4 @@ class AgentSetup(Table, frozen=True):
     formation: FormationSpec
     sensor: Sensors = Sensors()
     frame: FramePath = AT_HOME
+    lockstep: bool = False

@@ -34,6 +34,7 @@ from netem.near import Near, Neighbourhood
 from netem.schedule import Schedule
 from netem.wire.frame import (
     BATCH_HEAD_B,
+    CHANNELS,
     FRAME_HEAD_B,
     MAX_BATCH_B,
     MAX_FRAMES,
@@ -71,6 +72,7 @@ class Medium:
         self._airs: dict[tuple[int, int], Air] = {}
         self._fates = [0] * len(Cause)
         self._journal = Journal(setup.agents)
+        self._spoken_b = [0] * (len(CHANNELS) * setup.agents)
         self.sent = self.addressed = self.in_flight = self.duplicated = self.corrupted = 0
 
     def place(self, positions: tuple[Position | None, ...]) -> None:
@@ -106,6 +108,7 @@ class Medium:
             count = self._counts.get(count_key, 0)
             self._counts[count_key] = count + 1
             self.sent += 1
+            self._spoken_b[len(CHANNELS) * source + outgoing.channel] += len(outgoing.payload)
             self.addressed += self._others[source]
             self._spread(
                 Frame(source, transmission.incarnation, outgoing.channel, count, outgoing.payload),
@@ -156,6 +159,7 @@ class Medium:
             self.digest(),
             duplicated=self.duplicated,
             corrupted=self.corrupted,
+            spoken_b=tuple(self._spoken_b),
         )
 
     def _spread(self, frame: Frame, sent_s: float) -> None:

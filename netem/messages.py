@@ -1,11 +1,12 @@
 """What the world tells the medium: the conditions, each slot the true positions, and orders."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
-from netem.wire.frame import AgentId, Count
+from netem.wire.frame import AgentId, Count, unpack_typed
 
 Metres = Annotated[float, Meta(ge=-1e6, le=1e6)]
 Position = tuple[Metres, Metres, Metres]
@@ -13,6 +14,8 @@ Position = tuple[Metres, Metres, Metres]
 MAX_TRUTH_B = 256 * 1024
 MAX_CONDITIONS_B = 1024 * 1024
 MAX_ORDERS_B = 1024 * 1024
+MAX_TURN_B = MAX_TRUTH_B + MAX_ORDERS_B
+MAX_DONE_B = 4 * 1024 * 1024
 
 
 Percent = Annotated[float, Meta(ge=0, le=100)]
@@ -155,7 +158,10 @@ class Orders(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class MediumSetup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """All that a medium needs to begin; ``speed``: simulated seconds in one of the wall clock."""
+    """All that a medium needs to begin; ``speed``: simulated seconds in one of the wall clock.
+
+    receivers: those whom this one of several mediums delivers to; None: all.
+    """
 
     seed: Count
     agents: Annotated[int, Meta(ge=1, lt=2**16)]
@@ -163,6 +169,8 @@ class MediumSetup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     slot_hz: Annotated[float, Meta(gt=0, le=1e5)]
     conditions: Conditions
     speed: Annotated[float, Meta(gt=0, le=1e4)] = 1.0
+    lockstep: bool = False
+    receivers: tuple[AgentId, ...] | None = None
 
 
 class Truth(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
@@ -183,6 +191,7 @@ class Verdicts(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_un
     addressed: frames sent, times the other agents, and each duplicate once more; it equals the sum
     of fates and in_flight. duplicated, corrupted: how many were copies, or had a bit turned.
     late_s: how much later than their due time batches left, free-running [s]: median and worst.
+    spoken_b: payload bytes that each agent sent, channel by channel, agent after agent.
     """
 
     slot: Count
@@ -195,9 +204,62 @@ class Verdicts(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_un
     late_s: tuple[float, float] | None = None
     duplicated: Count = 0
     corrupted: Count = 0
+    spoken_b: tuple[Count, ...] = ()
 
     def packets(self) -> dict[str, int]:
         """Return the counters under their names in summary.json, fates between the others."""
         counted = {"sent": self.sent, "addressed": self.addressed}
         marked = {"duplicated": self.duplicated, "corrupted": self.corrupted}
         return {**counted, **self.fates, **marked, "in_flight": self.in_flight}
+
+
+class Turn(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
+    """All that the medium needs to play one slot in lockstep.
+
+    participants: who steps in it, ids ascending; incarnations: everybody's, row i = agent i.
+    orders: what is to be carried out before it.
+    """
+
+    truth: Truth
+    participants: tuple[AgentId, ...]
+    incarnations: tuple[Count, ...]
+    orders: tuple[RadioOrder, ...] = ()
+
+
+class Done(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
+    """A slot that one of several mediums has played: its pages by receiver, and its counters."""
+
+    slot: Count
+    pages: tuple[tuple[AgentId, bytes], ...]
+    verdicts: Verdicts
+
+
+_turn = msgspec.msgpack.Decoder(Turn).decode
+_done = msgspec.msgpack.Decoder(Done).decode
+
+
+def unpack_turn(data: bytes) -> Turn:
+    """Decode what the world sends in lockstep, or raise WireError."""
+    return unpack_typed(data, _turn, MAX_TURN_B)
+
+
+def unpack_done(data: bytes) -> Done:
+    """Decode what a medium answers in lockstep, or raise WireError."""
+    return unpack_typed(data, _done, MAX_DONE_B)
+
+
+def together(parts: Sequence[Verdicts]) -> Verdicts:
+    """Return what one medium would have counted where several share the receivers out."""
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    causes = {cause for part in parts for cause in part.rejected}
+    return msgspec.structs.replace(
+        first,
+        addressed=sum(part.addressed for part in parts),
+        fates={fate: sum(part.fates[fate] for part in parts) for fate in first.fates},
+        in_flight=sum(part.in_flight for part in parts),
+        rejected={c: sum(part.rejected.get(c, 0) for part in parts) for c in sorted(causes)},
+        duplicated=sum(part.duplicated for part in parts),
+        corrupted=sum(part.corrupted for part in parts),
+    )

@@ -1,35 +1,28 @@
 """The medium as a process: this host's Zenoh router, and the radio between the agents of one run.
 
-The world conducts. Each slot's truth makes the medium take in what was sent so far and hand out
-the batches of the next slot, so a frame never arrives in the slot in which it was sent.
+The world conducts. Several of them may share the agents out by receiver; then one is the router,
+and the others are its clients.
 """
 
 import sys
-import time
-from collections import Counter, deque
-from statistics import median
 
 import msgspec
 import zenoh
 from zenoh.handlers import RingChannel
 
-from netem.medium import Medium
-from netem.messages import MAX_CONDITIONS_B, MAX_TRUTH_B, MediumSetup, Truth, Verdicts
-from netem.orders import OrderBook
-from netem.wire.frame import Batch, Transmission, WireError, pack, unpack, unpack_transmission
+from netem.lockstep import Turns
+from netem.messages import MAX_CONDITIONS_B, MediumSetup
+from netem.radio import Radio
+from netem.wire.ending import Ending
 from netem.wire.keys import Keys
-from netem.wire.post import Post, Waiting, drained, receive
-from netem.wire.session import SessionError, open_router
+from netem.wire.post import Post, Ring, Waiting, drained, receive
+from netem.wire.session import SessionError, open_client, open_router
 from netem.wire.stop import Stop
+from netem.wire.turns import LockstepError, UnwantedError
 
 WAIT_S = 0.2
 SILENCE_S = 30.0
 TRUTH_RING = 16
-ORDERS_RING = 256
-SENDER_RING = 4
-SENDER_QUOTA = 2
-"""How many of one sender's messages are taken a slot: a flooder evicts only its own."""
-LATENESS_KEPT = 4096
 
 
 class SilenceError(RuntimeError):
@@ -37,14 +30,17 @@ class SilenceError(RuntimeError):
 
 
 class Desk:
-    """Gives the medium to the run that asks first, and refuses every other."""
+    """Gives the medium to the run that asks first, and refuses every other.
 
-    def __init__(self, session: zenoh.Session) -> None:
+    shard: which of several mediums it is; 0 is the router's own.
+    """
+
+    def __init__(self, session: zenoh.Session, shard: int = 0) -> None:
+        self.shard = shard
         self.run: str | None = None
         self.setup: MediumSetup | None = None
-        self._questions: Waiting[zenoh.Query] = session.declare_queryable(
-            Keys.any_run("medium"), RingChannel(16)
-        )
+        key = Keys.any_run("shard", shard) if shard else Keys.any_run("medium")
+        self._questions: Waiting[zenoh.Query] = session.declare_queryable(key, RingChannel(16))
 
     def wait(self, timeout_s: float) -> None:
         """Answer the next question that comes within ``timeout_s`` [s]."""
@@ -81,163 +77,28 @@ class Desk:
         return None
 
 
-class Lateness:
-    """How much later than due batches left [simulated s]: the median of the last ones, the worst.
-
-    The present simulated time is that of the newest truth, and what has passed since it was read.
-    """
-
-    def __init__(self, speed: float) -> None:
-        self._speed = speed
-        self._kept: deque[float] = deque(maxlen=LATENESS_KEPT)
-        self._worst_s = 0.0
-
-    def note(self, due_s: float, newest_s: float, read_at: float) -> None:
-        """Note a batch due at ``due_s``, leaving now; the newest truth is of ``newest_s``."""
-        now_s = newest_s + (time.monotonic() - read_at) * self._speed
-        late_s = max(0.0, now_s - due_s)
-        self._kept.append(late_s)
-        self._worst_s = max(self._worst_s, late_s)
-
-    def summary(self) -> tuple[float, float] | None:
-        """Return median and worst [s], or None before the first batch."""
-        return (median(self._kept), self._worst_s) if self._kept else None
-
-
-class Intake:
-    """Decides which of the senders' messages the medium takes, and counts the others by cause."""
-
-    def __init__(self, setup: MediumSetup) -> None:
-        self.rejected: Counter[str] = Counter()
-        self._slots_per_tick = setup.slots_per_tick
-        self._last: list[tuple[int, int]] = [(-1, -1)] * setup.agents
-
-    def take(self, sender: int, data: bytes, slot: int) -> Transmission | None:
-        """Return a sender's message as it arrived by ``slot``, or None where it is refused.
-
-        A process that was stopped for a while answers old observations when it goes on; a copy of
-        an earlier message may come at any time. Neither reaches the air.
-        """
-        try:
-            transmission = unpack_transmission(data)
-        except WireError as error:
-            self.rejected[str(error).split(" ", 1)[0].rstrip(":")] += 1
-            return None
-        cause = self._cause(sender, transmission, slot)
-        if cause is not None:
-            self.rejected[cause] += 1
-            return None
-        self._last[sender] = (transmission.incarnation, transmission.slot)
-        return transmission
-
-    def _cause(self, sender: int, transmission: Transmission, slot: int) -> str | None:
-        if transmission.slot > slot:
-            return "ahead"
-        if transmission.slot < slot - self._slots_per_tick:
-            return "stale"
-        if (transmission.incarnation, transmission.slot) <= self._last[sender]:
-            return "repeated"
-        return None
-
-
-class Radio:
-    """The medium between the agents of one run, slot by slot."""
-
-    def __init__(self, post: Post, setup: MediumSetup) -> None:
-        self._setup = setup
-        self._medium = Medium(setup)
-        self._intake = Intake(setup)
-        self._lateness = Lateness(setup.speed)
-        agents = range(setup.agents)
-        self._senders = [post.ring("tx", agent, SENDER_RING) for agent in agents]
-        self._receivers = [post.putter("rx", agent) for agent in agents]
-        self._orders = post.ring("orders", size=ORDERS_RING)
-        self._book = OrderBook()
-        self._report = post.putter("verdicts")
-        self._report_every = max(1, round(setup.slot_hz))
-        self._slot = 0
-
-    def hear(self, truths: list[bytes]) -> None:
-        """Play the slots whose truths have come, oldest first."""
-        read_at = time.monotonic()
-        known = [truth for truth in map(self._truth, truths) if truth is not None]
-        for truth in known:
-            self._play(truth, known[-1].time_s, read_at)
-
-    def report(self) -> None:
-        """Tell the world the counters as they stand after the last slot played."""
-        verdicts: Verdicts = msgspec.structs.replace(
-            self._medium.verdicts(self._slot),
-            rejected=dict(self._intake.rejected),
-            late_s=self._lateness.summary(),
-        )
-        self._report(pack(verdicts))
-
-    def _truth(self, data: bytes) -> Truth | None:
-        try:
-            truth = unpack(data, Truth, MAX_TRUTH_B)
-        except WireError:
-            self._intake.rejected["truth"] += 1
-            return None
-        if len(truth.positions) != self._setup.agents or truth.slot < self._slot:
-            self._intake.rejected["truth"] += 1
-            return None
-        return truth
-
-    def _play(self, truth: Truth, newest_s: float, read_at: float) -> None:
-        self._obey(truth.slot)
-        self._medium.place(truth.positions)
-        self._ingest(truth.slot)
-        self._deliver(truth.slot + 1, newest_s, read_at)
-        self._slot = truth.slot + 1
-        if self._slot % self._report_every == 0:
-            self.report()
-
-    def _obey(self, slot: int) -> None:
-        """Carry out what was ordered for slots up to this one."""
-        for data in self._orders.drain(ORDERS_RING):
-            try:
-                self._book.take(data)
-            except WireError:
-                self._intake.rejected["orders"] += 1
-        for order in self._book.due(slot):
-            self._medium.obey(order)
-
-    def _ingest(self, slot: int) -> None:
-        for sender, ring in enumerate(self._senders):
-            for data in ring.drain(SENDER_QUOTA):
-                transmission = self._intake.take(sender, data, slot)
-                if transmission is not None:
-                    sent_s = transmission.slot / self._setup.slot_hz
-                    self._medium.transmit(sender, sent_s, transmission)
-
-    def _deliver(self, slot: int, newest_s: float, read_at: float) -> None:
-        due_s = slot / self._setup.slot_hz
-        group = slot % self._setup.slots_per_tick
-        for receiver in range(group, self._setup.agents, self._setup.slots_per_tick):
-            frames = self._medium.collect(receiver, due_s)
-            self._receivers[receiver](pack(Batch(slot, frames)))
-        self._lateness.note(due_s, newest_s, read_at)
-
-
-def run(listen: str) -> int:
+def run(endpoint: str, shard: int = 0, patient: bool = False) -> int:
     """Serve at an endpoint, and say in one line what stood in its way; return the exit status."""
     try:
-        return serve(listen)
-    except (SessionError, SilenceError) as error:
-        print(f"netem: {error}", file=sys.stderr)
+        return serve(endpoint, shard, patient)
+    except (SessionError, SilenceError, LockstepError) as error:
+        print(f"{name_of(shard)}: {error}", file=sys.stderr)
         return 2 if isinstance(error, SessionError) else 1
 
 
-def serve(listen: str) -> int:
-    """Be the router at an endpoint and the medium of the first run that asks; return 0 at its end.
+def serve(endpoint: str, shard: int = 0, patient: bool = False) -> int:
+    """Be the medium of the first run that asks; return 0 at its end.
 
-    Raises SessionError when it cannot listen there, SilenceError when the world is gone.
+    Shard 0 is the router at the endpoint, too; the others connect to it. patient: whether who is
+    silent for long is still there. Raises SessionError when it cannot listen or connect there,
+    SilenceError when the world is gone, LockstepError when somebody speaks out of turn.
     """
-    with open_router(listen) as session:
+    opening = open_client(endpoint, patient=patient) if shard else open_router(endpoint, patient)
+    with opening as session:
         stop = Stop()
-        print(f"netem listens at {listen}, for one run", flush=True)
-        desk = Desk(session)
+        at = "is connected to" if shard else "listens at"
+        print(f"{name_of(shard)} {at} {endpoint}, for one run", flush=True)
+        desk = Desk(session, shard)
         while desk.run is None and not stop.asked:
             desk.wait(WAIT_S)
         if desk.run is not None and desk.setup is not None:
@@ -245,22 +106,35 @@ def serve(listen: str) -> int:
     return 0
 
 
+def name_of(shard: int) -> str:
+    """Return the name under which one of several mediums shows life."""
+    return f"netem-{shard}" if shard else "netem"
+
+
 def _serve_run(post: Post, desk: Desk, setup: MediumSetup, stop: Stop) -> None:
-    print(f"netem serves run {desk.run!r} of {setup.agents} agents, seed {setup.seed}", flush=True)
-    truths, over = post.ring("truth", size=TRUTH_RING), post.ring("over")
-    radio = Radio(post, setup)
-    post.show_life("netem")
+    name = name_of(desk.shard)
+    print(f"{name} serves run {desk.run!r} of {setup.agents} agents, seed {setup.seed}", flush=True)
+    truths, ending = post.ring("truth", size=TRUTH_RING), Ending(post, stop)
+    radio = Turns(post, setup, desk.shard, ending) if setup.lockstep else Radio(post, setup)
+    post.show_life(name)
+    try:
+        _play(radio, truths, desk, ending)
+    except UnwantedError:
+        print(f"{name}: the run is over, within a slot", flush=True)
+    else:
+        radio.report()
+        print(f"{name}: the run is over", flush=True)
+
+
+def _play(radio: Turns | Radio, truths: Ring, desk: Desk, ending: Ending) -> None:
+    """Play slots until the run is over; what came before its end is played still."""
     silent_s = 0.0
-    while not stop.asked:
+    ended = False
+    while not ended:
         desk.attend()
-        ended = bool(over.drain(1))
+        ended = ending()
         first = truths.wait(WAIT_S) if not ended else None
-        heard = [first] if first is not None else []
-        radio.hear(heard + truths.drain(TRUTH_RING))
-        if ended:
-            radio.report()
-            print("netem: the run is over", flush=True)
-            break
+        radio.hear(([first] if first is not None else []) + truths.drain(TRUTH_RING))
         silent_s = 0.0 if first is not None else silent_s + WAIT_S
         if silent_s > SILENCE_S:
             raise SilenceError(f"the world of run {desk.run!r} has been silent for {SILENCE_S:g} s")

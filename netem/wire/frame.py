@@ -23,6 +23,7 @@ MAX_TRANSMISSION_B = MAX_OUTGOING * (MAX_PAYLOAD_B + 5) + 22
 MAX_BATCH_B = 256 * 1024
 BATCH_RING = 8
 """How many batches wait at an agent that does not read; newer ones push out the oldest."""
+MAX_INBOX_B = BATCH_RING * (MAX_BATCH_B + 5) + 16
 MAX_FRAMES = 4096
 FRAME_HEAD_B = 26
 BATCH_HEAD_B = 13
@@ -72,6 +73,16 @@ class Batch(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unkno
     frames: Annotated[tuple[Frame, ...], Meta(max_length=MAX_FRAMES)]
 
 
+class Inbox(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
+    """All batches that wait for one agent when it steps in a slot, encoded; for lockstep.
+
+    One, as a rule; none at an agent's first step, more after a pause.
+    """
+
+    slot: Count
+    batches: Annotated[tuple[bytes, ...], Meta(max_length=BATCH_RING)]
+
+
 _T = TypeVar("_T")
 _encode = msgspec.msgpack.Encoder().encode
 
@@ -108,19 +119,25 @@ def unpack(data: bytes, kind: type[_T], max_bytes: int, max_items: int = MAX_FRA
 
 _transmission = msgspec.msgpack.Decoder(Transmission).decode
 _batch = msgspec.msgpack.Decoder(Batch).decode
+_inbox = msgspec.msgpack.Decoder(Inbox).decode
 
 
 def unpack_transmission(data: bytes) -> Transmission:
     """Decode what an agent sent, or raise :class:`WireError`."""
-    return _typed(data, _transmission, MAX_TRANSMISSION_B)
+    return unpack_typed(data, _transmission, MAX_TRANSMISSION_B)
 
 
 def unpack_batch(data: bytes) -> Batch:
     """Decode what the medium delivered, or raise :class:`WireError`."""
-    return _typed(data, _batch, MAX_BATCH_B)
+    return unpack_typed(data, _batch, MAX_BATCH_B)
 
 
-def _typed(data: bytes, decode: Callable[[bytes], _T], max_bytes: int) -> _T:
+def unpack_inbox(data: bytes) -> Inbox:
+    """Decode what waited for an agent, or raise :class:`WireError`."""
+    return unpack_typed(data, _inbox, MAX_INBOX_B)
+
+
+def unpack_typed(data: bytes, decode: Callable[[bytes], _T], max_bytes: int) -> _T:
     """Decode where it happens most: the type alone bounds depth, lengths and extension types."""
     if len(data) > max_bytes:
         raise WireError(f"oversize: {len(data)} B where {max_bytes} B are allowed")

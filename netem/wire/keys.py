@@ -28,6 +28,7 @@ class Topic(NamedTuple):
 TOPICS = {
     "setup": Topic("setup/{id}", "world", "agent", "query, once a start", True, "agent's setup"),
     "medium": Topic("medium", "netem", "world", "query, once a start", True, "seed, conditions"),
+    "shard": Topic("medium/{id}", "netem", "world", "query, once a start", True, "one of several"),
     "orders": Topic("orders", "world", "netem", "at an event", True, "changes, partitions"),
     "control": Topic("control", "world", "operator", "query, at will", True, "missions, faults"),
     "truth": Topic("truth", "world", "netem", "each slot", False, "true positions"),
@@ -35,6 +36,7 @@ TOPICS = {
     "command": Topic("cmd/{id}", "agent", "world", "tick_hz", False, "velocity and telemetry"),
     "tx": Topic("radio/tx/{id}", "agent", "netem", "tick_hz", False, "frames to send"),
     "rx": Topic("radio/rx/{id}", "netem", "agent", "tick_hz", False, "a batch of frames heard"),
+    "done": Topic("done/{id}", "netem", "world", "each slot, lockstep", True, "a slot's fates"),
     "verdicts": Topic("verdicts", "netem", "world", "1 Hz and at the end", False, "counters"),
     "over": Topic("over", "world", "everybody", "once", True, "the run has ended"),
     "alive": Topic("alive/{name}", "everybody", "everybody", "liveliness", True, "a process lives"),
@@ -62,9 +64,9 @@ class Keys:
         return f"qswarm/{self.run}/" + TOPICS[topic].template.format(id="*", name="*")
 
     @staticmethod
-    def any_run(topic: str) -> str:
-        """Return the key expression of a topic without an id, of whichever run."""
-        return "qswarm/*/" + TOPICS[topic].template
+    def any_run(topic: str, who: int | None = None) -> str:
+        """Return the key expression of a topic, of whichever run."""
+        return "qswarm/*/" + TOPICS[topic].template.format(id=who)
 
     @staticmethod
     def run_of(key: str) -> str:

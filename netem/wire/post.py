@@ -7,7 +7,7 @@ thread of ours or blocks a sender.
 import signal
 from collections.abc import Callable
 from types import FrameType
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import zenoh
 from zenoh.handlers import RingChannel
@@ -133,14 +133,27 @@ class Post:
         self._session = session
         self._keys = keys
         self._signs: list[zenoh.LivelinessToken] = []
+        self._awaited: list[zenoh.Publisher] = []
 
-    def putter(self, topic: str, who: int | None = None) -> Put:
-        """Return what puts on a topic, with the quality of service that the table gives it."""
-        reliable = TOPICS[topic].reliable
+    def putter(self, topic: str, who: int | None = None, *, lockstep: bool = False) -> Put:
+        """Return what puts on a topic, with the quality of service that the table gives it.
+
+        In lockstep every message is waited for: it blocks where it would else be dropped.
+        """
+        reliable = lockstep or TOPICS[topic].reliable
         control = zenoh.CongestionControl.BLOCK if reliable else zenoh.CongestionControl.DROP
         key = self._keys.of(topic, who)
         publisher = self._session.declare_publisher(key, congestion_control=control)
+        if lockstep:
+            self._awaited.append(publisher)
         return publisher.put
+
+    @property
+    def heard(self) -> bool:
+        """Whether all that is put in lockstep has somebody who listens."""
+        # Zenoh's stubs call a status a bool; it has one.
+        found: list[Any] = [publisher.matching_status for publisher in self._awaited]
+        return all(status.matching for status in found)
 
     def ring(self, topic: str, who: int | None = None, size: int = 1) -> Ring:
         """Return a ring of the newest messages on a topic."""

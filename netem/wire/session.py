@@ -12,6 +12,8 @@ import zenoh
 
 OPEN_TIMEOUT_S = 8.0
 MAX_MESSAGE_B = 4 * 1024 * 1024
+PATIENT_LEASE_S = 24 * 3600
+"""How long a session in lockstep may be silent: as long as somebody is paused there."""
 
 _ENDPOINT = re.compile(r"(?P<protocol>[a-z][a-z-]*)/(?P<address>.+)")
 _IN_USE = re.compile(r"in use|lock", re.IGNORECASE)
@@ -21,36 +23,40 @@ class SessionError(RuntimeError):
     """A session that could not be opened; the text says it in one line."""
 
 
-def open_router(listen: str) -> zenoh.Session:
+def open_router(listen: str, patient: bool = False) -> zenoh.Session:
     """Open this host's router at ``listen``, for example ``tcp/127.0.0.1:7447``.
 
-    Raises :class:`SessionError` when the endpoint is malformed, not loopback or in use.
+    patient: whether who is silent for long is still there. Raises :class:`SessionError` when the
+    endpoint is malformed, not loopback or in use.
     """
     _refuse_all_but_loopback(listen)
     try:
-        return zenoh.open(router_config(listen))
+        return zenoh.open(router_config(listen, patient))
     except zenoh.ZError as error:
         raise SessionError(f"{listen}: {_cause(error)}") from error
 
 
-def open_client(connect: str, timeout_s: float = OPEN_TIMEOUT_S) -> zenoh.Session:
+def open_client(
+    connect: str, timeout_s: float = OPEN_TIMEOUT_S, patient: bool = False
+) -> zenoh.Session:
     """Open a client of the router at ``connect``; later the client reconnects by itself.
 
-    Raises :class:`SessionError` when no router answers within ``timeout_s`` [s].
+    patient: whether it may be silent for long and is still there. Raises :class:`SessionError`
+    when no router answers within ``timeout_s`` [s].
     """
     _address(connect)
     try:
-        return zenoh.open(client_config(connect, timeout_s))
+        return zenoh.open(client_config(connect, timeout_s, patient))
     except zenoh.ZError as error:
         raise SessionError(f"no router answers at {connect} within {timeout_s:g} s") from error
 
 
-def router_config(listen: str) -> zenoh.Config:
+def router_config(listen: str, patient: bool = False) -> zenoh.Config:
     """Return the configuration of a router that listens at one endpoint."""
-    return _config({"mode": "router", "listen": {"endpoints": [listen]}})
+    return _config({"mode": "router", "listen": {"endpoints": [listen]}}, patient)
 
 
-def client_config(connect: str, timeout_s: float) -> zenoh.Config:
+def client_config(connect: str, timeout_s: float, patient: bool = False) -> zenoh.Config:
     """Return the configuration of a client that listens nowhere."""
     retry = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2}
     return _config(
@@ -63,16 +69,18 @@ def client_config(connect: str, timeout_s: float) -> zenoh.Config:
                 "exit_on_failure": True,
                 "retry": retry,
             },
-        }
+        },
+        patient,
     )
 
 
-def _config(own: dict[str, Any]) -> zenoh.Config:
+def _config(own: dict[str, Any], patient: bool) -> zenoh.Config:
+    sending = {"tx": {"lease": PATIENT_LEASE_S * 1000}} if patient else {}
     common = {
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "adminspace": {"enabled": False},
         "transport": {
-            "link": {"rx": {"max_message_size": MAX_MESSAGE_B}},
+            "link": {"rx": {"max_message_size": MAX_MESSAGE_B}, **sending},
             "shared_memory": {"enabled": False},
         },
     }

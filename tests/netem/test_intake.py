@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netem.messages import Conditions, MediumSetup
-from netem.process import Intake
+from netem.radio import Intake
 from netem.wire.frame import (
     MAX_OUTGOING,
     MAX_PAYLOAD_B,

@@ -7,7 +7,7 @@ import pytest
 
 from agent.messages import Command, Telemetry
 from netem.messages import Conditions, MediumSetup
-from netem.process import Intake, Lateness
+from netem.radio import Intake, Lateness
 from netem.wire.frame import MAX_TRANSMISSION_B, Outgoing, Transmission, pack
 from netem.wire.post import RefusedError
 from worldsim.run import muster
