@@ -5,7 +5,7 @@ come. Silent or wrong: nothing is sensed where a neighbour near by says it is.
 """
 
 from collections.abc import Sequence
-from math import dist
+from math import dist, hypot
 
 from agent.messages import Beacon, Observation, Vector
 from agent.sensing.pattern import Pattern
@@ -27,7 +27,8 @@ class Trust:
     """Watches one agent's sensors; max_speed: of any vehicle [m/s].
 
     noisy: sensors of which no two readings are the same. Without noise, those who fly side by side
-    see one another at the very same place for ever; then only what does not move shows it.
+    see one another at the very same place for ever, and so does who flies along a wall; then only
+    what does not move shows it, to those who come nearer or go away.
     """
 
     def __init__(
@@ -78,8 +79,23 @@ class Trust:
         )
         if reading == NO_READING or reading != self._reading or self._read_at is None:
             self._reading, self._read_at, self._stuck = reading, observation.position, False
-        elif dist(observation.position, self._read_at) > MOVED_M:
+        elif self._must_have_changed(observation, self._read_at):
             self._stuck = True
+
+    def _must_have_changed(self, observation: Observation, read_at: Vector) -> bool:
+        """Whether the vehicle has moved too far for a reading that stayed the same.
+
+        Without noise one sees no change along a wall, but as one comes nearer or goes away.
+        """
+        if dist(observation.position, read_at) <= MOVED_M:
+            return False
+        if PROXIMITY in self._noisy or self._reading[2]:
+            return True
+        x, y, z = (b - a for a, b in zip(read_at, observation.position, strict=True))
+        return any(
+            abs(x * u + y * v + z * w) > MOVED_M * hypot(u, v, w)
+            for u, v, w in observation.obstacles
+        )
 
     def _late(self, observation: Observation) -> bool:
         now_s = observation.time_s

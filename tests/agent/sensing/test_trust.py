@@ -15,9 +15,9 @@ ECHO = Scan(0, array("H", [1000] * 61).tobytes())
 NONE = Scan(0, array("H", [0xFFFF] * 61).tobytes())
 
 
-def seen(tick, x=0.0, vehicles=(), scans=()):
+def seen(tick, x=0.0, vehicles=(), scans=(), obstacles=()):
     at = (x, 0.0, 0.0)
-    return Observation(4 * tick, 0.05 * tick, at, (0.0,) * 3, 0.0, vehicles, (), (), scans)
+    return Observation(4 * tick, 0.05 * tick, at, (0.0,) * 3, 0.0, vehicles, obstacles, (), scans)
 
 
 def trust(patterns=(), ranging=True, noisy=(PROXIMITY, 0)):
@@ -42,6 +42,13 @@ def test_who_stands_may_read_the_same_for_ever_and_so_may_who_sees_nothing():
 def test_without_noise_who_flies_side_by_side_reads_the_same():
     watch = trust(noisy=())
     assert all(watch.note(seen(tick, 0.1 * tick, ((1.0, 0.0, 0.0),))) for tick in range(50))
+
+
+def test_without_noise_who_flies_along_a_wall_reads_the_same_but_nobody_who_comes_nearer():
+    along, towards = trust(noisy=()), trust(noisy=())
+    beside, ahead = ((0.0, 1.25, 0.0),), ((1.25, 0.0, 0.0),)
+    assert all(along.note(seen(tick, 0.1 * tick, obstacles=beside)) for tick in range(50))
+    assert not all(towards.note(seen(tick, 0.01 * tick, obstacles=ahead)) for tick in range(8))
 
 
 def test_scans_that_do_not_come_are_missed():
