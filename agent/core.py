@@ -82,6 +82,7 @@ class Agent:
         self._intent: Intent | None = None
         self._lagging = False
         self._tidy_at_s = 0.0
+        self._record_age_s = 0.0
 
     def receive(self, source: int, channel: int, payload: bytes, now_s: float) -> None:
         """Take a frame heard from ``source``; what is not to be believed is counted, by cause."""
@@ -185,6 +186,7 @@ class Agent:
         departed = self._table.forget_silent(now_s, self._neighbours.ids, lost)
         beacons = self._neighbours.beacons()
         here, team = observation.position, self._table.members(now_s)
+        self._record_age_s = max((member.age_s for member in team), default=0.0)
         self._silent = self._bodies.look(now_s, here, observation.vehicles, beacons, team, departed)
         self._eyes.trust.compare(observation, beacons)
         self._lagging = self._neighbours.behind(self._missions.flown.key)
@@ -233,6 +235,7 @@ class Agent:
             self._standing.tier,
             self._standing.parent,
             self._standing.role,
+            self._record_age_s,
         )
         return Command(
             slot,

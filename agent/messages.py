@@ -138,7 +138,8 @@ class Telemetry(Message, frozen=True):
     wanted: velocity before the safety filter [m/s]; force: |u_i| of (28) before saturation;
     target: its target-on-queue [m]; place: where in the formation it means to be; heard: ids
     heard directly of late; rejected: messages refused so far; mission: the key of the mission it
-    flies; tier, parent: its standing in its queue (see Beacon), -1 for none; role: index of ROLES.
+    flies; tier, parent: its standing in its queue (see Beacon), -1 for none; role: index of ROLES;
+    record_age_s: the age of the oldest record it keeps of a member, when it last looked.
     """
 
     wanted: Velocity
@@ -151,6 +152,7 @@ class Telemetry(Message, frozen=True):
     tier: Index
     parent: Annotated[int, Meta(ge=-1, lt=2**16)]
     role: Annotated[int, Meta(ge=0, lt=4)]
+    record_age_s: Seconds = 0.0
 
 
 class Command(Message, frozen=True):

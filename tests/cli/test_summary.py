@@ -49,6 +49,7 @@ def test_it_has_every_key_of_the_contract(small: Path, flight: Flight) -> None:
         "converged",
         "converge_s",
         "residual_m",
+        "queues_converge_s",
     }
     assert json.loads(json.dumps(told, allow_nan=False)) == told
 

@@ -47,6 +47,14 @@ def books_balance(radio):
     assert min(*verdicts.fates.values(), verdicts.in_flight) >= 0
 
 
+def test_bytes_are_counted_by_who_sent_them_and_on_which_channel():
+    radio = medium()
+    radio.transmit(1, 0.0, said(b"four", b"seven b"))
+    radio.transmit(1, 0.5, said(b"far", channel=MULTIHOP, incarnation=1))
+    radio.transmit(3, 0.5, said(b"near"))
+    assert radio.verdicts(0).spoken_b == (0, 0, 11, 3, 0, 0, 4, 0, 0, 0)
+
+
 agents = st.integers(0, AGENTS - 1)
 coordinate = st.floats(-3.0, 3.0)
 operations = st.one_of(

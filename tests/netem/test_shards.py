@@ -96,7 +96,7 @@ def test_shards_have_the_verdicts_the_frames_and_the_digest_of_one_medium(owners
         assert digest.value == whole.digest()
     told = whole.verdicts(0)
     parts = [shard.verdicts(0) for shard in shards]
-    assert all(part.sent == told.sent for part in parts)
+    assert all((part.sent, part.spoken_b) == (told.sent, told.spoken_b) for part in parts)
     for name in ("addressed", "in_flight", "duplicated", "corrupted"):
         assert sum(getattr(part, name) for part in parts) == getattr(told, name)
     for fate, count in told.fates.items():

@@ -14,6 +14,20 @@ Packets = dict[str, int]
 
 
 @dataclass(frozen=True, slots=True)
+class Standings:
+    """How agents stand in their queues, as they say: shown, not judged. Row i = agent i.
+
+    tier (N,), parent (N,): -1 for none; role (N,): index of ROLES, -1 for one who takes no part.
+    record_age_s (N,): the age of the oldest record kept of a member, NaN for one who takes no part.
+    """
+
+    tier: NDArray[np.int16]
+    parent: NDArray[np.int32]
+    role: NDArray[np.int8]
+    record_age_s: Singles
+
+
+@dataclass(frozen=True, slots=True)
 class Tick:
     """One tick of truth and telemetry; row i = agent i, NaN for no vehicle in the world.
 
@@ -22,7 +36,8 @@ class Tick:
     force (N,): |u_i| of (28); turn_deg (N,): azimuth of the wanted velocity against the heading on
     moving steps, else NaN; alive (N,): whether the agent's process takes part, and is not paused;
     links (L, 2): (hearer, heard). mission (N,): the key of the mission that each flies. packets:
-    the newest counters of the medium, as in summary.json; empty before there are any.
+    the newest counters of the medium, as in summary.json; empty before there are any. standings:
+    as they were told, None where nobody records them.
     """
 
     index: int
@@ -37,3 +52,4 @@ class Tick:
     links: NDArray[np.int32]
     mission: NDArray[np.int64]
     packets: Packets = field(default_factory=dict)
+    standings: Standings | None = None

@@ -18,6 +18,7 @@ from worldsim.judge.clearance import Clearance
 from worldsim.judge.invariants import Invariants
 from worldsim.judge.metrics import Floats, conserved, swept_separation
 from worldsim.judge.phase import Phase
+from worldsim.judge.queues import Queues
 from worldsim.judge.recovery import LOSSES, RETURNS, Recoveries, Recovery
 from worldsim.judge.tick import Packets, Tick
 from worldsim.scenario.frame import path_of
@@ -32,12 +33,14 @@ class Figures:
 
     separation (N,) [m]: swept since the tick before; slot_error (N,) [m]: to the agent's own slot;
     obstacle_distance (N,) [m]: centre to surface, swept likewise; None where there is no obstacle.
+    queue_residual (Q,) [m]: of each queue by itself.
     """
 
     separation: Floats
     slot_error: Floats
     converged: bool
     obstacle_distance: Floats | None = None
+    queue_residual: Floats | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +60,7 @@ class Judge:
         self._scenario = scenario
         formation = Formation(scenario.formation, scenario.control.spacing_m)
         self.phases = [Phase(formation, 0.0, path_of(scenario.frame))]
+        self.queues = [Queues(self.phases[0])]
         self._recoveries = Recoveries(scenario.control.spacing_m)
         self._allocation = Invariants(scenario) if scenario.expect.converge else None
         self.ticks = 0
@@ -99,7 +103,7 @@ class Judge:
         self._recoveries.see(tick, phase, in_place)
         if self._allocation is not None:
             self._allocation.see(tick, phase, in_place)
-        return Figures(separation, error, in_place, distance)
+        return Figures(separation, error, in_place, distance, self.queues[-1].see(tick, error))
 
     @property
     def recoveries(self) -> list[Recovery]:
@@ -168,6 +172,7 @@ class Judge:
         path = msgspec.convert(event["path"], FramePath)
         formation = Formation(spec, self._scenario.control.spacing_m)
         self.phases.append(Phase(formation, event["t_s"], path, event["mission"]))
+        self.queues.append(Queues(self.phases[-1]))
 
     def _reformed(self, within_s: float) -> Expectation:
         took = [recovery.reformed_s for recovery in self.recoveries]

@@ -16,6 +16,7 @@ import numpy as np
 from agent.messages import Command, Observation, Vector
 from worldsim.judge.tick import Packets, Tick
 from worldsim.judge.verdict import Figures, Judge
+from worldsim.run.company import Company
 from worldsim.run.faults import (
     BARRIERS,
     Action,
@@ -104,6 +105,7 @@ class SlotLoop:
         self.team = Team(scenario)
         self.timeline = Timeline(scenario)
         self.orders = Orders()
+        self.company = Company(scenario.rows, scenario.fleet.tick_hz)
         self._planned: dict[str, Any] = {}
         self._formation = scenario.formation
         self._recorder = recorder
@@ -176,6 +178,7 @@ class SlotLoop:
             self.trace.command(agent, encoded)
             told = command.telemetry
             self._told[agent] = told_by(told, self._headings[agent])
+            self.company.note(agent, len(told.heard))
             self.orders.heard(told.mission)
             self._watch_place(agent, told.place)
 
@@ -283,8 +286,9 @@ class SlotLoop:
             self.event("role", agent, role="vertex" if now and now[1] == 0 else "member")
 
     def _show(self) -> None:
-        awake, linked = self.team.awake, self._recorder is not None
-        tick = tick_of(self.world, self._told, awake, linked, self._packets())
+        awake, shown = self.team.awake, self._recorder is not None
+        self.company.tick(awake)
+        tick = tick_of(self.world, self._told, awake, shown, self._packets())
         self.figures = self.judge.see(tick)
         if self._recorder is not None:
             self._recorder.tick(tick, self.figures)

@@ -36,16 +36,18 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
     duration_s: float,
     interrupted: bool,
     host_too_slow: bool,
+    failure: str | None = None,
 ) -> dict[str, Any]:
     """Return summary.json's content: plain values, None for what could not be measured.
 
     mode: "processes", "lockstep" or "virtual". duration_s: how much was flown, in simulated time.
+    failure: what ended the run that should not have happened in it.
     """
     judge = loop.judge
     expectations = judge.expectations()
     invariants = judge.invariants()
     doubt = _doubt(interrupted, host_too_slow, duration_s, late_tick_fraction)
-    outcome, reason = _outcome(expectations, invariants, doubt)
+    outcome, reason = ("fail", failure) if failure else _outcome(expectations, invariants, doubt)
     summary = {
         "schema": SCHEMA,
         "scenario": scenario.name,
@@ -63,6 +65,8 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "packets": _packets(verdicts, rejected),
+        "direct_links": loop.company.links(),
+        "bytes_per_s": loop.company.bytes_per_s(verdicts),
         "invariants": invariants,
         "delivery_late_ms": _delivery_late_ms(verdicts),
         "late_tick_fraction": late_tick_fraction,
@@ -129,8 +133,9 @@ def _phases(judge: Judge) -> list[dict[str, Any]]:
             "converged": phase.converge_s is not None,
             "converge_s": phase.converge_s,
             "residual_m": phase.residual_m,
+            "queues_converge_s": dict(zip(queues.names, queues.formed_s, strict=True)),
         }
-        for phase in judge.phases
+        for phase, queues in zip(judge.phases, judge.queues, strict=True)
     ]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agent.messages import Telemetry, Vector
-from worldsim.judge.tick import Packets, Tick
+from worldsim.judge.tick import Packets, Standings, Tick
 from worldsim.truth.world import World
 
 MOVING_MPS = 0.02
@@ -23,9 +23,13 @@ class Told(msgspec.Struct, frozen=True, gc=False):
     turn_deg: float
     heard: tuple[int, ...]
     mission: int
+    tier: int
+    parent: int
+    role: int
+    record_age_s: float
 
 
-UNTOLD = Told((nan, nan, nan), (-1, -1), nan, nan, (), 0)
+UNTOLD = Told((nan, nan, nan), (-1, -1), nan, nan, (), 0, -1, -1, -1, nan)
 
 
 def told_by(telemetry: Telemetry, heading: float) -> Told:
@@ -37,13 +41,17 @@ def told_by(telemetry: Telemetry, heading: float) -> Told:
         _turn_deg(telemetry.wanted, heading),
         telemetry.heard,
         telemetry.mission,
+        telemetry.tier,
+        telemetry.parent,
+        telemetry.role,
+        telemetry.record_age_s,
     )
 
 
 def tick_of(
-    world: World, told: list[Told], awake: NDArray[np.bool_], linked: bool, packets: Packets
+    world: World, told: list[Told], awake: NDArray[np.bool_], shown: bool, packets: Packets
 ) -> Tick:
-    """Return the present tick; linked: with the links, which cost most.
+    """Return the present tick; shown: with what is recorded and not judged, links first of all.
 
     awake (N,): who steps; the others tell nothing.
     """
@@ -63,14 +71,24 @@ def tick_of(
         turn_deg=reasons[:, 4],
         alive=awake.copy(),
         mission=np.array([row.mission for row in rows], dtype=np.int64),
-        links=_links(rows) if linked else NO_LINKS,
+        links=_links(rows) if shown else NO_LINKS,
         packets=packets,
+        standings=_standings(rows) if shown else None,
     )
 
 
 def _links(rows: list[Told]) -> NDArray[np.int32]:
     pairs = [(row, other) for row, each in enumerate(rows) for other in each.heard]
     return np.array(pairs, dtype=np.int32).reshape(-1, 2)
+
+
+def _standings(rows: list[Told]) -> Standings:
+    return Standings(
+        tier=np.array([row.tier for row in rows], dtype=np.int16),
+        parent=np.array([row.parent for row in rows], dtype=np.int32),
+        role=np.array([row.role for row in rows], dtype=np.int8),
+        record_age_s=np.array([row.record_age_s for row in rows], dtype=np.float32),
+    )
 
 
 def _turn_deg(wanted: Vector, heading: float) -> float:

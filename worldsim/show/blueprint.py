@@ -37,12 +37,21 @@ def stage_of(scenario: Scenario, slots: NDArray[np.float64]) -> Stage:
 def blueprint_of(stage: Stage, obstacles: bool = False) -> rrb.Blueprint:
     """Return the viewer's default layout; ``obstacles``: whether there are any."""
     near = [_series("Distance to the nearest obstacle [m]", layout.OBSTACLE_DISTANCE)]
-    figures = rrb.Vertical(
+    flight = rrb.Vertical(
         _series("Separation to the nearest other [m]", layout.SEPARATION),
         *(near if obstacles else ()),
         _series("Distance to the own slot [m]", layout.SLOT_ERROR),
         _series("Force |u|", layout.FORCE),
         _series("Wanted turn [deg]", layout.TURN_DEG),
+        name="Flight",
+    )
+    team = rrb.Vertical(
+        _series("Residual of each queue [m]", layout.QUEUE_RESIDUAL),
+        _series("Tier (-1: in distress)", layout.TIER),
+        _series("Oldest record kept of a member [s]", layout.RECORD_AGE),
+        _series("Neighbours heard directly", layout.NEIGHBOURS),
+        rrb.StateTimelineView(origin=layout.ROLES, name="Role"),
+        name="Team",
     )
     main = rrb.Vertical(
         _flight(stage),
@@ -54,7 +63,7 @@ def blueprint_of(stage: Stage, obstacles: bool = False) -> rrb.Blueprint:
         row_shares=[4, 1],
     )
     return rrb.Blueprint(
-        rrb.Horizontal(main, figures, column_shares=[2, 1]),
+        rrb.Horizontal(main, rrb.Tabs(flight, team), column_shares=[2, 1]),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=layout.SIM_TIME, playback_speed=1.0),

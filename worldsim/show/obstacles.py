@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from worldsim.judge.tick import Tick
 from worldsim.show import layout, palette
-from worldsim.show.sheets import Sheet
+from worldsim.show.sheet import Sheet
 from worldsim.truth.obstacle import Obstacles
 
 Rows = NDArray[np.intp]

@@ -1,4 +1,4 @@
-"""Colours: one for each queue, so that a viewer sees the edges of a formation."""
+"""Colours: one for each queue and each tier, so that a viewer sees what belongs together."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,19 @@ QUEUES = np.array(
     ],
     dtype=np.uint32,
 )
+TIERS = np.array([0xFFD54FFF, 0x7BE0ADFF, 0x4FC3F7FF, 0x7E8CFFFF, 0xC77DFFFF], dtype=np.uint32)
+"""From tier 1 on; deeper ones have the last."""
 SHARED = np.uint32(0xFFD54FFF)
 UNPLACED = np.uint32(0xC8CDD6FF)
+DISTRESS = np.uint32(0xFF3B30FF)
 DEAD = np.uint32(0x5A5F69FF)
+ROLES = {
+    "vertex": 0xFFD54FFF,
+    "sub-vertex": 0x4FC3F7FF,
+    "member": 0x3A5A78FF,
+    "distress": 0xFF3B30FF,
+    "absent": 0x2A2F38FF,
+}
 LINK = np.uint32(0x333D4DFF)
 LIMIT = np.uint32(0xFF5252FF)
 OBSTACLE = np.uint32(0x6F6256FF)
@@ -35,6 +45,11 @@ def of_places(place: NDArray[np.int16], shared: NDArray[np.int16]) -> Colours:
     colours = np.where(queue >= 0, QUEUES[queue % len(QUEUES)], UNPLACED)
     at_shared = np.any(np.all(place[:, None, :] == shared[None, :, :], axis=2), axis=1)
     return np.where(at_shared, SHARED, colours).astype(np.uint32)
+
+
+def of_tiers(tier: NDArray[np.int16]) -> Colours:
+    """Return the colours (K,) of agents of tiers 1 and more."""
+    return TIERS[np.clip(tier - 1, 0, len(TIERS) - 1)]
 
 
 def faint(colours: Colours, alpha: int) -> Colours:

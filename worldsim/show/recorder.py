@@ -6,7 +6,7 @@ a tenth of sending them one by one, and loses at most that second when the proce
 
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +24,11 @@ from worldsim.scenario.tables import Scenario
 from worldsim.show import layout
 from worldsim.show.blueprint import blueprint_of, stage_of
 from worldsim.show.obstacles import Shapes
-from worldsim.show.scenery import Scenery, limits
-from worldsim.show.sheets import Sheet, Sheets
+from worldsim.show.scenery import Scenery, limits, queues_of
+from worldsim.show.sheet import Sheet
+from worldsim.show.sheets import Sheets
 from worldsim.show.spool import Spool
+from worldsim.show.standings import StandingSheets
 from worldsim.truth.obstacle import Obstacles
 
 Event = dict[str, Any]
@@ -62,6 +64,7 @@ class RunRecorder:
         self._formation = Formation(scenario.formation, scenario.control.spacing_m)
         shared = np.array(self._formation.common, dtype=np.int16).reshape(-1, 2)
         self._sheets = Sheets(shared, scenario.fleet.tick_hz, limits(scenario))
+        self._standings = StandingSheets(scenario.fleet.tick_hz, scenario.rows, queues_of(scenario))
         self._shapes = Shapes(Obstacles(scenario.obstacle))
         self._team = scenario.fleet.agents
         self._every = max(1, round(scenario.fleet.tick_hz))
@@ -146,8 +149,7 @@ class RunRecorder:
     def _flush(self) -> None:
         if self._ticks:
             self._team = int(np.count_nonzero(self._ticks[-1].alive))
-            sheets = self._sheets.of(self._ticks, self._figures)
-            for sheet in (*sheets, *self._shapes.sheets(self._ticks)):
+            for sheet in self._sheets_of(self._ticks, self._figures):
                 self._send(sheet)
         if not self._track.rests:
             self._move_slots()
@@ -157,6 +159,11 @@ class RunRecorder:
             if "tables" in event:
                 self._show_phase(event)
         self._stream.flush(timeout_sec=FLUSH_S)
+
+    def _sheets_of(self, ticks: list[Tick], figures: list[Figures]) -> Iterator[Sheet]:
+        yield from self._sheets.of(ticks, figures)
+        yield from self._standings.of(ticks, figures)
+        yield from self._shapes.sheets(ticks)
 
     def _move_slots(self) -> None:
         """Show where the slots of a frame under way are, tick by tick."""

@@ -42,17 +42,21 @@ class Scenery:
     def lasting(self) -> Iterator[tuple[str, list[Any]]]:
         """Return what holds for the whole run, entity by entity."""
         agents = self._scenario.rows
-        names = [f"a{agent}" for agent in range(agents)]
+        names = layout.names_of(agents)
         yield layout.AGENTS, [rr.Points3D.from_fields(radii=[TRAIL_RADIUS_M])]
         yield layout.TARGETS, [rr.Points3D.from_fields(radii=[TARGET_RADIUS_M])]
         yield (
             layout.LINKS,
             [rr.LineStrips3D.from_fields(colors=np.array([palette.LINK]), radii=[0.004])],
         )
-        yield layout.VEHICLES, [self._bodies(names)]
+        yield layout.HIERARCHY, [rr.LineStrips3D.from_fields(radii=[0.012])]
+        yield layout.VEHICLES, [self._bodies(agents)]
         metrics = layout.NEAR_OBSTACLES if self._scenario.obstacle else layout.PER_AGENT
-        for metric in metrics:
+        for metric in (*metrics, *layout.TOLD):
             yield metric, [rr.SeriesLines(names=names, widths=[1.2] * agents)]
+        yield layout.QUEUE_RESIDUAL, [_by_queue(queues_of(self._scenario))]
+        for agent in range(min(agents, layout.NAMED_MAX)):
+            yield layout.role_of(agent), [_role_colours()]
         for metric, lines in limits(self._scenario).items():
             yield layout.limit_of(metric), [_reference(len(lines))]
         text = f"```toml\n{dump(self._scenario)}```\n"
@@ -80,12 +84,11 @@ class Scenery:
         where = [frame.to_world(point) for point in self._points]
         return rr.Points3D.from_fields(positions=where)
 
-    def _bodies(self, names: list[str]) -> rr.Boxes3D:
+    def _bodies(self, agents: int) -> rr.Boxes3D:
         r = self._scenario.vehicle.radius_m
         return rr.Boxes3D.from_fields(
-            half_sizes=[[r, 0.62 * r, 0.3 * r]] * len(names),
-            labels=names,
-            show_labels=len(names) <= 50,
+            half_sizes=[[r, 0.62 * r, 0.3 * r]] * agents,
+            show_labels=agents <= layout.NAMED_MAX,
             fill_mode=rr.components.FillMode.Solid,
         )
 
@@ -116,6 +119,25 @@ def _reference(lines: int) -> rr.SeriesLines:
     )
 
 
+def _by_queue(queues: int) -> rr.SeriesLines:
+    """Return the style of one series for each queue, of whatever formation is flown."""
+    return rr.SeriesLines(
+        names=[f"queue {queue + 1}" for queue in range(queues)],
+        colors=palette.QUEUES[np.arange(queues) % len(palette.QUEUES)],
+        widths=[1.2] * queues,
+    )
+
+
+def _role_colours() -> rr.StateConfiguration:
+    return rr.StateConfiguration(values=list(palette.ROLES), colors=list(palette.ROLES.values()))
+
+
+def queues_of(scenario: Scenario) -> int:
+    """Return how many queues the formations of a scenario have at most."""
+    later = [event.formation for event in scenario.event if event.formation is not None]
+    return max(len(spec.queue) for spec in (scenario.formation, *later))
+
+
 def limits(scenario: Scenario) -> dict[str, list[float]]:
     """Return the reference lines of each metric that has a limit."""
     least = scenario.expect.min_separation_m
@@ -125,5 +147,6 @@ def limits(scenario: Scenario) -> dict[str, list[float]]:
         **near,
         layout.SEPARATION: [least if least is not None else scenario.control.separation_m],
         layout.SLOT_ERROR: [CONVERGED_M],
+        layout.QUEUE_RESIDUAL: [CONVERGED_M],
         layout.TURN_DEG: [-turn, turn],
     }

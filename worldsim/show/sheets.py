@@ -5,7 +5,6 @@ counters) has a row where it changed, and a viewer shows the latest.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,38 +12,15 @@ import rerun as rr
 from numpy.typing import NDArray
 from pyarrow.lib import array as arrow_array
 
+from agent.comms.hierarchy import DISTRESS
 from worldsim.judge.tick import Singles, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.show import layout, palette
+from worldsim.show.sheet import Latest, Sheet, Thinned
 
 LINES_MAX = 400
 LINES_PER_S = 2000
 """More lines than these at once, or in a second, would cost more than all the rest together."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sheet:
-    """Columns of one entity; ``rows`` are the ticks of the block that they belong to."""
-
-    entity: str
-    rows: Sequence[int]
-    columns: Any
-
-
-class Latest:
-    """Remembers a value, and finds where a series departs from the one before."""
-
-    def __init__(self) -> None:
-        self._value: NDArray[Any] | None = None
-
-    def changes(self, series: Sequence[NDArray[Any]]) -> list[int]:
-        """Return the rows of a series that differ from the row before; the first ever counts."""
-        rows = []
-        for row, value in enumerate(series):
-            if self._value is None or not np.array_equal(self._value, value):
-                rows.append(row)
-                self._value = value
-        return rows
 
 
 class Sheets:
@@ -59,14 +35,13 @@ class Sheets:
     ) -> None:
         self._shared = shared
         self._limits = limits
-        self._tick_hz = tick_hz
         self._colours = Latest()
         self._heard = Latest()
         self._flown = Latest()
         self._counters: dict[str, Latest] = {}
-        self._lines_due = 0
+        self._drawn = Thinned(tick_hz, LINES_PER_S)
         near = layout.OBSTACLE_DISTANCE in limits
-        self._per_agent = layout.NEAR_OBSTACLES if near else layout.PER_AGENT
+        self._per_agent = (*(layout.NEAR_OBSTACLES if near else layout.PER_AGENT), *layout.TOLD)
 
     def of(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Sheet]:
         """Return the sheets of a block; blocks come in order."""
@@ -81,10 +56,7 @@ class Sheets:
         yield from self._references(len(ticks) - 1)
 
     def _coloured(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
-        series = [
-            np.where(tick.alive, palette.of_places(tick.place, self._shared), palette.DEAD)
-            for tick in ticks
-        ]
+        series = [self._colours_at(tick) for tick in ticks]
         rows = self._colours.changes(series)
         yield _trail(ticks, np.concatenate(series))
         if not rows:
@@ -96,6 +68,13 @@ class Sheets:
         lasting = rr.SeriesLines.columns(colors=series[rows[-1]]).partition(counts[:1])
         for entity in self._per_agent:
             yield Sheet(entity, (), lasting)
+
+    def _colours_at(self, tick: Tick) -> palette.Colours:
+        """Return agents' colours (N,): their queues', but for those in distress and the dead."""
+        colours = palette.of_places(tick.place, self._shared)
+        if tick.standings is not None:
+            colours = np.where(tick.standings.role == DISTRESS, palette.DISTRESS, colours)
+        return np.where(tick.alive, colours, palette.DEAD)
 
     def _hearing(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
         # As bits: 5 kB for 200 agents, where pairs of numbers take 20.
@@ -117,11 +96,10 @@ class Sheets:
     def _lines(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
         rows, strips = [], []
         for row, tick in enumerate(ticks):
-            if tick.index >= self._lines_due:
+            if self._drawn.due(tick.index):
                 rows.append(row)
                 strips.append(lines(tick))
-                pause = len(strips[-1]) * self._tick_hz / LINES_PER_S
-                self._lines_due = tick.index + max(1, round(pause))
+                self._drawn.drawn(tick.index, len(strips[-1]))
         if rows:
             columns = rr.LineStrips3D.columns(strips=np.concatenate(strips))
             yield Sheet(layout.LINKS, rows, columns.partition([len(some) for some in strips]))
