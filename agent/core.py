@@ -138,7 +138,7 @@ class Agent:
             raise RejectedError("spoofed", f"{source} says it is {beacon.id}")
         self._neighbours.hear(beacon, now_s, self._broadcast.sent_s)
         self._table.adopt_beacon(beacon)
-        if self._missions.is_news(beacon):
+        if beacon.drift is not None or beacon.frame_key != self._missions.frame_key:
             self._missions.glimpse(beacon)
 
     def _hear_gossip(self, source: int, payload: bytes, now_s: float) -> None:

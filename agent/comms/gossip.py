@@ -19,6 +19,7 @@ RELAYED_SILENCE_ROUNDS = 12
 hops at that loss, is twice the age at which a subject's records are measured to come."""
 LAG_SMOOTHING = 0.25
 LEAST_RELAYED_SILENCE_S = 2.5
+NEVER = (-1, -1)
 NOBODY: Mapping[int, float] = MappingProxyType({})
 MAX_FRAME_B = MAX_RADIO_B - SEAL_B
 FRAME_HEAD_B = 17
@@ -43,8 +44,9 @@ class Table:
 
     def adopt_beacon(self, beacon: Beacon) -> None:
         """Take what a neighbour said of itself just now."""
-        who = beacon.id
-        if self._is_news(who, beacon.incarnation, beacon.sequence):
+        who, version = beacon.id, (beacon.incarnation, beacon.sequence)
+        if version > self._last.get(who, NEVER) and self._has_room(who):
+            self._last[who] = version
             self._newest[who] = beacon
 
     def adopt(self, gossip: Gossip, now_s: float, slack_s: float) -> None:
@@ -57,7 +59,10 @@ class Table:
         earliest_s = now_s - self._relayed_silence_s / (1.0 - 2.0 * LAG_SMOOTHING)
         for record in gossip.records:
             plausible = record.id != self._own_id and earliest_s <= record.stamp_s <= latest_s
-            if plausible and self._is_news(record.id, record.incarnation, record.version):
+            version = (record.incarnation, record.version)
+            news = plausible and version > self._last.get(record.id, NEVER)
+            if news and self._has_room(record.id):
+                self._last[record.id] = version
                 self._newest[record.id] = record
                 lag_s = self._lag_s.get(record.id, 0.0)
                 age_s = max(0.0, now_s - record.stamp_s)
@@ -124,15 +129,8 @@ class Table:
     def _may_be_silent_s(self, who: int) -> float:
         return self._relayed_silence_s + 2.0 * self._lag_s.get(who, 0.0)
 
-    def _is_news(self, who: int, incarnation: int, version: int) -> bool:
-        """Whether this is newer than all ever adopted of its subject; if so, remember it."""
-        if who not in self._newest and len(self._newest) >= MAX_KNOWN:
-            return False
-        last = self._last.get(who)
-        if last is not None and (incarnation, version) <= last:
-            return False
-        self._last[who] = (incarnation, version)
-        return True
+    def _has_room(self, who: int) -> bool:
+        return len(self._newest) < MAX_KNOWN or who in self._newest
 
 
 def _record(newest: Beacon | Record) -> Record:

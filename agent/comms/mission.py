@@ -103,7 +103,7 @@ class Missions:
         key = self.flown.key
         return [Piece(key, index, len(parts), part) for index, part in enumerate(parts)]
 
-    def is_news(self, beacon: Beacon) -> bool:
+    def _is_news(self, beacon: Beacon) -> bool:
         """Whether a beacon knows better where the frame is: by a newer mission, or a newer look."""
         key, drift = beacon.frame_key, beacon.drift
         if key != self.frame_key or drift is None:
@@ -114,11 +114,13 @@ class Missions:
         return drift.stamp_s > mine.drift.stamp_s
 
     def glimpse(self, beacon: Beacon) -> None:
-        """Take the frame from a beacon that is news, before its mission has come.
+        """Take the frame from a beacon where that is news, before its mission has come.
 
         So a frame that moves comes down the tiers at the local channel's rate. Raises
         RejectedError for a look at it that is newer than the beacon.
         """
+        if not self._is_news(beacon):
+            return
         if beacon.drift is not None and beacon.drift.stamp_s > beacon.stamp_s:
             raise RejectedError("future", "a frame seen after the beacon that tells of it")
         self.frame_key = beacon.frame_key

@@ -5,7 +5,7 @@ clock is never read.
 """
 
 from collections.abc import Collection
-from math import log
+from math import inf, log
 
 from agent.codec import RejectedError
 from agent.controller import Heard
@@ -88,9 +88,11 @@ class Neighbours:
             raise RejectedError("future", f"a stamp {-age_s:.3f} s ahead")
         if age_s > MAX_AGE_S:
             raise RejectedError("old", f"a stamp {age_s:.3f} s old")
-        echoed_s = self._echoed_s(beacon, own_sent_s)
-        if echoed_s is not None and beacon.stamp_s + self._slack_s < echoed_s:
-            raise RejectedError("offset", "older than a beacon it has heard")
+        for echoed, sequence in beacon.echoes:
+            if echoed == self._own_id:
+                if beacon.stamp_s + self._slack_s < own_sent_s.get(sequence, -inf):
+                    raise RejectedError("offset", "older than a beacon it has heard")
+                break
         self._last[who] = key
         latency_s = age_s if age_s > 0.0 else 0.0
         known = self._known.get(who)
@@ -132,7 +134,18 @@ class Neighbours:
 
         A place claimed in another mission than ``mission`` is none.
         """
-        return tuple([_forward(each, now_s, mission) for each in self._in_order])
+        heard = []
+        for known in self._in_order:
+            beacon = known.beacon
+            age_s = now_s - beacon.stamp_s
+            along = 0.0 if age_s < 0.0 else age_s if age_s < FORWARD_S else FORWARD_S
+            (x, y, z), (u, v, w) = beacon.position, beacon.velocity
+            position = (x + along * u, y + along * v, z + along * w)
+            place = known.place if beacon.mission == mission else None
+            heard.append(
+                Heard(beacon.id, max(0.0, age_s), position, beacon.velocity, beacon.target, place)
+            )
+        return tuple(heard)
 
     def behind(self, mission: int) -> bool:
         """Whether somebody who is heard flies an older mission."""
@@ -149,23 +162,6 @@ class Neighbours:
     def _put_in_order(self) -> None:
         self._in_order = [self._known[who] for who in sorted(self._known)]
 
-    def _echoed_s(self, beacon: Beacon, own_sent_s: dict[int, float]) -> float | None:
-        for who, sequence in beacon.echoes:
-            if who == self._own_id:
-                return own_sent_s.get(sequence)
-        return None
-
 
 def _claim(beacon: Beacon) -> Place | None:
     return Place(beacon.queue, beacon.rank) if beacon.queue >= 0 else None
-
-
-def _forward(neighbour: Neighbour, now_s: float, mission: int) -> Heard:
-    beacon = neighbour.beacon
-    age_s = now_s - beacon.stamp_s
-    age_s = max(age_s, 0.0)
-    along = age_s if age_s < FORWARD_S else FORWARD_S
-    (x, y, z), (u, v, w) = beacon.position, beacon.velocity
-    position = (x + along * u, y + along * v, z + along * w)
-    place = neighbour.place if beacon.mission == mission else None
-    return Heard(beacon.id, age_s, position, beacon.velocity, beacon.target, place)
