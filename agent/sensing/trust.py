@@ -20,7 +20,8 @@ NEAR_M = 1.2
 FRESH_S = 0.5
 SLACK_M = 0.3
 LOOKS = 3
-"""So many looks in a row miss a neighbour before the sensor is doubted."""
+"""So many looks in a row miss a neighbour before the sensor is doubted, and find one before it is
+believed again: that they have flown on proves nothing."""
 
 
 class Trust:
@@ -47,23 +48,30 @@ class Trust:
         self._reading: tuple[object, ...] = ()
         self._read_at: Vector | None = None
         self._stuck = False
-        self._missed = 0
+        self._missed = self._met = 0
+        self._blind = False
 
     def note(self, observation: Observation) -> bool:
         """Take what is sensed now; return whether it may be believed."""
         self._note_change(observation)
         late = bool(self._due_s) and self._late(observation)
-        return not (self._stuck or late or self._missed >= LOOKS)
+        return not (self._stuck or late or self._blind)
 
     def compare(self, observation: Observation, neighbours: Sequence[Beacon]) -> None:
         """Look whether neighbours near by are sensed where they say they are."""
         if not self._ranging:
             return
+        met = False
         for beacon in neighbours:
-            if self._is_missed(observation, beacon):
-                self._missed += 1
+            missed = self._is_missed(observation, beacon)
+            if missed:
+                self._missed, self._met = self._missed + 1, 0
+                self._blind = self._blind or self._missed >= LOOKS
                 return
-        self._missed = 0
+            met = met or missed is False
+        if met:
+            self._missed, self._met = 0, self._met + 1
+            self._blind = self._blind and self._met < LOOKS
 
     def _note_change(self, observation: Observation) -> None:
         if self._due_s and not observation.scans:
@@ -106,13 +114,14 @@ class Trust:
             for kind, due_s in self._due_s.items()
         )
 
-    def _is_missed(self, observation: Observation, beacon: Beacon) -> bool:
+    def _is_missed(self, observation: Observation, beacon: Beacon) -> bool | None:
+        """Whether a neighbour near by is not sensed; None where its word proves nothing."""
         here, there = observation.position, beacon.position
         if dist(here, there) > NEAR_M:
-            return False
+            return None
         age_s = max(0.0, observation.time_s - beacon.stamp_s)
         if age_s > FRESH_S:
-            return False
+            return None
         slack = SLACK_M + self._max_speed * age_s
         away = (there[0] - here[0], there[1] - here[1], there[2] - here[2])
         return all(dist(away, body) > slack for body in observation.vehicles)

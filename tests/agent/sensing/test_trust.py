@@ -76,3 +76,17 @@ def test_old_word_and_far_neighbours_prove_nothing():
     for _ in range(2 * LOOKS):
         watch.compare(seen(40), [old, far])
     assert watch.note(seen(40))
+
+
+def test_who_was_blind_believes_again_once_it_sees_a_neighbour_not_once_they_have_gone():
+    watch, body = trust(), ((1.0, 0.0, 0.0),)
+    there, gone = (beacon(1, 1, stamp_s=0.0, at=(x, 0.0, 0.0)) for x in (1.0, 5.0))
+    for _ in range(LOOKS):
+        watch.compare(seen(0), [there])
+    for _ in range(2 * LOOKS):
+        watch.compare(seen(0), [gone])
+        assert not watch.note(seen(0))
+    for _ in range(LOOKS):
+        assert not watch.note(seen(0))
+        watch.compare(seen(0, vehicles=body), [there])
+    assert watch.note(seen(0, vehicles=body))

@@ -1,0 +1,29 @@
+"""The Q-structure without choice: each agent takes the place of its number, and keeps it."""
+
+from agent.controller import Senses
+from agent.guidance.q_structure import QStructure
+from agent.guidance.target_on_queue import OwnTarget
+from agent.setup import AgentSetup
+
+
+class ByNumber:
+    """Agent k wants the k-th place of the formation, whoever is nearer."""
+
+    def __init__(self, own_id: int) -> None:
+        self._own_id = own_id
+        self.cost_m = 0.0
+        self.blocked = ()
+
+    def made(self, senses: Senses) -> OwnTarget:
+        """Return the place of one's number among two."""
+        layout = senses.mission.formation.layout(2)
+        place = layout.places[self._own_id]
+        return OwnTarget(place, layout.slots[place], vertex=True)
+
+
+class Swapping(QStructure):
+    """Flies to the place of its number."""
+
+    def __init__(self, setup: AgentSetup) -> None:
+        super().__init__(setup)
+        self._choice = ByNumber(setup.id)  # type: ignore[assignment]
