@@ -14,7 +14,7 @@ from netem.lockstep import Turns
 from netem.messages import MAX_CONDITIONS_B, MediumSetup
 from netem.radio import Radio
 from netem.wire.ending import Ending
-from netem.wire.keys import Keys
+from netem.wire.keys import Keys, medium_name
 from netem.wire.post import Post, Ring, Waiting, drained, receive
 from netem.wire.session import SessionError, open_client, open_router
 from netem.wire.stop import Stop
@@ -82,7 +82,7 @@ def run(endpoint: str, shard: int = 0, patient: bool = False) -> int:
     try:
         return serve(endpoint, shard, patient)
     except (SessionError, SilenceError, LockstepError) as error:
-        print(f"{name_of(shard)}: {error}", file=sys.stderr)
+        print(f"{medium_name(shard)}: {error}", file=sys.stderr)
         return 2 if isinstance(error, SessionError) else 1
 
 
@@ -97,7 +97,7 @@ def serve(endpoint: str, shard: int = 0, patient: bool = False) -> int:
     with opening as session:
         stop = Stop()
         at = "is connected to" if shard else "listens at"
-        print(f"{name_of(shard)} {at} {endpoint}, for one run", flush=True)
+        print(f"{medium_name(shard)} {at} {endpoint}, for one run", flush=True)
         desk = Desk(session, shard)
         while desk.run is None and not stop.asked:
             desk.wait(WAIT_S)
@@ -106,13 +106,8 @@ def serve(endpoint: str, shard: int = 0, patient: bool = False) -> int:
     return 0
 
 
-def name_of(shard: int) -> str:
-    """Return the name under which one of several mediums shows life."""
-    return f"netem-{shard}" if shard else "netem"
-
-
 def _serve_run(post: Post, desk: Desk, setup: MediumSetup, stop: Stop) -> None:
-    name = name_of(desk.shard)
+    name = medium_name(desk.shard)
     print(f"{name} serves run {desk.run!r} of {setup.agents} agents, seed {setup.seed}", flush=True)
     truths, ending = post.ring("truth", size=TRUTH_RING), Ending(post, stop)
     radio = Turns(post, setup, desk.shard, ending) if setup.lockstep else Radio(post, setup)

@@ -22,6 +22,7 @@ from worldsim.options import (
     Agents,
     Duration,
     Gallery,
+    Lockstep,
     NoRecording,
     Out,
     RunFolder,
@@ -30,6 +31,8 @@ from worldsim.options import (
     Schema,
     Seed,
     Settings,
+    Shards,
+    check_lockstep,
     examples,
     overrides_of,
     seeds_of,
@@ -63,6 +66,7 @@ app = typer.Typer(
         "qswarm run deploy/scenarios/wedge-9.toml",
         "qswarm run deploy/scenarios/wedge-9.toml --seed 7 --set netem.loss_percent=50",
         "qswarm run deploy/scenarios/wedge-9.toml --agents 20 --duration 40 --speed 2",
+        "qswarm run deploy/scenarios/wedge-9.toml --lockstep",
         "qswarm run --list",
     )
 )
@@ -73,6 +77,8 @@ def run(
     speed: Annotated[
         float, typer.Option(metavar="X", help="Simulated seconds in one of the clock.", min=0.01)
     ] = 1.0,
+    lockstep: Lockstep = False,
+    shards: Shards = 1,
     duration: Duration = None,
     settings: Settings = None,
     out: Out = None,
@@ -80,16 +86,20 @@ def run(
     gallery: Gallery = False,
 ) -> int:
     """Fly a fleet of real processes: netem, world and one for each agent, over Zenoh."""
-    from worldsim.run.admission import PROCESS_COMMAND_TICKS
+    from worldsim.run.admission import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
     from worldsim.run.fleet import run as fly_processes
+    from worldsim.run.process import Terms
     from worldsim.run.rundir import RunDirectory
 
     if not isfinite(speed):
         raise typer.BadParameter(f"{speed}; a number from 0.01", param_hint="--speed")
+    check_lockstep(lockstep, speed, shards)
     overrides = overrides_of(settings, agents, seed, duration)
-    admitted = _admitted(scenario, overrides, PROCESS_COMMAND_TICKS)
+    command_ticks = VIRTUAL_COMMAND_TICKS if lockstep else PROCESS_COMMAND_TICKS
+    admitted = _admitted(scenario, overrides, command_ticks)
     directory = RunDirectory.create(out, admitted)
-    return fly_processes(admitted, directory, speed=speed, recording=not no_recording)
+    terms = Terms(admitted.name, speed, not no_recording, lockstep, shards)
+    return fly_processes(admitted, directory, terms)
 
 
 @app.command(

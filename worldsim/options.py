@@ -67,6 +67,14 @@ Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Set any key; may be given again."),
 ]
+Lockstep = Annotated[
+    bool,
+    typer.Option("--lockstep", help="Take turns, slot by slot: the same result on any host."),
+]
+Shards = Annotated[
+    int,
+    typer.Option(metavar="N", min=1, max=64, help="Share the radio out to N processes (lockstep)."),
+]
 Out = Annotated[
     Path | None,
     typer.Option(metavar="DIR", help="Where to; must not exist. [runs/SCENARIO-TIME]"),
@@ -91,6 +99,14 @@ def overrides_of(
         overrides[key.strip()] = value.strip()
     options = {"fleet.agents": agents, "seed": seed, "duration_s": duration}
     return overrides | {key: str(value) for key, value in options.items() if value is not None}
+
+
+def check_lockstep(lockstep: bool, speed: float, shards: int) -> None:
+    """Raise typer.BadParameter for what goes with lockstep alone, or not with it."""
+    if lockstep and speed != 1.0:
+        raise typer.BadParameter("not beside --lockstep: it has no speed", param_hint="--speed")
+    if shards > 1 and not lockstep:
+        raise typer.BadParameter("needs --lockstep", param_hint="--shards")
 
 
 def seeds_of(text: str) -> range:

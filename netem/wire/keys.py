@@ -43,6 +43,11 @@ TOPICS = {
 }
 
 
+def medium_name(shard: int) -> str:
+    """Return the name of one of several mediums; the first is the router."""
+    return f"netem-{shard}" if shard else "netem"
+
+
 @dataclass(frozen=True, slots=True)
 class Keys:
     """The keys of one run. Raises ValueError on a run name that a key cannot carry."""

@@ -9,11 +9,13 @@ import os
 import signal
 import socket
 import time
+from functools import partial
 from typing import Any
 
 from rich.console import Console
 
 from netem import process as netem_process
+from netem.wire.keys import medium_name
 from worldsim.run import process as world_process
 from worldsim.run.child import Exit
 from worldsim.run.kin import Kin
@@ -43,9 +45,7 @@ class StartError(RuntimeError):
     """A process of the fleet that did not come up; the text says which, and its last words."""
 
 
-def run(
-    scenario: Scenario, directory: RunDirectory, *, speed: float = 1.0, recording: bool = True
-) -> int:
+def run(scenario: Scenario, directory: RunDirectory, terms: Terms) -> int:
     """Fly a scenario with real processes, and tell the verdict; return the exit status.
 
     Whatever happens, Ctrl-C and SIGTERM included, no process is left behind.
@@ -53,7 +53,7 @@ def run(
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     # One thread for receiving is enough for a client, and saves a tenth of its CPU time.
     os.environ.setdefault("ZENOH_RUNTIME", "(rx: (worker_threads: 1))")
-    launch = Launch(scenario, directory, Terms(scenario.name, speed, recording))
+    launch = Launch(scenario, directory, terms)
     try:
         launch.fly()
         status = launch.conclude()
@@ -130,7 +130,8 @@ class Launch:
         self._landing = True
         self.terminal.close()
         self._zygote.send(end=True)
-        self._kin.end(["world", "netem"], END_WITHIN_S, signal.SIGTERM)
+        mediums = [medium_name(shard) for shard in range(self._terms.shards)]
+        self._kin.end(["world", *mediums], END_WITHIN_S, signal.SIGTERM)
         self._kin.end(["zygote"], END_WITHIN_S, None)
         everybody = list(self._kin.pids)
         self._kin.end(everybody, END_WITHIN_S, signal.SIGKILL)
@@ -143,11 +144,16 @@ class Launch:
         agents = range(self._scenario.fleet.agents)
         zygote = self._kin.start("zygote", signal.SIGKILL, self._be_zygote)
         self._zygote_end.close()
-        netem = self._kin.start("netem", signal.SIGKILL, self._be_netem)
+        mediums = {
+            medium_name(shard): self._kin.start(
+                medium_name(shard), signal.SIGKILL, partial(self._be_netem, shard)
+            )
+            for shard in range(self._terms.shards)
+        }
         # The world is asked to end, so that it finishes the recording even without a launcher.
         world = self._kin.start("world", signal.SIGTERM, self._be_world)
         self._world_end.close()
-        for name, pid in (("zygote", zygote), ("netem", netem), ("world", world)):
+        for name, pid in {"zygote": zygote, **mediums, "world": world}.items():
             self._roster.add(name, pid)
         self._kin.listen(self._zygote, self._hear_zygote)
         self._kin.listen(self._world, self._hear_world)
@@ -156,13 +162,14 @@ class Launch:
     def _be_zygote(self) -> int:
         for end in (self._zygote, self._world, self._world_end):
             end.close()
-        brood = Brood(self._terms.run, self._endpoint, self._directory.logs)
+        terms = self._terms
+        brood = Brood(terms.run, self._endpoint, self._directory.logs, terms.lockstep)
         return Zygote(self._zygote_end, brood).serve()
 
-    def _be_netem(self) -> int:
+    def _be_netem(self, shard: int) -> int:
         for end in (self._zygote, self._world, self._world_end):
             end.close()
-        return netem_process.run(self._endpoint)
+        return netem_process.run(self._endpoint, shard, self._terms.lockstep)
 
     def _be_world(self) -> int:
         for end in (self._zygote, self._world):
@@ -182,6 +189,8 @@ class Launch:
                 self._roster.add(f"agent-{line['spawned']}", line["pid"])
             elif "exit" in line:
                 self._agent_ended(line)
+            else:
+                self._world.send(**line)
         if any("spawned" in line for line in lines):
             self._roster.write()
 
@@ -214,13 +223,17 @@ class Launch:
         if not self._flying:
             raise self._not_started(f"agent-{agent}", end)
         self._world.send(lost=[agent, incarnation, *end])
-        planned = (agent, incarnation) in self._doomed
         self.terminal.say(
             f"agent-{agent} (pid {line['pid']}) {end} about {self._time_s:.1f} s into the run;"
-            f" {'as planned' if planned else 'its vehicle hovers'}"
+            f" {self._what_follows(agent, incarnation)}"
         )
         if end.status is not None:
             self.terminal.say(self._last_words(f"agent-{agent}"))
+
+    def _what_follows(self, agent: int, incarnation: int) -> str:
+        if (agent, incarnation) in self._doomed:
+            return "as planned"
+        return "the run ends here" if self._terms.lockstep else "its vehicle hovers"
 
     def _child_ended(self, name: str, end: Exit) -> None:
         self._hear_world()
@@ -229,6 +242,7 @@ class Launch:
         if not self._flying:
             raise self._not_started(name, end)
         self.terminal.say(f"{name} {end} about {self._time_s:.1f} s into the run, which ends here")
+        self._world.send(broken=f"{name} {end}")
         self._broken = True
 
     def _say_who_is_missing(self) -> None:

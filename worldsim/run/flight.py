@@ -8,20 +8,18 @@ vehicles.
 import time
 from collections.abc import Callable
 
-import numpy as np
-
 from agent.codec import RejectedError, decode_command, encode
 from netem.messages import Truth, Verdicts
 from netem.wire.frame import WireError, pack, unpack
 from netem.wire.post import Post
-from worldsim.judge.phase import CONVERGED_M
 from worldsim.judge.tick import Packets
 from worldsim.run.admission import PROCESS_COMMAND_TICKS
 from worldsim.run.control import Control, Reception
 from worldsim.run.hands import Hands
+from worldsim.run.headway import Headway
 from worldsim.run.meaning import Deed
 from worldsim.run.muster import Muster
-from worldsim.run.outside import Loss, Outside, Progress
+from worldsim.run.outside import Loss, Outside
 from worldsim.run.pace import Pacer, Punctuality
 from worldsim.run.slots import Opened, Recorder, SlotLoop, world_of
 from worldsim.run.team import Begin, Hold, Stop
@@ -30,7 +28,6 @@ from worldsim.scenario.tables import Scenario
 SENDER_RING = 4
 SENDER_QUOTA = 2
 LOOK_EVERY_S = 0.25
-PROGRESS_EVERY_S = 0.25
 FINAL_VERDICTS_WITHIN_S = 1.0
 MAX_VERDICTS_B = 64 * 1024
 
@@ -54,6 +51,7 @@ class Flight:
         self.verdicts: Verdicts | None = None
         self.punctuality = Punctuality(len(rows))
         self.real_time_factor: float | None = None
+        self.failure: str | None = None
         self._scenario = scenario
         self._outside = outside
         self._muster = muster
@@ -62,11 +60,16 @@ class Flight:
         self.begun = self._landed = False
         self._unreadable = 0
         self._pacer = Pacer(1.0 / (scenario.slot_hz * speed))
-        self._progress_at_s = 0.0
+        self._headway = Headway(scenario.duration_s, self.loop, outside)
         self._truth, self._over = post.putter("truth"), post.putter("over")
         self._observers = [post.putter("observation", agent) for agent in rows]
         self._commands = [post.ring("command", agent, SENDER_RING) for agent in rows]
         self._reports = post.ring("verdicts", size=SENDER_RING)
+
+    @property
+    def late_fraction(self) -> float | None:
+        """Share of late ticks."""
+        return self.punctuality.late_fraction
 
     @property
     def rejected(self) -> int:
@@ -121,7 +124,7 @@ class Flight:
         for report in self._reports.drain(SENDER_RING):
             self._read_report(report)
         self.loop.close(b"")
-        self._say_progress()
+        self._headway.tell(self._pacer.elapsed_s, self.late_fraction)
 
     def _do(self, deed: Deed, **signed: str) -> None:
         """Carry out what happens between slots, and let it count at once."""
@@ -160,23 +163,6 @@ class Flight:
 
     def _packets(self) -> Packets:
         return self.verdicts.packets() if self.verdicts is not None else {}
-
-    def _say_progress(self) -> None:
-        if self._pacer.elapsed_s >= self._progress_at_s:
-            self._progress_at_s = self._pacer.elapsed_s + PROGRESS_EVERY_S
-            self._outside.progress(self._progress())
-
-    def _progress(self) -> Progress:
-        figures = self.loop.figures
-        in_place = int(np.sum(figures.slot_error <= CONVERGED_M)) if figures is not None else 0
-        return Progress(
-            self.loop.world.time_s,
-            self._scenario.duration_s,
-            int(np.count_nonzero(self.loop.team.awake)),
-            in_place,
-            self.loop.judge.min_separation_m,
-            self.punctuality.late_fraction,
-        )
 
 
 def _known(loss: Loss) -> dict[str, int]:

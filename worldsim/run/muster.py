@@ -6,11 +6,13 @@ from collections.abc import Callable, Iterable, Mapping
 import msgspec
 import zenoh
 
+from agent.setup import AgentSetup
 from netem.messages import MediumSetup
+from netem.wire.keys import medium_name
 from netem.wire.post import Post, RefusedError, Roll, Waiting, drained
-from worldsim.run.admission import PROCESS_COMMAND_TICKS
+from worldsim.run.admission import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
 from worldsim.run.outside import Outside
-from worldsim.scenario.tables import Scenario
+from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 
 MUSTER_WITHIN_S = 30.0
 LOOK_EVERY_S = 0.02
@@ -22,23 +24,36 @@ class MusterError(RuntimeError):
 
 
 class Muster:
-    """Answers agents that ask for their setup, at the start and late; knows who is there."""
+    """Answers agents that ask for their setup, at the start and late; knows who is there.
 
-    def __init__(self, post: Post, scenario: Scenario) -> None:
+    lockstep: whether they take turns; shards: how many mediums share the agents out.
+    """
+
+    def __init__(
+        self, post: Post, scenario: Scenario, lockstep: bool = False, shards: int = 1
+    ) -> None:
         self._post = post
         self._scenario = scenario
+        self._lockstep = lockstep
+        self._shards = shards
+        self._uninstructed = list(range(shards))
         self._incarnations = dict.fromkeys(range(scenario.fleet.agents), 0)
         self._roll: Roll = post.roll()
         self._questions: Waiting[zenoh.Query] = post.questions("setup")
 
     def instruct_medium(self, speed: float) -> bool:
-        """Tell the medium its conditions; False while there is no medium yet.
+        """Tell each medium its conditions; False while one is missing.
 
-        Raises RefusedError when it serves another run.
+        Raises RefusedError when one serves another run.
         """
-        setup: MediumSetup = msgspec.structs.replace(self._scenario.medium_setup(), speed=speed)
-        answer = self._post.ask("medium", None, msgspec.json.encode(setup), timeout_s=2.0)
-        return answer is not None
+        while self._uninstructed:
+            shard = self._uninstructed[0]
+            question = msgspec.json.encode(self._medium_setup(shard, speed))
+            topic, who = ("shard", shard) if shard else ("medium", None)
+            if self._post.ask(topic, who, question, timeout_s=2.0) is None:
+                return False
+            self._uninstructed.pop(0)
+        return True
 
     def instruct_agents(self) -> None:
         """Answer the agents that ask."""
@@ -50,7 +65,8 @@ class Muster:
         """Return the names of those who have not come."""
         self._roll.gone()
         agents = range(self._scenario.fleet.agents)
-        wanted = ["netem", *(f"agent-{agent}" for agent in agents)]
+        mediums = [medium_name(shard) for shard in range(self._shards)]
+        wanted = [*mediums, *(f"agent-{agent}" for agent in agents)]
         return [name for name in wanted if name not in self._roll.present]
 
     def expect(self, incarnations: Mapping[int, int]) -> None:
@@ -62,9 +78,26 @@ class Muster:
         self._roll.gone()
         return [agent for agent in agents if f"agent-{agent}" not in self._roll.present]
 
+    def present(self, agents: Iterable[int]) -> list[int]:
+        """Return which of these agents show a sign of life."""
+        absent = self.absent(agents := list(agents))
+        return [agent for agent in agents if agent not in absent]
+
     def gone(self) -> list[str]:
         """Return who went since the last call, as liveliness has it: a hint."""
         return self._roll.gone()
+
+    def _medium_setup(self, shard: int, speed: float) -> MediumSetup:
+        rows = range(self._scenario.rows)
+        # By fours: so each medium has some of those who step in a slot.
+        own = tuple(a for a in rows if a // SLOTS_PER_TICK % self._shards == shard)
+        setup: MediumSetup = msgspec.structs.replace(
+            self._scenario.medium_setup(),
+            speed=speed,
+            lockstep=self._lockstep,
+            receivers=own if self._shards > 1 else None,
+        )
+        return setup
 
     def _answer(self, query: zenoh.Query) -> None:
         agent = str(query.key_expr).rsplit("/", 1)[1]
@@ -72,7 +105,10 @@ class Muster:
         if incarnation is None:
             query.reply_err(f"no agent {agent} in a run of {len(self._incarnations)}")
             return
-        setup = self._scenario.agent_setup(int(agent), incarnation, PROCESS_COMMAND_TICKS)
+        ticks = VIRTUAL_COMMAND_TICKS if self._lockstep else PROCESS_COMMAND_TICKS
+        setup: AgentSetup = msgspec.structs.replace(
+            self._scenario.agent_setup(int(agent), incarnation, ticks), lockstep=self._lockstep
+        )
         query.reply(query.key_expr, msgspec.json.encode(setup))
 
 

@@ -26,6 +26,12 @@ class Loss(NamedTuple):
     signal: int | None = None
     status: int | None = None
 
+    def __str__(self) -> str:
+        if self.signal is not None:
+            return f"agent-{self.agent} was killed by signal {self.signal}"
+        how = f" with status {self.status}" if self.status is not None else ""
+        return f"agent-{self.agent} ended{how}"
+
 
 class Progress(NamedTuple):
     """How far a flight is. separation_m: the least so far; late: share of late ticks."""
@@ -52,6 +58,9 @@ class Outside(Protocol):
     launches: bool
     """Whether processes can be started and ended."""
 
+    broken: str | None
+    """How a process ended of which there is one, or None."""
+
     @property
     def stopped(self) -> str | None:
         """Why the flight must end now, or None."""
@@ -67,6 +76,9 @@ class Outside(Protocol):
 
         after_s: how long a process that starts sleeps first [s].
         """
+
+    def has_done(self, deed: str, whom: list[tuple[int, int]]) -> bool:
+        """Whether a deed that was asked for has been done; it is told once."""
 
     def missing(self, names: list[str]) -> None:
         """Say who is not there yet."""
@@ -85,24 +97,39 @@ class Conducted:
 
     def __init__(self, lines: Lines) -> None:
         self._lines = lines
+        self._losses: list[Loss] = []
+        self._done: list[tuple[str, list[list[int]]]] = []
+        self.broken: str | None = None
 
     @property
     def stopped(self) -> str | None:
-        """The launcher's end is the flight's."""
-        return "the launcher is gone" if self._lines.closed else None
+        """The launcher's end is the flight's, and that of a process of which there is one."""
+        return "the launcher is gone" if self._lines.closed else self.broken
 
     def wait(self, left_s: float) -> None:
         """Wait, but not longer than until the launcher says something."""
         _wait([] if self._lines.closed else [self._lines], left_s)
+        self._hear()
 
     def losses(self) -> list[Loss]:
         """Return the exits that the launcher told."""
-        return [Loss(*line["lost"]) for line in self._lines.receive() if "lost" in line]
+        self._hear()
+        losses, self._losses = self._losses, []
+        return losses
 
     def act(self, deed: str, whom: list[tuple[int, int]], after_s: float = 0.0) -> None:
         """Ask the launcher for it."""
         if whom:
             self._lines.send(do=deed, whom=whom, after_s=after_s)
+
+    def has_done(self, deed: str, whom: list[tuple[int, int]]) -> bool:
+        """Whether the launcher's zygote has confirmed it."""
+        self._hear()
+        told = (deed, [list(who) for who in whom])
+        if told not in self._done:
+            return False
+        self._done.remove(told)
+        return True
 
     def missing(self, names: list[str]) -> None:
         """Tell the launcher who is not there yet; an empty list when everybody is."""
@@ -116,6 +143,15 @@ class Conducted:
         """Tell the launcher that from now on everybody ends as planned."""
         self._lines.send(landing=True)
 
+    def _hear(self) -> None:
+        for line in self._lines.receive():
+            if "lost" in line:
+                self._losses.append(Loss(*line["lost"]))
+            elif "done" in line:
+                self._done.append((line["done"], line["whom"]))
+            else:
+                self.broken = line["broken"]
+
 
 class ByHand:
     """Without a launcher; ``gone`` tells which names stopped showing signs of life."""
@@ -124,6 +160,7 @@ class ByHand:
 
     def __init__(self, gone: Callable[[], list[str]]) -> None:
         self.stopped: str | None = None
+        self.broken: str | None = None
         self._gone = gone
         self._print_at_s = -inf
 
@@ -145,6 +182,10 @@ class ByHand:
     def act(self, deed: str, whom: list[tuple[int, int]], after_s: float = 0.0) -> None:
         """Refuse: what was started by hand is stopped by hand. Raises LookupError."""
         raise LookupError(f"nobody can {deed} {whom}: these processes were started by hand")
+
+    def has_done(self, deed: str, whom: list[tuple[int, int]]) -> bool:
+        """Refuse: nothing was asked for. Raises LookupError."""
+        raise LookupError(f"nobody was asked to {deed} {whom}")
 
     def missing(self, names: list[str]) -> None:
         """Print who is not there yet, every two seconds."""

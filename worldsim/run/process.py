@@ -12,8 +12,9 @@ from netem.wire.post import Post
 from netem.wire.session import SessionError, open_client
 from netem.wire.stop import Stop
 from worldsim.run.flight import Flight
+from worldsim.run.lockstep import Lockstep
 from worldsim.run.muster import Muster, MusterError, assemble
-from worldsim.run.notebook import notebook
+from worldsim.run.notebook import Notebook, notebook
 from worldsim.run.outside import Outside
 from worldsim.run.rundir import RunDirectory, RunDirectoryError, RunWriteError
 from worldsim.run.summary import EXIT_STATUS, summarise
@@ -23,11 +24,21 @@ TOO_LATE_FRACTION = 0.01
 
 
 class Terms(NamedTuple):
-    """How a run is flown: its name, how much faster than the wall clock, recorded or not."""
+    """How a run is flown: its name, how much faster than the wall clock, recorded or not.
+
+    lockstep: in turns, at whatever speed that takes; shards: by how many mediums.
+    """
 
     run: str
     speed: float = 1.0
     recording: bool = True
+    lockstep: bool = False
+    shards: int = 1
+
+    @property
+    def mode(self) -> str:
+        """The clock's name in the summary."""
+        return "lockstep" if self.lockstep else "processes"
 
 
 def run(
@@ -42,7 +53,7 @@ def run(
     ``directory`` is asked for once the router answers: without one, nothing is made.
     """
     try:
-        with open_client(connect) as session:
+        with open_client(connect, patient=terms.lockstep) as session:
             return conduct(session, scenario, directory(), terms, outside_of)
     except (SessionError, MusterError, RunDirectoryError) as error:
         print(f"world: {error}", file=sys.stderr)
@@ -65,10 +76,10 @@ def conduct(
     stop = Stop()
     post = Post(session, Keys(terms.run))
     post.show_life("world")
-    muster = Muster(post, scenario)
+    muster = Muster(post, scenario, terms.lockstep, terms.shards)
     outside = outside_of(muster)
-    notes = notebook(directory, scenario, directory.path.name, "processes", terms.recording)
-    flight = Flight(scenario, post, notes, outside, muster, terms.speed)
+    notes = notebook(directory, scenario, directory.path.name, terms.mode, terms.recording)
+    flight = _flight(scenario, post, notes, outside, muster, terms)
     whole = False
 
     def unwanted() -> bool:
@@ -79,13 +90,26 @@ def conduct(
     finally:
         flight.land()
         notes.close()
-        summary = _summary(scenario, flight, interrupted=not whole)
+        summary = _summary(scenario, flight, terms.mode, interrupted=not whole)
         if flight.begun or stop.asked:
             directory.write_summary(summary)
         else:
             directory.nothing_flew()
     print(f"world: {summary['outcome']}{_lateness(flight.verdicts)}", flush=True)
     return EXIT_STATUS[summary["outcome"]]
+
+
+def _flight(
+    scenario: Scenario,
+    post: Post,
+    notes: Notebook,
+    outside: Outside,
+    muster: Muster,
+    terms: Terms,
+) -> Flight | Lockstep:
+    if terms.lockstep:
+        return Lockstep(scenario, post, notes, outside, muster, terms.shards)
+    return Flight(scenario, post, notes, outside, muster, terms.speed)
 
 
 def _lateness(verdicts: Verdicts | None) -> str:
@@ -95,12 +119,14 @@ def _lateness(verdicts: Verdicts | None) -> str:
     return f"; netem late by {typical_s * 1e3:.1f} ms (median), {worst_s * 1e3:.1f} ms (worst)"
 
 
-def _summary(scenario: Scenario, flight: Flight, interrupted: bool) -> dict[str, Any]:
-    late = flight.punctuality.late_fraction
+def _summary(
+    scenario: Scenario, flight: Flight | Lockstep, mode: str, interrupted: bool
+) -> dict[str, Any]:
+    late = flight.late_fraction
     return summarise(
         scenario,
         flight.loop,
-        mode="processes",
+        mode=mode,
         verdicts=flight.verdicts,
         rejected=flight.rejected,
         late_tick_fraction=late,
@@ -108,4 +134,5 @@ def _summary(scenario: Scenario, flight: Flight, interrupted: bool) -> dict[str,
         duration_s=flight.loop.world.time_s,
         interrupted=interrupted,
         host_too_slow=late is not None and late >= TOO_LATE_FRACTION,
+        failure=flight.failure,
     )

@@ -25,11 +25,12 @@ ARRIVED = {signal.SIGSTOP: os.WSTOPPED, signal.SIGCONT: os.WCONTINUED}
 
 
 class Brood(NamedTuple):
-    """What all agents of a run have in common."""
+    """What all agents of a run have in common; patient: who is silent for long is still there."""
 
     run: str
     endpoint: str
     logs: Path
+    patient: bool = False
 
 
 class Zygote:
@@ -101,7 +102,8 @@ class Zygote:
     def _live(self, agent: int, after_s: float) -> int:
         self._lines.close()
         time.sleep(after_s)
-        return agent_process.run(agent, self._brood.run, self._brood.endpoint)
+        brood = self._brood
+        return agent_process.run(agent, brood.run, brood.endpoint, brood.patient)
 
     def _bury(self, exit_descriptor: int, pid: int) -> None:
         end = reaped(pid)
