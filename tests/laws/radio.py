@@ -22,6 +22,32 @@ name = "line"
 vertices = {{ V1 = [0, 0, 0] }}
 queue = [{{ name = "Q1", vertices = ["V1"], shape = {{ kind = "ray", direction = [1, 0, 0] }} }}]
 """
+UNDER_WAY = """
+seed = {seed}
+[fleet]
+agents = 6
+start = {{ kind = "box", size_m = [4, 4, 2], spacing_m = 0.6 }}
+[vehicle]
+kind = "{kind}"
+[netem]
+range_m = 2.5
+loss_percent = 30
+delay_ms = 80
+[formation]
+name = "line"
+vertices = {{ V1 = [0, 0, 0] }}
+queue = [{{ name = "Q1", vertices = ["V1"], shape = {{ kind = "ray", direction = [-1, 0, 0] }} }}]
+[frame]
+waypoints_m = [[0, 0, 0], [1.5, 0, 0], [1.5, 3, 0]]
+speed_mps = 0.4
+yaw = "path"
+turn_dps = 20
+[[obstacle]]
+shape = "sphere"
+waypoints_m = [[3, -3, 0], [0, 4, 0]]
+speed_mps = 0.4
+radius_m = 0.4
+"""
 CHAIN = """
 [fleet]
 agents = 5
@@ -37,6 +63,12 @@ queue = [{ name = "Q1", vertices = ["V1"], shape = { kind = "ray", direction = [
 """
 
 
+KINDS = ("kinematic", "accelerating", "forward")
+FLIGHTS = [SCATTERED.format(seed=seed) for seed in range(3)]
+FLIGHTS += [UNDER_WAY.format(seed=seed, kind=kind) for seed, kind in enumerate(KINDS)]
+"""Flights to form up, and flights with a frame that moves and turns, past a ball that moves too."""
+
+
 def flown(text: str, duration_s: float) -> Iterator[tuple[VirtualFleet, list]]:
     """Fly a scenario; yield the fleet after every slot, and where all stood in each slot so far."""
     scenario = parse(text)
@@ -50,9 +82,10 @@ def flown(text: str, duration_s: float) -> Iterator[tuple[VirtualFleet, list]]:
 
 def who_is_out_of_range_stays_off() -> None:
     """Lemma 7, E20: out of range at t0, a pair is still d_c - 2 v_max (t - t0) apart at t."""
-    range_m, speed, ago, pairs = 3.0, 0.5, 80, 0
-    for seed in range(3):
-        for fleet, track in flown(SCATTERED.format(seed=seed), 6.0):
+    speed, ago, pairs = 0.5, 80, 0
+    for text in FLIGHTS:
+        range_m = parse(text).netem.range_m
+        for fleet, track in flown(text, 6.0):
             slot_hz = fleet.loop.world.clock.slot_hz
             now = track[-1]
             for back in range(1, min(ago, len(track)), 7):
@@ -67,8 +100,8 @@ def who_is_out_of_range_stays_off() -> None:
 def what_was_heard_bounds_what_is() -> None:
     """Lemma 7, E20: a pair last heard at distance r_h stays r_h - 2 v_max age apart."""
     speed, heard = 0.5, 0
-    for seed in range(3):
-        for fleet, track in flown(SCATTERED.format(seed=seed), 6.0):
+    for text in FLIGHTS:
+        for fleet, track in flown(text, 6.0):
             clock, now = fleet.loop.world.clock, track[-1]
             if (len(track) - 1) % clock.slots_per_tick:
                 continue
