@@ -1,0 +1,149 @@
+"""Lockstep: real processes that take turns fly what virtual time flies; a loss ends the run."""
+
+import json
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.processes.harness import QSWARM, Started, events_of, pids
+from worldsim.run.virtual import fly
+from worldsim.scenario.file import load
+
+pytestmark = pytest.mark.processes
+
+Start = Callable[..., Started]
+Write = Callable[[float], str]
+
+ROUGH = """
+jitter_ms = 30
+distribution = "pareto"
+loss_percent = 5
+duplicate_percent = 2
+corrupt_percent = 1
+rate_kbit = 128
+gemodel = { p_percent = 5, r_percent = 25, loss_bad_percent = 90 }
+"""
+TROUBLES = """
+[[event]]
+at_s = 1.0
+pause = [3]
+for_s = 3.0
+[[event]]
+at_s = 1.5
+kill = [1, "random:1"]
+for_s = 1.0
+[[event]]
+at_s = 2.0
+partition = [[0, 3]]
+for_s = 1.0
+[[event]]
+at_s = 3.0
+join = { count = 1, start = { kind = "list", positions_m = [[-4.2, 0.3, 0]] } }
+[[event]]
+at_s = 4.0
+netem = { loss_percent = 60 }
+[[event]]
+at_s = 4.5
+leave = [2]
+"""
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    return tmp_path / "run"
+
+
+@pytest.fixture
+def rough(scenario: Write) -> Write:
+    def write(duration_s: float) -> str:
+        path = Path(scenario(duration_s))
+        clean = path.read_text().replace("agents = 4", "agents = 4\nboot_s = 0.5")
+        path.write_text(clean.replace("delay_ms = 10", "delay_ms = 10" + ROUGH) + TROUBLES)
+        return str(path)
+
+    return write
+
+
+def in_turns(start: Start, scenario: str, run: Path, *options: str) -> Started:
+    return start(*QSWARM, "run", scenario, "--lockstep", "--out", str(run), *options)
+
+
+def summary_of(run: Path) -> dict[str, Any]:
+    summary: dict[str, Any] = json.loads((run / "summary.json").read_text())
+    return summary
+
+
+def test_a_clean_run_is_that_of_virtual_time_and_passes(
+    start: Start, scenario: Write, run: Path
+) -> None:
+    fleet = in_turns(start, scenario(6.0), run)
+    assert fleet.status(40.0) == 0, fleet.text
+    summary, flight = summary_of(run), fly(load(Path(scenario(6.0))))
+    assert (summary["mode"], summary["outcome"]) == ("lockstep", "pass")
+    assert summary["trace_sha256"] == flight.loop.trace.sha256
+    assert summary["late_tick_fraction"] is None
+    assert summary["real_time_factor"] > 0.0
+    assert summary["packets"]["delivered"] == flight.verdicts.fates["delivered"]
+    assert (run / "run.rrd").exists()
+
+
+@pytest.mark.parametrize("shards", [1, 3])
+def test_whatever_befalls_a_fleet_befalls_it_as_in_virtual_time(
+    start: Start, rough: Write, run: Path, shards: int
+) -> None:
+    fleet = in_turns(start, rough(6.0), run, "--no-recording", "--shards", str(shards))
+    assert fleet.status(60.0) in (0, 1), fleet.text
+    summary, flight = summary_of(run), fly(load(Path(rough(6.0))))
+    assert summary["duration_s"] == 6.0, summary["reason"]
+    assert summary["trace_sha256"] == flight.loop.trace.sha256
+    told = {name: summary["packets"][name] for name in flight.verdicts.packets()}
+    assert told == flight.verdicts.packets()
+    assert {each.partition("-")[2] for each in pids(run) if each.startswith("netem-")} == {
+        str(shard) for shard in range(1, shards)
+    }
+    kinds = [event["kind"] for event in events_of(run)]
+    assert kinds == [event["kind"] for event in flight.loop.events]
+
+
+def test_an_agent_that_dies_ends_the_run_with_a_line(
+    start: Start, scenario: Write, run: Path
+) -> None:
+    fleet = in_turns(start, scenario(3000.0), run, "--no-recording")
+    fleet.says("in place")
+    os.kill(pids(run)["agent-2"], signal.SIGKILL)
+    assert fleet.status(15.0) == 1
+    assert "agent-2 was killed by signal 9, " in summary_of(run)["reason"]
+    assert "the run ends here" in fleet.text
+    assert "fail (agent-2 was killed by signal 9" in fleet.text
+
+
+def test_a_medium_that_dies_ends_the_run_with_a_line(
+    start: Start, scenario: Write, run: Path
+) -> None:
+    fleet = in_turns(start, scenario(3000.0), run, "--no-recording", "--shards", "2")
+    fleet.says("in place")
+    os.kill(pids(run)["netem-1"], signal.SIGKILL)
+    assert fleet.status(15.0) == 1
+    assert summary_of(run)["reason"] == "netem-1 was killed by signal 9"
+
+
+def test_ctrl_c_ends_a_run_in_turns_as_any_other(start: Start, scenario: Write, run: Path) -> None:
+    fleet = in_turns(start, scenario(3000.0), run, "--no-recording")
+    fleet.says("in place")
+    fleet.kill_group(signal.SIGINT)
+    assert fleet.status(10.0) == 130, fleet.text
+    assert summary_of(run)["outcome"] == "inconclusive"
+
+
+def test_what_does_not_go_together_is_one_line(start: Start, scenario: Write, run: Path) -> None:
+    hasty = in_turns(start, scenario(6.0), run, "--speed", "2")
+    assert hasty.status(10.0) == 2
+    assert "--speed: not beside --lockstep" in hasty.text
+    loose = start(*QSWARM, "run", scenario(6.0), "--shards", "2", "--out", str(run))
+    assert loose.status(10.0) == 2
+    assert "--shards: needs --lockstep" in loose.text
+    assert not run.exists()
