@@ -27,5 +27,11 @@ check lint "$venv/bin/ruff" check .
 check types "$venv/bin/mypy"
 check imports "$venv/bin/lint-imports"
 printf '%-16s ...\n' tests
-"$venv/bin/pytest" "$@" || failed=1
+if [ $# -gt 0 ]; then
+    "$venv/bin/pytest" "$@" || failed=1
+else
+    # What is timed by the wall clock runs alone; the rest shares the cores, a file to a worker.
+    "$venv/bin/pytest" -m "not processes" --numprocesses auto --dist loadfile || failed=1
+    "$venv/bin/pytest" -m processes || failed=1
+fi
 exit "$failed"

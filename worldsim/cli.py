@@ -1,4 +1,4 @@
-"""The command line: qswarm run | sim | new | check | netem | fault | mission | verify | view | ps.
+"""The command line, `qswarm COMMAND`: run, sim, new, check, netem, fault, mission, verify, bench...
 
 Commands check everything before they start anything. Bad input is one line on stderr and exit
 status 2; what a command needs is imported inside it, so that --help and check stay quick.
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer.main import get_command
 
+from worldsim.bench_cli import bench
 from worldsim.netem_cli import netem
 from worldsim.operating import attach
 from worldsim.options import (
@@ -229,6 +230,9 @@ app.command(
         "qswarm netem runs/mine show",
     )
 )(netem)
+
+
+app.command(epilog=examples("qswarm bench", "qswarm bench --repeats 5 --json speed.json"))(bench)
 
 
 @app.command(epilog=examples("qswarm ps runs/wedge-9-20260102T030405Z"))

@@ -1,0 +1,56 @@
+"""The benchmark: every row is measured, the best of repeats counts, and a goal is a goal."""
+
+import json
+
+import pytest
+
+from worldsim.bench import table
+from worldsim.bench.fleets import wedge
+from worldsim.bench.parts import control_step_us, frame_us
+from worldsim.bench.table import MEASURES, Row, measured
+from worldsim.cli import command
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Two measures that take no time: each repeat yields the next of its numbers."""
+    slower, faster = iter([3.0, 1.0, 2.0]), iter([30.0, 60.0, 40.0])
+    rows = (
+        ("less", "us", 2.0, False, lambda: next(slower)),
+        ("more", "x", 70.0, True, lambda: next(faster)),
+    )
+    monkeypatch.setattr(table, "MEASURES", rows)
+
+
+def test_the_best_of_the_repeats_counts(quick):
+    assert [(row.measured, row.reached) for row in measured(3)] == [(1.0, True), (60.0, False)]
+
+
+@pytest.mark.parametrize(
+    ("more", "reached"), [(True, [False, True, True]), (False, [True, True, False])]
+)
+def test_a_goal_is_a_bound_on_the_right_side(more, reached):
+    assert [Row("x", "us", 2.0, value, more).reached for value in (1.0, 2.0, 3.0)] == reached
+
+
+def test_each_part_takes_some_time():
+    assert control_step_us(50) > 0.0
+    assert frame_us(9) > 0.0
+    assert len({name for name, *_ in MEASURES}) == len(MEASURES)
+
+
+def test_fleets_start_at_one_density():
+    for agents in (9, 72):
+        x, y, z = wedge(agents, 1.0).fleet.start.size_m
+        assert agents / (x * y * z) == pytest.approx(9 / 75, rel=0.05)
+
+
+def test_the_command_tells_each_row_and_overwrites_nothing(quick, capsys, tmp_path):
+    file = tmp_path / "speed.json"
+    assert command(["bench", "--repeats", "3", "--json", str(file)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == ["less", "more"]
+    assert lines[1].endswith("not reached")
+    assert [row["measured"] for row in json.loads(file.read_text())["rows"]] == [1.0, 60.0]
+    assert command(["bench", "--json", str(file)]) == 2
+    assert "speed.json" in capsys.readouterr().err

@@ -1,0 +1,1 @@
+"""What things cost in CPU time: the figures behind `qswarm bench`."""

@@ -1,0 +1,41 @@
+"""Fleets as a benchmark flies them: wedges of any size at one density, in virtual time."""
+
+from math import ceil
+from time import process_time
+
+from agent.qstructure.formation import FormationSpec, QueueSpec
+from agent.qstructure.shape import Ray
+from netem.messages import Conditions
+from worldsim.run.virtual import VirtualFleet
+from worldsim.scenario.starting import BoxStart
+from worldsim.scenario.tables import Fleet, Scenario
+
+EDGES = ((-1.0, 1.0, 1.0), (-1.0, -1.0, 1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, -1.0))
+BOX_M = (5.0, 5.0, 3.0)
+BOX_AGENTS = 9
+RANGE_M = 6.0
+IN_RANGE_M = 2.5
+"""A range in which an agent of a large fleet hears about eight others."""
+
+
+def wedge(agents: int, duration_s: float, range_m: float = RANGE_M) -> Scenario:
+    """Return a wedge of so many agents that start as densely as nine in 5 x 5 x 3 m do."""
+    queues = tuple(QueueSpec(f"Q{i}", ("V1",), Ray(edge)) for i, edge in enumerate(EDGES))
+    scale = (agents / BOX_AGENTS) ** (1.0 / 3.0)
+    x, y, z = (ceil(10.0 * side * scale) / 10.0 for side in BOX_M)
+    return Scenario(
+        name=f"wedge-{agents}",
+        fleet=Fleet(agents=agents, start=BoxStart(size_m=(x, y, z))),
+        formation=FormationSpec("wedge", {"V1": (0.0, 0.0, 0.0)}, queues),
+        duration_s=duration_s,
+        netem=Conditions(range_m=range_m),
+    )
+
+
+def flown_cpu_s(scenario: Scenario) -> float:
+    """Fly a scenario without a recording; return what its flight took of the CPU [s]."""
+    fleet = VirtualFleet(scenario)
+    begun_s = process_time()
+    for _ in range(scenario.slots):
+        fleet.slot()
+    return process_time() - begun_s

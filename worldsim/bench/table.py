@@ -1,0 +1,63 @@
+"""The benchmark's rows: what is measured, in which unit, and the goal it is held against."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from netem.messages import Conditions
+from worldsim.bench.fleets import IN_RANGE_M, flown_cpu_s, wedge
+from worldsim.bench.parts import control_step_us, frame_us
+
+TICK_HZ = 20.0
+WEDGE_S = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One figure: the best of some repeats, since a busy host only ever adds.
+
+    more: whether more is better, so that the goal is a least value.
+    """
+
+    name: str
+    unit: str
+    goal: float
+    measured: float
+    more: bool
+
+    @property
+    def reached(self) -> bool:
+        """Whether the goal is reached."""
+        return self.measured >= self.goal if self.more else self.measured <= self.goal
+
+
+def _real_time() -> float:
+    return WEDGE_S / flown_cpu_s(wedge(9, WEDGE_S))
+
+
+def _steps(agents: int, duration_s: float) -> Callable[[], float]:
+    scenario = wedge(agents, duration_s, IN_RANGE_M)
+    return lambda: agents * TICK_HZ * duration_s / flown_cpu_s(scenario)
+
+
+MEASURES: tuple[tuple[str, str, float, bool, Callable[[], float]], ...] = (
+    ("control step, 8 neighbours, 4 obstacles", "us", 30.0, False, control_step_us),
+    ("medium, a frame, N = 9, clean", "us", 15.0, False, lambda: frame_us(9)),
+    ("medium, a frame, N = 100, clean", "us", 15.0, False, lambda: frame_us(100)),
+    (
+        "medium, a frame, N = 100, loss and jitter",
+        "us",
+        15.0,
+        False,
+        lambda: frame_us(100, Conditions(loss_percent=20.0, delay_ms=20.0, jitter_ms=5.0)),
+    ),
+    ("virtual time, N = 9, one core", "x real time", 50.0, True, _real_time),
+    ("virtual time, N = 10", "agent-steps/CPU s", 10_000.0, True, _steps(10, 10.0)),
+    ("virtual time, N = 100", "agent-steps/CPU s", 20_000.0, True, _steps(100, 2.0)),
+)
+
+
+def measured(repeats: int) -> Iterator[Row]:
+    """Yield each row as soon as it is measured."""
+    for name, unit, goal, more, measure in MEASURES:
+        found = [measure() for _ in range(repeats)]
+        yield Row(name, unit, goal, max(found) if more else min(found), more)
