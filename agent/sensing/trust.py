@@ -1,13 +1,15 @@
 """Whether an agent may believe its sensors: one that doubts them stops.
 
 Stuck: a reading stays the very same while the vehicle moves. Silent: scans that are due do not
-come. Silent or wrong: nothing is sensed where a neighbour near by says it is.
+come. Silent or wrong: nothing is sensed where a neighbour near by says it is. Wrong: most echoes of
+a scan leap, time after time.
 """
 
 from collections.abc import Sequence
 from math import dist, hypot
 
 from agent.messages import Beacon, Observation, Vector
+from agent.sensing.leaps import Leaps
 from agent.sensing.pattern import Pattern
 
 MOVED_M = 0.03
@@ -43,6 +45,7 @@ class Trust:
         self._noisy = noisy
         self._due_s = {p.kind: LOST_SCANS * p.every / tick_hz for p in patterns}
         self._scanned_s: dict[int, float] = {}
+        self._leaps = {p.kind: Leaps() for p in patterns}
         self._ranging = ranging
         self._max_speed = max_speed
         self._reading: tuple[object, ...] = ()
@@ -54,8 +57,8 @@ class Trust:
     def note(self, observation: Observation) -> bool:
         """Take what is sensed now; return whether it may be believed."""
         self._note_change(observation)
-        late = bool(self._due_s) and self._late(observation)
-        return not (self._stuck or late or self._blind)
+        amiss = bool(self._due_s) and (self._late(observation) or self._leap(observation))
+        return not (self._stuck or amiss or self._blind)
 
     def compare(self, observation: Observation, neighbours: Sequence[Beacon]) -> None:
         """Look whether neighbours near by are sensed where they say they are."""
@@ -113,6 +116,12 @@ class Trust:
             now_s - self._scanned_s.setdefault(kind, now_s) > due_s + 1e-9
             for kind, due_s in self._due_s.items()
         )
+
+    def _leap(self, observation: Observation) -> bool:
+        for scan in observation.scans:
+            if scan.kind in self._leaps:
+                self._leaps[scan.kind].note(scan)
+        return any(leaps.wrong for leaps in self._leaps.values())
 
     def _is_missed(self, observation: Observation, beacon: Beacon) -> bool | None:
         """Whether a neighbour near by is not sensed; None where its word proves nothing."""

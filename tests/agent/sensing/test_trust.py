@@ -1,6 +1,7 @@
 """What an agent doubts: readings that never change, scans that do not come, neighbours unseen."""
 
 from array import array
+from random import Random
 
 import pytest
 
@@ -90,3 +91,14 @@ def test_who_was_blind_believes_again_once_it_sees_a_neighbour_not_once_they_hav
         assert not watch.note(seen(0))
         watch.compare(seen(0, vehicles=body), [there])
     assert watch.note(seen(0, vehicles=body))
+
+
+def test_scans_that_leap_time_after_time_are_wrong_and_quiet_ones_are_right_again():
+    watch, random = trust((LASER,), ranging=False), Random(5)
+    told = [random.randrange(1 << 16) for _ in range(61 * 8)]
+    wild = [Scan(0, array("H", told[k : k + 61]).tobytes()) for k in range(0, len(told), 61)]
+    believed = [watch.note(seen(2 * k, 0.1 * k, scans=(scan,))) for k, scan in enumerate(wild)]
+    assert believed == [True] * 3 + [False] * 5
+    calm = [Scan(0, array("H", [1000 + 10 * k] * 61).tobytes()) for k in range(5)]
+    believed = [watch.note(seen(16 + 2 * k, 0.8, scans=(scan,))) for k, scan in enumerate(calm)]
+    assert believed == [False] * 3 + [True] * 2
