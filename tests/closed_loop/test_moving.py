@@ -46,3 +46,16 @@ def test_the_wedge_passes_the_field_and_closes_again(seed, mode):
     assert judge.min_separation_m >= 0.25
     assert judge.phases[0].residual_m < 0.1
     assert judge.turns_over_limit_fraction <= 0.05
+
+
+@pytest.mark.parametrize("mode", ["stuck", "silent", "wrong"])
+@pytest.mark.parametrize("sensors", ["['proximity']", "['laser', 'sonar']"])
+def test_who_has_reason_to_doubt_its_sensors_stands_and_nobody_is_hit(sensors, mode):
+    fault = f"[{{ at_s = 10, sensor = {{ agents = [0], mode = '{mode}' }} }}]"
+    changes = {"event": fault, "vehicle.sensors": sensors, "duration_s": "20"}
+    noise = {"sensor.proximity.noise_m": "0.02"}
+    loop = fly(load(DEPLOY / "field-scan-6.toml", {**changes, **noise})).loop
+    assert np.linalg.norm(loop.world.fleet.velocity[0]) == 0.0
+    assert np.all(np.linalg.norm(loop.world.fleet.velocity[1:], axis=1) > 0.1)
+    assert [e["t_s"] for e in loop.events if e["kind"] == "sensor"] == [10.0]
+    assert loop.judge.invariants()["I1"]["violations"] == 0
