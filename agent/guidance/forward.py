@@ -1,8 +1,8 @@
 """Vehicles that move only where they point: the filter may only shorten what they fly.
 
 Until a command expires such a vehicle may have turned by its yaw rate, whatever it was told last:
-each bound is kept for every heading within that. They cannot fly back: before what comes nearer by
-itself they stand.
+each bound is kept for every heading within that. They cannot fly back: from what comes nearer by
+itself they climb or sink, and go ahead where that leads away.
 """
 
 from collections.abc import Sequence
@@ -30,6 +30,28 @@ def forward_kept(velocity: Vector, bounds: Sequence[Bound], yaw: float, sway: fl
         return (0.0, 0.0, up * climb)
     forward, climb = both * forward, both * climb
     return (forward * cos(yaw), forward * sin(yaw), climb)
+
+
+def forward_retreat(
+    bounds: Sequence[Bound], yaw: float, sway: float, max_speed: float, max_climb: float
+) -> Vector:
+    """Return the velocity that best gives way to what comes nearer [m/s]; others it lets be."""
+    firm = [bound for bound in bounds if bound.limit >= 0.0]
+    duties = [bound for bound in bounds if bound.limit < 0.0]
+    climb = min(max_climb, max_speed)
+    ahead_too = sqrt(max_speed * max_speed - climb * climb)
+    flown = []
+    for forward, up in ((0.0, climb), (0.0, -climb), (ahead_too, climb), (ahead_too, -climb)):
+        share = _scale(forward, up, firm, yaw, sway)
+        flown.append((share * forward, share * up))
+    flown.append((_scale(max_speed, 0.0, firm, yaw, sway) * max_speed, 0.0))
+    forward, up = min(flown, key=lambda way: _shortfall(way, duties, yaw, sway))
+    return (forward * cos(yaw), forward * sin(yaw), up)
+
+
+def _shortfall(way: tuple[float, float], duties: Sequence[Bound], yaw: float, sway: float) -> float:
+    """Return by how much a flight ahead and upward misses the worst of its duties [m/s]."""
+    return max(_worst_approach(*way, duty.away, yaw, sway) - duty.limit for duty in duties)
 
 
 def _scale(forward: float, climb: float, bounds: Sequence[Bound], yaw: float, sway: float) -> float:

@@ -10,7 +10,7 @@ from math import hypot, radians
 
 from agent.controller import Senses
 from agent.guidance.cone import cone_of
-from agent.guidance.forward import forward_kept
+from agent.guidance.forward import forward_kept, forward_retreat
 from agent.guidance.retreat import retreated
 from agent.guidance.safety import (
     ROUNDING_MPS,
@@ -54,7 +54,7 @@ class Guard:
         scans = any(kind in limits.sensors for kind in KINDS)
         scanned_m, creep = (SCANNED_M, CREEP * limits.max_speed_mps) if scans else (0.0, 0.0)
         self._cone = cone_of(limits)
-        self._limits = limits
+        self._speeds = limits.max_speed_mps, limits.max_climb_mps
         self._motion = None if scans else Motion(setup.sensor.proximity.noise_m)
         self._ranging = None
         if "proximity" in limits.sensors:
@@ -92,13 +92,15 @@ class Guard:
         return self._clearing.bounds(points)
 
     def _kept(self, wanted: Vector, bounds: list[Bound], senses: Senses) -> Vector:
-        limits = self._limits
+        comes = bool(senses.obstacles) and any(bound.limit < 0.0 for bound in bounds)
         if self._forward:
+            if comes:
+                return forward_retreat(bounds, senses.yaw, self._sway, *self._speeds)
             return forward_kept(wanted, bounds, senses.yaw, self._sway)
         if self._accelerates and self._too_fast(senses.velocity, bounds):
             return STAND
-        if senses.obstacles and any(bound.limit < 0.0 for bound in bounds):
-            return retreated(wanted, bounds, limits.max_speed_mps, limits.max_climb_mps)
+        if comes:
+            return retreated(wanted, bounds, *self._speeds)
         return limited(wanted, bounds, senses.yaw, self._cone)
 
     def _too_fast(self, velocity: Vector, bounds: list[Bound]) -> bool:

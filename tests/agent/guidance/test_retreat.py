@@ -37,9 +37,10 @@ class Ball:
         return tuple(share * x for x in off)
 
 
-def least_distance(random, speed, ticks):
+def least_distance(random, speed, ticks, kind):
     """Fly one vehicle of 1 m/s, that wants the worst, in the way of a ball [m]."""
-    guard = Craft(Vehicle(max_speed_mps=1.0, max_climb_mps=1.0), ticks).guard(1.0)
+    limits = Vehicle(kind=kind, max_speed_mps=1.0, max_climb_mps=1.0)
+    guard = Craft(limits, ticks).guard(1.0)
     ball, wish = Ball(random, speed), random.choice(WISHES)
     here, least, flown = (0.0, 0.0, 0.0), 9.0, (0.0, 0.0, 0.0)
     coming = [flown] * ticks
@@ -58,9 +59,14 @@ def least_distance(random, speed, ticks):
 @pytest.mark.parametrize("ticks", [1, 2])
 @pytest.mark.parametrize("speed", [0.3, 0.6])
 def test_a_ball_hits_nobody_whatever_they_want(speed, ticks):
-    least = [least_distance(Random(seed), speed, ticks) for seed in range(40)]
+    least = [least_distance(Random(seed), speed, ticks, "kinematic") for seed in range(40)]
     assert min(least) > CLEARANCE_M - 0.05
     assert min(least) < CLEARANCE_M + 0.2
+
+
+def test_who_flies_only_ahead_climbs_or_sinks_out_of_the_way():
+    least = [least_distance(Random(seed), 0.6, 1, "forward") for seed in range(40)]
+    assert min(least) > 0.4
 
 
 def test_giving_way_never_leads_into_somebody_else():
