@@ -53,20 +53,19 @@ class Cockpit:
         command, radio = post.putter("command", setup.id), post.putter("tx", setup.id)
         self._controls = Controls(setup, command, radio)
         self._batches = post.ring("rx", setup.id, BATCH_RING)
-        self.rejected = 0
 
     def see(self, data: bytes) -> None:
         """Step on an observation; one that cannot be read is counted."""
         try:
             observation = decode_observation(data)
         except RejectedError:
-            self.rejected += 1
+            self._controls.core.rejected["observation"] += 1
             return
         for batch in self._batches.drain(BATCH_RING):
             try:
                 self._controls.hear(batch, observation.time_s)
             except WireError:
-                self.rejected += 1
+                self._controls.core.rejected["batch"] += 1
         self._controls.step(observation)
 
 
@@ -81,7 +80,6 @@ class Partner:
         self._controls = Controls(setup, command, post.putter("tx", setup.id, lockstep=True))
         self._inbox = post.ring("rx", setup.id, TURN_RING)
         self._unwanted = unwanted
-        self.rejected = 0
 
     def see(self, data: bytes) -> None:
         """Step on an observation, with what was heard by its slot.

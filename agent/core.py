@@ -20,6 +20,7 @@ from agent.controller import Intent, Peer, Senses
 from agent.guidance.guard import STAND, Guard
 from agent.guidance.safety import Told
 from agent.messages import (
+    CAUSES,
     Beacon,
     Command,
     Gossip,
@@ -230,7 +231,7 @@ class Agent:
             intent.target,
             intent.place,
             tuple([other.id for other in senses.neighbours[:MAX_TOLD]]),
-            self.rejected.total(),
+            tuple([(CAUSES.index(cause), n) for cause, n in sorted(self.rejected.items())]),
             self._missions.flown.key,
             self._standing.tier,
             self._standing.parent,

@@ -30,6 +30,15 @@ ROLES = ("member", "sub-vertex", "vertex", "distress")
 """An agent's role in its queue; a sub-vertex is a member whom another follows."""
 
 
+CAUSES = (
+    *("oversize", "corrupt", "garbage", "invalid", "spoofed", "replay", "future", "old", "offset"),
+    *("mission", "observation", "batch"),
+)
+"""Why a message is refused; RejectedError has the causes of those heard by radio."""
+CauseIndex = Annotated[int, Meta(ge=0, lt=len(CAUSES))]
+Rejections = Annotated[tuple[tuple[CauseIndex, Count], ...], Meta(max_length=len(CAUSES))]
+
+
 class Place(NamedTuple):
     """A place in a formation: the rank-th slot of a queue, rank 0 at the queue's first vertex.
 
@@ -137,8 +146,9 @@ class Telemetry(Message, frozen=True):
 
     wanted: velocity before the safety filter [m/s]; force: |u_i| of (28) before saturation;
     target: its target-on-queue [m]; place: where in the formation it means to be; heard: ids
-    heard directly of late; rejected: messages refused so far; mission: the key of the mission it
-    flies; tier, parent: its standing in its queue (see Beacon), -1 for none; role: index of ROLES;
+    heard directly of late; rejected: messages refused so far, (index of CAUSES, how many) each;
+    mission: the key of the one it flies; tier, parent: its standing in its queue (see Beacon), -1
+    for none; role: index of ROLES;
     record_age_s: the age of the oldest record it keeps of a member, when it last looked.
     """
 
@@ -147,7 +157,7 @@ class Telemetry(Message, frozen=True):
     target: Position | None
     place: tuple[Index, Index] | None
     heard: Annotated[tuple[AgentId, ...], Meta(max_length=256)]
-    rejected: Count
+    rejected: Rejections
     mission: Count
     tier: Index
     parent: Annotated[int, Meta(ge=-1, lt=2**16)]

@@ -101,7 +101,7 @@ def _fly(post: Post, setup: AgentSetup, run: str, stop: Stop) -> None:
         _steer(cockpit, observations, run, ending)
     except UnwantedError:
         print(f"agent-{setup.id}: the run is over, within a slot", flush=True)
-    print(f"agent-{setup.id} is done, {cockpit.rejected} messages could not be read", flush=True)
+    print(f"agent-{setup.id} is done", flush=True)
 
 
 def _wait_for_ears(post: Post, ending: Ending) -> None:

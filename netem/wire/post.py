@@ -16,6 +16,8 @@ from zenoh.handlers import RingChannel
 from netem.wire.keys import TOPICS, Keys
 
 Put = Callable[[bytes], None]
+LATE = "Timeout"
+"""What Zenoh itself answers for somebody who has heard the question and says nothing in time."""
 
 _T = TypeVar("_T")
 _T_co = TypeVar("_T_co", covariant=True)
@@ -180,7 +182,7 @@ class Post:
         """
         key = self._keys.of(topic, who)
         for reply in self._session.get(key, payload=question, timeout=timeout_s):
-            if reply.err is not None:
+            if reply.err is not None and reply.err.payload.to_string() != LATE:
                 raise RefusedError(reply.err.payload.to_string())
             if reply.ok is not None:
                 return reply.ok.payload.to_bytes()

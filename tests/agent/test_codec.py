@@ -22,6 +22,7 @@ from agent.codec import (
     encode,
     sealed,
 )
+from agent.messages import CAUSES as CAUSES_TOLD
 from agent.messages import (
     Beacon,
     Command,
@@ -43,7 +44,7 @@ POSE = Pose(1.0, 2.0, 3.0, 0.5)
 SCAN = Scan(1, bytes(8))
 DRIFT = Drift(1.5, 0.1, 0.2, 0.3, 0.4)
 PATH = FramePath((VECTOR, VECTOR), 0.25, 2.0, 0.5, 0.2, (1.0, 2.0))
-TELEMETRY = Telemetry(VECTOR, 1.0, VECTOR, (1, 2), (3, 4), 5, 6, 1, 3, 0)
+TELEMETRY = Telemetry(VECTOR, 1.0, VECTOR, (1, 2), (3, 4), ((5, 5),), 6, 1, 3, 0)
 RECORD = Record(4, 0, 77, 1.25, VECTOR, -1, -1, 0, 7, ((0, 0),))
 GOOD = {
     Observation: Observation(
@@ -56,7 +57,7 @@ GOOD = {
         VECTOR,
         0.5,
         (0.1, 0.2),
-        Telemetry(VECTOR, 1.0, VECTOR, (1, 2), (3, 4), 5, 6, 1, 3, 0),
+        Telemetry(VECTOR, 1.0, VECTOR, (1, 2), (3, 4), ((5, 5),), 6, 1, 3, 0),
     ),
     Beacon: Beacon(
         3,
@@ -139,7 +140,7 @@ telemetries = st.builds(
     st.none() | positions,
     st.none() | st.tuples(indices, indices),
     st.lists(ids, max_size=20).map(tuple),
-    counts,
+    st.lists(st.tuples(st.integers(0, len(CAUSES_TOLD) - 1), counts), max_size=8).map(tuple),
     counts,
     indices,
     parents,

@@ -22,7 +22,6 @@ def outcome(scenario: Scenario) -> str:
         flight.loop,
         mode="virtual",
         verdicts=flight.verdicts,
-        rejected=flight.rejected,
         late_tick_fraction=0.0,
         real_time_factor=1.0,
         duration_s=flight.loop.world.time_s,

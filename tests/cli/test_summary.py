@@ -29,7 +29,6 @@ def summary(small: Path, flight: Flight, **others: Any) -> dict[str, Any]:
     figures = {
         "mode": "virtual",
         "verdicts": flight.verdicts,
-        "rejected": 0,
         "late_tick_fraction": 0.0,
         "real_time_factor": 1.0,
         "duration_s": 5.0,
@@ -93,9 +92,7 @@ def test_how_late_the_radio_was_is_told_in_ms(small: Path, flight: Flight) -> No
 
 def test_what_was_not_measured_is_null_and_no_pass(small: Path, flight: Flight) -> None:
     flight.loop.judge.packet_ticks = 0
-    told = summary(
-        small, flight, verdicts=None, rejected=None, real_time_factor=float("nan"), mode="processes"
-    )
+    told = summary(small, flight, verdicts=None, real_time_factor=float("nan"), mode="processes")
     assert set(told["packets"].values()) == {None}
     assert told["real_time_factor"] is None
     assert told["trace_sha256"] is None

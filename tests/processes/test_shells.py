@@ -40,7 +40,7 @@ def command(slot: int) -> Command:
         still,
         0.0,
         (0.0, 0.0),
-        Telemetry(still, 0.0, None, None, (), 0, 0, -1, -1, 0),
+        Telemetry(still, 0.0, None, None, (), (), 0, -1, -1, 0),
     )
 
 

@@ -6,7 +6,8 @@ vehicles.
 """
 
 import time
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
 
 from agent.codec import RejectedError, decode_command, encode
 from netem.messages import Truth, Verdicts
@@ -58,7 +59,7 @@ class Flight:
         self._hands = Hands(post, muster, outside, scenario.fleet.boot_s / speed)
         self._reception = Reception(post, Control(scenario, self.loop, outside.launches))
         self.begun = self._landed = False
-        self._unreadable = 0
+        self._refused: Counter[str] = Counter()
         self._pacer = Pacer(1.0 / (scenario.slot_hz * speed))
         self._headway = Headway(scenario.duration_s, self.loop, outside)
         self._truth, self._over = post.putter("truth"), post.putter("over")
@@ -72,11 +73,10 @@ class Flight:
         return self.punctuality.late_fraction
 
     @property
-    def rejected(self) -> int:
-        """Messages refused so far: by the agents, by the medium, and by the world."""
-        by_agents = sum(last.telemetry.rejected for last in self.loop.world.latest if last)
-        by_medium = sum(self.verdicts.rejected.values()) if self.verdicts is not None else 0
-        return by_agents + by_medium + self._unreadable
+    def refused(self) -> Mapping[str, int]:
+        """What the world refused so far, by cause; "stale": commands of another time."""
+        causes = {**self._refused, "stale": self.loop.world.discarded}
+        return {cause: count for cause, count in sorted(causes.items()) if count}
 
     def fly(self, unwanted: Callable[[], bool]) -> bool:
         """Fly the scenario's slots until the end, or until unwanted; return whether all of them."""
@@ -147,14 +147,14 @@ class Flight:
             return
         try:
             self.loop.obey(agent, decode_command(data), data)
-        except RejectedError:
-            self._unreadable += 1
+        except RejectedError as error:
+            self._refused[error.cause] += 1
 
     def _read_report(self, data: bytes) -> None:
         try:
             self.verdicts = unpack(data, Verdicts, MAX_VERDICTS_B)
         except WireError:
-            self._unreadable += 1
+            self._refused["verdicts"] += 1
 
     def _strike_out(self) -> None:
         for loss in self._outside.losses():

@@ -6,7 +6,7 @@ the host's speed or load, the run is the one of virtual time.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from agent.codec import RejectedError, decode_command, encode
 from netem.journal import Digest, joined
@@ -33,6 +33,8 @@ class Lockstep:
     """A fleet in the air, everybody waiting for everybody."""
 
     late_fraction: float | None = None
+    refused: Mapping[str, int] = {}
+    """Nothing: what the world would refuse ends the run."""
 
     def __init__(
         self,
@@ -61,11 +63,6 @@ class Lockstep:
         self._observers = [post.putter("observation", agent, lockstep=True) for agent in rows]
         self._commands = [post.ring("command", agent, TURN_RING) for agent in rows]
         self._done = [post.ring("done", shard, TURN_RING) for shard in range(shards)]
-
-    @property
-    def rejected(self) -> int:
-        """Messages refused so far, all of them by agents: any other refusal ends the run."""
-        return sum(last.telemetry.rejected for last in self.loop.world.latest if last)
 
     def fly(self, unwanted: Callable[[], bool]) -> bool:
         """Fly the scenario's slots until the end, or until unwanted; return whether all of them.

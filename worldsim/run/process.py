@@ -128,7 +128,7 @@ def _summary(
         flight.loop,
         mode=mode,
         verdicts=flight.verdicts,
-        rejected=flight.rejected,
+        refused=flight.refused,
         late_tick_fraction=late,
         real_time_factor=flight.real_time_factor,
         duration_s=flight.loop.world.time_s,

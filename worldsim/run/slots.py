@@ -30,6 +30,7 @@ from worldsim.run.faults import (
 )
 from worldsim.run.meaning import Deed, deed_of
 from worldsim.run.orders import Orders
+from worldsim.run.refusals import Refusals
 from worldsim.run.team import Begin, Fail, Hold, Start, Stop, Team
 from worldsim.run.told import UNTOLD, tick_of, told_by
 from worldsim.run.trace import Trace
@@ -113,6 +114,7 @@ class SlotLoop:
         self._places: list[tuple[int, int] | None] = [None] * scenario.rows
         self._headings = world.fleet.yaw.tolist()
         self._told = [UNTOLD] * scenario.rows
+        self.refusals = Refusals()
 
     def due(self) -> Iterator[Deed]:
         """Yield what is to happen before the present slot: do each, and ``take`` it, in turn."""
@@ -181,6 +183,8 @@ class SlotLoop:
             self.company.note(agent, len(told.heard))
             self.orders.heard(told.mission)
             self._watch_place(agent, told.place)
+            if told.rejected:
+                self.refusals.note(agent, command)
 
     def close(self, verdicts: bytes) -> None:
         """End the slot with the medium's digest: the vehicles fly through it."""

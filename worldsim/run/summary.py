@@ -1,5 +1,6 @@
 """summary.json: what a run showed, from the judge, the radio's counters and the clock."""
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from math import isfinite
 from typing import Any
@@ -30,20 +31,22 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
     *,
     mode: str,
     verdicts: Verdicts | None,
-    rejected: int | None,
     late_tick_fraction: float | None,
     real_time_factor: float | None,
     duration_s: float,
     interrupted: bool,
     host_too_slow: bool,
     failure: str | None = None,
+    refused: Mapping[str, int] | None = None,
 ) -> dict[str, Any]:
     """Return summary.json's content: plain values, None for what could not be measured.
 
     mode: "processes", "lockstep" or "virtual". duration_s: how much was flown, in simulated time.
-    failure: what ended the run that should not have happened in it.
+    failure: what ended the run that should not have happened in it. refused: messages that the
+    world refused, by cause.
     """
     judge = loop.judge
+    rejected = _rejected(loop, verdicts, refused)
     expectations = judge.expectations()
     invariants = judge.invariants()
     doubt = _doubt(interrupted, host_too_slow, duration_s, late_tick_fraction)
@@ -65,6 +68,7 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "packets": _packets(verdicts, rejected),
+        "rejected_by_cause": rejected,
         "direct_links": loop.company.links(),
         "bytes_per_s": loop.company.bytes_per_s(verdicts),
         "invariants": invariants,
@@ -108,13 +112,25 @@ def _doubt(
     return None
 
 
-def _packets(verdicts: Verdicts | None, rejected: int | None) -> dict[str, int | None]:
+def _rejected(
+    loop: SlotLoop, verdicts: Verdicts | None, refused: Mapping[str, int] | None
+) -> dict[str, dict[str, int]]:
+    """Return who refused how many messages for which cause."""
+    by_medium = verdicts.rejected if verdicts is not None else {}
+    told = {"agents": loop.refusals.by_cause(), "netem": by_medium, "world": refused or {}}
+    return {who: dict(causes) for who, causes in told.items()}
+
+
+def _packets(
+    verdicts: Verdicts | None, rejected: Mapping[str, Mapping[str, int]]
+) -> dict[str, int | None]:
     """Count packets: sent as frames, addressed and each fate once for each agent that may hear."""
     names = ("sent", "addressed", *FATES, "in_flight")
     if verdicts is None:
-        return {**dict.fromkeys(names), "rejected": rejected}
+        return dict.fromkeys((*names, "rejected"))
     counted = verdicts.packets()
-    return {**{name: counted.get(name, 0) for name in names}, "rejected": rejected}
+    refused = sum(count for causes in rejected.values() for count in causes.values())
+    return {**{name: counted.get(name, 0) for name in names}, "rejected": refused}
 
 
 def _delivery_late_ms(verdicts: Verdicts | None) -> dict[str, float] | None:

@@ -58,7 +58,6 @@ def simulate(
         flight.loop,
         mode="virtual",
         verdicts=flight.verdicts,
-        rejected=flight.rejected,
         late_tick_fraction=0.0,
         real_time_factor=flown_s / flight.wall_s,
         duration_s=flown_s,

@@ -55,14 +55,13 @@ class VirtualFleet:
         self._medium = Medium(scenario.medium_setup())
         self._decoders = decoders
         self._agents = {agent: self._started(agent, 0) for agent in range(scenario.fleet.agents)}
-        self._rejected = 0
         self._inboxes = [deque[bytes](maxlen=BATCH_RING) for _ in range(scenario.rows)]
         self.loop = SlotLoop(scenario, world_of(scenario, COMMAND_TICKS), recorder, self._packets)
 
     @property
     def rejected(self) -> int:
         """Messages that agents refused to believe."""
-        return self._rejected + sum(agent.rejected.total() for agent in self._agents.values())
+        return sum(self.loop.refusals.by_cause().values())
 
     @property
     def verdicts(self) -> Verdicts:
@@ -86,7 +85,7 @@ class VirtualFleet:
         match deed:
             case Stop(agents=agents):
                 for agent in agents:
-                    self._rejected += self._agents.pop(agent).rejected.total()
+                    del self._agents[agent]
                     self._inboxes[agent].clear()
             case Start(incarnations=incarnations):
                 for agent, incarnation in incarnations.items():

@@ -51,7 +51,8 @@ def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
     rows = [_expectation(**row) for row in summary["expectations"]]
     reason = f" ({summary['reason']})" if summary["reason"] else ""
     place = f"{folder}/run.rrd" if recorded else f"{folder}/summary.json"
-    return "\n".join([head, *rows, _aside(summary), f"{summary['outcome']}{reason}  {place}"])
+    told = [_aside(summary), *_refused(summary["rejected_by_cause"])]
+    return "\n".join([head, *rows, *told, f"{summary['outcome']}{reason}  {place}"])
 
 
 def table(overall: Summary, folder: Path) -> str:
@@ -87,6 +88,16 @@ def _expectation(name: str, wanted: float | None, got: float | None, held: bool)
     asked = f"wanted {wanted:g}" if wanted is not None else "wanted at all"
     shown = f"{got:.3g}" if got is not None else "never"
     return f"  {'held' if held else 'NOT HELD':9}{name}: {shown} ({asked})"
+
+
+def _refused(rejected: dict[str, dict[str, int]]) -> list[str]:
+    """Return who refused what in a line, or none where nothing was refused."""
+    told = [
+        f"{who} {', '.join(f'{count} {cause}' for cause, count in causes.items())}"
+        for who, causes in rejected.items()
+        if causes
+    ]
+    return [f"  refused: {'; '.join(told)}"] if told else []
 
 
 def _aside(summary: Summary) -> str:
