@@ -6,7 +6,7 @@ the virtual clock) only carry bytes.
 
 from collections import Counter
 from collections.abc import Callable
-from math import inf
+from math import dist, inf
 from typing import NamedTuple
 
 from agent.codec import RejectedError, decode_beacon, decode_gossip
@@ -15,11 +15,12 @@ from agent.comms.gossip import Table
 from agent.comms.hierarchy import ALONE, Hierarchy
 from agent.comms.mission import Missions
 from agent.comms.neighbours import Neighbours
-from agent.comms.silent import SilentBodies
+from agent.comms.silent import SAME_BODY_M, SilentBodies, TellsOf
 from agent.controller import Intent, Peer, Senses
 from agent.guidance.guard import STAND, Guard
 from agent.guidance.safety import Told
 from agent.messages import (
+    MAX_PLACES,
     CAUSES,
     Beacon,
     Command,
@@ -82,6 +83,7 @@ class Agent:
         self._blocked: frozenset[Place] = frozenset()
         self._intent: Intent | None = None
         self._lagging = False
+        self._beside_m = 0.5 * setup.control.spacing_m + SAME_BODY_M
         self._tidy_at_s = 0.0
         self._record_age_s = 0.0
 
@@ -188,13 +190,35 @@ class Agent:
         beacons = self._neighbours.beacons()
         here, team = observation.position, self._table.members(now_s)
         self._record_age_s = max((member.age_s for member in team), default=0.0)
-        self._silent = self._bodies.look(now_s, here, observation.vehicles, beacons, team, departed)
+        sensed = observation.vehicles
+        self._silent = self._bodies.look(
+            now_s, here, sensed, beacons, team, departed, self._teller(1 + len(team))
+        )
         self._eyes.trust.compare(observation, beacons)
         self._lagging = self._neighbours.behind(self._missions.flown.key)
         self._blocked = self._table.blocked(self._missions.flown.key)
         vertex = self._intent is not None and self._intent.vertex
         queue = self._on_my_queue()
         self._standing = self._hierarchy.stand(now_s, self._broadcast.sequence, vertex, queue)
+
+    def _teller(self, agents: int) -> TellsOf:
+        """Return what says whether a neighbour tells of a silent body, in a team of that size.
+
+        It tells of places, each taken by a body within d_ir / 2, and of a few at most; one who
+        flies another mission cannot be asked.
+        """
+        mission = self._missions.flown
+
+        def tells_of(witness: Beacon, body: Vector) -> bool:
+            if witness.mission != mission.key or len(witness.blocked) >= MAX_PLACES:
+                return True
+            slots = [mission.formation.slot(Place(*told), agents) for told in witness.blocked]
+            return any(
+                slot is None or dist(mission.frame.to_world(slot.point), body) <= self._beside_m
+                for slot in slots
+            )
+
+        return tells_of
 
     def _on_my_queue(self) -> list[Beacon]:
         """Return the last beacons of those heard on the own queue, its vertex agents included."""

@@ -22,7 +22,8 @@ Index = Annotated[int, Meta(ge=-1, lt=2**15)]
 
 Position = tuple[Metres, Metres, Metres]
 Cost = Annotated[int, Meta(ge=0, lt=2**31)]
-Places = Annotated[tuple[tuple[Index, Index], ...], Meta(max_length=8)]
+MAX_PLACES = 8
+Places = Annotated[tuple[tuple[Index, Index], ...], Meta(max_length=MAX_PLACES)]
 Velocity = tuple[Speed, Speed, Speed]
 
 

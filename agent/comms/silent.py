@@ -7,7 +7,7 @@ farther than a radio hears: a body is silent only if others as far away are hear
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import dist
 from typing import NamedTuple
 
@@ -22,6 +22,10 @@ MEMORY_S = 10.0
 """So long a body is remembered out of sight; whoever comes near will see it again."""
 SURE_RANGE_M = 1.8
 """Nearer than this a body would be sensed if it were still there."""
+
+WITNESS_M = 1.3
+"""Nearer than this to where a body was, whoever tells of none there says that it is gone."""
+TellsOf = Callable[[Beacon, Vector], bool]
 
 
 class _Body(NamedTuple):
@@ -66,11 +70,13 @@ class SilentBodies:
         heard: Sequence[Beacon],
         team: Sequence[Member],
         departed: Sequence[Departed] = (),
+        tells_of: TellsOf = lambda _witness, _body: True,
     ) -> tuple[Vector, ...]:
         """Return where silent bodies stand [m; world frame].
 
         sensed: bodies relative to ``position`` [m; world axes]; heard: the last beacons of those
-        who are heard directly; team: all members known; departed: who was one until now.
+        who are heard directly; team: all members known; departed: who was one until now; tells_of:
+        whether a neighbour tells of a body there.
         """
         if departed or self._departed:
             self._departed = [
@@ -83,33 +89,46 @@ class SilentBodies:
             unknown = [body for body in unknown if dist(position, body) <= reach]
         if not unknown and not self._bodies:
             return ()
+        known = [each.seen_again(now_s, unknown) for each in self._bodies]
+        new = [
+            seen
+            for seen in unknown
+            if all(dist(body.position, seen) >= SAME_BODY_M for body in known)
+        ]
+        lost = [body for body in known if body.seen_s < now_s]
         kept = [
             body
-            for body in (each.seen_again(now_s, unknown) for each in self._bodies)
-            if body.seen_s == now_s or self._remembered(body, now_s, position, team)
+            for body in known
+            if body.seen_s == now_s
+            or (
+                self._remembered(body, now_s, position, team)
+                and not _refuted(body, heard, tells_of)
+            )
         ]
-        new = [
-            self._found(seen, now_s)
-            for seen in unknown
-            if all(dist(body.position, seen) >= SAME_BODY_M for body in kept)
-        ]
-        self._bodies = kept + new
+        self._bodies = kept + [self._found(seen, now_s, lost) for seen in new]
         return tuple(body.position for body in self._bodies if now_s - body.since_s >= SILENCE_S)
 
-    def _found(self, body: Vector, now_s: float) -> _Body:
-        """Return a body found now; where a member fell silent, it is as silent as that one."""
+    def _found(self, body: Vector, now_s: float, lost: Sequence[_Body]) -> _Body:
+        """Return a body found now; where a member fell silent, it is as silent as that one.
+
+        lost: those no longer seen; one of them that has flown on stands nowhere yet.
+        """
         since_s = min(
             (gone.stamp_s for gone in self._departed if dist(gone.position, body) < NEIGHBOUR_M),
             default=now_s,
         )
-        return _Body(body, since_s, now_s)
+        flown = any(
+            dist(each.position, body) < SAME_BODY_M + self._max_speed * (now_s - each.seen_s)
+            for each in lost
+        )
+        return _Body(body, now_s if flown else since_s, now_s)
 
     def _remembered(
         self, body: _Body, now_s: float, position: Vector, team: Sequence[Member]
     ) -> bool:
-        """Whether a body that is not sensed now may still be there."""
+        """Whether a body that is not sensed now may still be there: one that was seen to stand."""
         out_of_sight = dist(body.position, position) > SURE_RANGE_M
-        recent = now_s - body.seen_s <= MEMORY_S
+        recent = now_s - body.seen_s <= MEMORY_S and body.seen_s - body.since_s >= SILENCE_S
         return out_of_sight and recent and not self._explained(body.position, team)
 
     def _explained(self, body: Vector, team: Sequence[Member]) -> bool:
@@ -118,6 +137,14 @@ class SilentBodies:
             if dist(body, member.position) < NEIGHBOUR_M + self._max_speed * member.age_s:
                 return True
         return False
+
+
+def _refuted(body: _Body, heard: Sequence[Beacon], tells_of: TellsOf) -> bool:
+    """Whether a neighbour who would see a body tells of none."""
+    return any(
+        dist(witness.position, body.position) <= WITNESS_M and not tells_of(witness, body.position)
+        for witness in heard
+    )
 
 
 def _in_world(position: Vector, sensed: Sequence[Vector]) -> list[Vector]:

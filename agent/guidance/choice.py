@@ -1,4 +1,4 @@
-"""When an agent chooses its place anew, and what it takes for blocked.
+"""When an agent chooses its place anew.
 
 Algorithm 1 runs at 5 Hz; but what an agent knows of its team changes piecemeal when many come or
 go at once, as when a partition begins or ends. A choice made half way moves vehicles for nothing,
@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from math import dist
 
 from agent.controller import Heard, Peer, Senses
+from agent.guidance.blocked import Blocked
 from agent.guidance.target_on_queue import OwnTarget, TargetOnQueue
 from agent.messages import Place
 from agent.setup import AgentSetup
@@ -26,27 +27,30 @@ PATIENCE_S = 1.0
 class Choice:
     """One agent's place, and why it has it.
 
-    cost_m: how far it was from its place when it first claimed it; blocked: the places that it
-    sees taken by a silent body (E18).
+    cost_m: how far it was from its place when it first claimed it.
     """
 
     def __init__(self, setup: AgentSetup) -> None:
         self.cost_m = 0.0
-        self.blocked: tuple[Place, ...] = ()
         self._targets = TargetOnQueue(setup.id, setup.control.spacing_m)
-        self._sees = "proximity" in setup.vehicle.sensors
+        self._blocked = Blocked(self._targets, "proximity" in setup.vehicle.sensors)
         self._mine: OwnTarget | None = None
         self._known: tuple[tuple[int, ...], frozenset[Place]] = ((), frozenset())
         self._listening, self._new_at_s, self._changed_s = True, 0.0, 0.0
         self._chosen_for = -1
         self._again_s = -1.0
 
+    @property
+    def blocked(self) -> tuple[Place, ...]:
+        """The places that it sees taken by a silent body (E18)."""
+        return self._blocked.seen
+
     def made(self, senses: Senses) -> OwnTarget | None:
         """Return the own place; chosen anew at 5 Hz (Algorithm 1), and at once in a new mission."""
         new = senses.mission.key != self._chosen_for
         if senses.now_s >= self._again_s or new:
             team = senses.team()
-            blocked = self._all_blocked(senses, len(team))
+            blocked = self._blocked.now(senses, team)
             if not self._listens(senses.now_s, team, blocked):
                 self._choose(senses, team, blocked, new)
         return self._mine
@@ -62,16 +66,6 @@ class Choice:
         if self._mine is not None and (before != self._mine.place or new):
             self._again_s = max(self._again_s, now_s + _age_s(senses.neighbours))
             self.cost_m = dist(senses.position, mission.frame.to_world(self._mine.slot.point))
-
-    def _all_blocked(self, senses: Senses, agents: int) -> frozenset[Place]:
-        """Return the places that silent bodies take: those one sees, and those one is told of."""
-        mission = senses.mission
-        self.blocked = self._targets.blocked(mission, agents, senses.silent)
-        told = senses.blocked
-        if told and self._sees:
-            here = senses.position
-            told = self._targets.believed(mission, agents, told, here, senses.vehicles)
-        return told.union(self.blocked)
 
     def _listens(self, now_s: float, team: Sequence[Peer], blocked: frozenset[Place]) -> bool:
         """Whether what an agent knows of its team has only just changed.

@@ -5,18 +5,16 @@ claimed is kept (E17): the assignment of :mod:`agent.comms.allocation` gives it 
 beyond noise. A vertex shared by queues has one agent (E16); slots stand by arc length (E13).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import dist, hypot
 from typing import NamedTuple
 
 from agent.comms.allocation import own_place
 from agent.comms.silent import SURE_RANGE_M
 from agent.controller import Flown, Peer
-from agent.messages import Place, Vector
+from agent.messages import MAX_PLACES, Place, Vector
 from agent.qstructure.formation import Layout, Slot
 from agent.qstructure.frame import Frame
-
-MAX_BLOCKED = 8
 
 
 class OwnTarget(NamedTuple):
@@ -55,7 +53,7 @@ class TargetOnQueue:
     def blocked(self, mission: Flown, agents: int, silent: Sequence[Vector]) -> tuple[Place, ...]:
         """Return the places of a team that are within d_ir / 2 of a silent body (E18)."""
         found: set[Place] = set()
-        while silent and len(found) < MAX_BLOCKED:
+        while silent and len(found) < MAX_PLACES:
             layout = mission.formation.layout(agents, frozenset(found))
             points = self._points(layout, mission.frame)
             new = {
@@ -66,7 +64,23 @@ class TargetOnQueue:
             if not new:
                 break
             found |= new
-        return tuple(sorted(found))[:MAX_BLOCKED]
+        return tuple(sorted(found))[:MAX_PLACES]
+
+    def beside(
+        self, mission: Flown, agents: int, places: Iterable[Place], bodies: Sequence[Vector]
+    ) -> list[Place]:
+        """Return which of some places are within d_ir / 2 of a body [m; world frame]."""
+        points = [(place, self.point(mission, agents, place)) for place in places]
+        return [
+            place
+            for place, point in points
+            if point is not None and any(dist(point, body) <= self._blocking_m for body in bodies)
+        ]
+
+    def point(self, mission: Flown, agents: int, place: Place) -> Vector | None:
+        """Return where a place is [m; world frame] in a team of that size; None for no place."""
+        slot = mission.formation.slot(place, agents)
+        return mission.frame.to_world(slot.point) if slot is not None else None
 
     def believed(
         self,
@@ -87,10 +101,10 @@ class TargetOnQueue:
     def _is_empty(
         self, mission: Flown, agents: int, place: Place, here: Vector, near: Sequence[Vector]
     ) -> bool:
-        slot = mission.formation.slot(place, agents)
-        if slot is None:
+        point = self.point(mission, agents, place)
+        if point is None:
             return False
-        x, y, z = mission.frame.to_world(slot.point)
+        x, y, z = point
         away = (x - here[0], y - here[1], z - here[2])
         in_sight = hypot(*away) <= SURE_RANGE_M - self._blocking_m
         return in_sight and all(dist(away, body) > self._blocking_m for body in near)

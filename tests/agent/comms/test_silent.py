@@ -59,3 +59,24 @@ def test_a_body_is_remembered_out_of_sight_but_not_where_it_would_be_seen(away, 
         looked(bodies, now_s)
     assert looked(bodies, 12.2, sensed=(), here=away) == ((BODY,) if remembered else ())
     assert looked(bodies, 12.4 + MEMORY_S, sensed=(), here=away) == ()
+
+
+def test_a_body_that_flies_past_is_not_remembered_where_it_was_seen_last():
+    bodies = SilentBodies(0.5)
+    gone = [Departed((1.0, 0.0, 0.0), 8.0)]
+    assert looked(bodies, 10.0, departed=gone) == (BODY,)
+    for step in range(1, 12):
+        assert looked(bodies, 10.0 + 0.2 * step, sensed=[(1.0, 0.1 * step, 0.0)]) in ((BODY,), ())
+    assert looked(bodies, 12.4, sensed=(), here=(-1.0, 0.0, 0.0)) == ()
+
+
+@pytest.mark.parametrize("tells", [True, False])
+def test_a_neighbour_who_would_see_a_remembered_body_and_tells_of_none_is_believed(tells):
+    bodies = SilentBodies(0.5)
+    for now_s in (10.0, 12.0):
+        looked(bodies, now_s)
+    witness = beacon(5, 1, 12.2, at=(1.0, 1.0, 0.0))
+    remembered = bodies.look(
+        12.2, (3.0, 0.0, 0.0), (), [witness], (FAR_MEMBER,), (), lambda *_: tells
+    )
+    assert remembered == ((BODY,) if tells else ())
