@@ -20,8 +20,8 @@ from agent.controller import Intent, Peer, Senses
 from agent.guidance.guard import STAND, Guard
 from agent.guidance.safety import Told
 from agent.messages import (
-    MAX_PLACES,
     CAUSES,
+    MAX_PLACES,
     Beacon,
     Command,
     Gossip,
