@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from pathlib import Path
 
 from agent.process import run
 
@@ -31,8 +32,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--connect", required=True, metavar="ENDPOINT", help="the router: tcp/127.0.0.1:7447"
     )
+    parser.add_argument(
+        "--credentials", type=Path, metavar="FILE", help="passwords, where the router wants one"
+    )
     options = parser.parse_args(arguments)
-    return run(options.id, options.run, options.connect)
+    return run(options.id, options.run, options.connect, users=options.credentials)
 
 
 if __name__ == "__main__":

@@ -6,14 +6,16 @@ The process reads no clock: what time it is comes with each observation.
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import msgspec
 
 from agent.cockpit import Cockpit, Partner
 from agent.controller import ControllerError
 from agent.setup import AgentSetup
+from netem.wire.access import AccessError, login_of
 from netem.wire.ending import Ending
-from netem.wire.keys import Keys
+from netem.wire.keys import Keys, agent_name
 from netem.wire.post import Post, RefusedError, Ring
 from netem.wire.session import SessionError, open_client
 from netem.wire.stop import Stop
@@ -31,17 +33,19 @@ class GoneError(RuntimeError):
     """The world does not answer, or has said nothing for so long that it must be gone."""
 
 
-def run(agent: int, run_name: str, connect: str, patient: bool = False) -> int:
+def run(
+    agent: int, run_name: str, connect: str, patient: bool = False, users: Path | None = None
+) -> int:
     """Fly one agent, and say in one line what stood in its way; return the exit status."""
     try:
         keys = Keys(run_name)
     except ValueError as error:
         return _said(agent, error, 2)
     try:
-        return fly(agent, keys, connect, patient)
+        return fly(agent, keys, connect, patient, users)
     except (GoneError, LockstepError) as error:
         return _said(agent, error, 1)
-    except (SessionError, RefusedError, ControllerError) as error:
+    except (AccessError, SessionError, RefusedError, ControllerError) as error:
         return _said(agent, error, 2)
 
 
@@ -50,15 +54,19 @@ def _said(agent: int, error: Exception, status: int) -> int:
     return status
 
 
-def fly(agent: int, keys: Keys, connect: str, patient: bool = False) -> int:
+def fly(
+    agent: int, keys: Keys, connect: str, patient: bool = False, users: Path | None = None
+) -> int:
     """Fly one agent of a run until the run is over; return 0.
 
-    patient: whether it may be silent for long and is still there. Raises SessionError without a
-    router, RefusedError when the world has no such agent, ControllerError when its controller
+    patient: whether it may be silent for long and is still there. users: the file of passwords,
+    where the router wants one. Raises SessionError without a router, AccessError without a
+    password, RefusedError when the world has no such agent, ControllerError when its controller
     cannot be had, GoneError when the world is not there, LockstepError when somebody speaks out
     of turn.
     """
-    with open_client(connect, patient=patient) as session:
+    login = login_of(users, agent_name(agent)) if users is not None else None
+    with open_client(connect, patient=patient, login=login) as session:
         stop = Stop()
         post = Post(session, keys)
         setup = _setup(post, agent, keys.run, stop)

@@ -13,6 +13,7 @@ from zenoh.handlers import RingChannel
 from netem.lockstep import Turns
 from netem.messages import MAX_CONDITIONS_B, MediumSetup
 from netem.radio import Radio
+from netem.wire.access import AccessError, Guard
 from netem.wire.ending import Ending
 from netem.wire.keys import Keys, medium_name
 from netem.wire.post import Post, Ring, Waiting, drained, receive
@@ -77,24 +78,24 @@ class Desk:
         return None
 
 
-def run(endpoint: str, shard: int = 0, patient: bool = False) -> int:
+def run(endpoint: str, shard: int = 0, patient: bool = False, guard: Guard | None = None) -> int:
     """Serve at an endpoint, and say in one line what stood in its way; return the exit status."""
     try:
-        return serve(endpoint, shard, patient)
-    except (SessionError, SilenceError, LockstepError) as error:
+        return serve(endpoint, shard, patient, guard)
+    except (AccessError, SessionError, SilenceError, LockstepError) as error:
         print(f"{medium_name(shard)}: {error}", file=sys.stderr)
-        return 2 if isinstance(error, SessionError) else 1
+        return 2 if isinstance(error, AccessError | SessionError) else 1
 
 
-def serve(endpoint: str, shard: int = 0, patient: bool = False) -> int:
+def serve(endpoint: str, shard: int = 0, patient: bool = False, guard: Guard | None = None) -> int:
     """Be the medium of the first run that asks; return 0 at its end.
 
     Shard 0 is the router at the endpoint, too; the others connect to it. patient: whether who is
-    silent for long is still there. Raises SessionError when it cannot listen or connect there,
-    SilenceError when the world is gone, LockstepError when somebody speaks out of turn.
+    silent for long is still there. guard: who may do what. Raises SessionError when it cannot
+    listen or connect there, AccessError when it has no password, SilenceError when the world is
+    gone, LockstepError when somebody speaks out of turn.
     """
-    opening = open_client(endpoint, patient=patient) if shard else open_router(endpoint, patient)
-    with opening as session:
+    with _opened(endpoint, shard, patient, guard) as session:
         stop = Stop()
         at = "is connected to" if shard else "listens at"
         print(f"{medium_name(shard)} {at} {endpoint}, for one run", flush=True)
@@ -104,6 +105,13 @@ def serve(endpoint: str, shard: int = 0, patient: bool = False) -> int:
         if desk.run is not None and desk.setup is not None:
             _serve_run(Post(session, Keys(desk.run)), desk, desk.setup, stop)
     return 0
+
+
+def _opened(endpoint: str, shard: int, patient: bool, guard: Guard | None) -> zenoh.Session:
+    if not shard:
+        return open_router(endpoint, patient, guard)
+    login = guard.login(medium_name(shard)) if guard is not None else None
+    return open_client(endpoint, patient=patient, login=login)
 
 
 def _serve_run(post: Post, desk: Desk, setup: MediumSetup, stop: Stop) -> None:

@@ -43,9 +43,18 @@ TOPICS = {
 }
 
 
+EVERY_KEY = "qswarm/**"
+"""Matches all keys of all runs; a medium asks for questions of whichever run."""
+
+
 def medium_name(shard: int) -> str:
     """Return the name of one of several mediums; the first is the router."""
     return f"netem-{shard}" if shard else "netem"
+
+
+def agent_name(agent: int) -> str:
+    """Return the name of an agent's process."""
+    return f"agent-{agent}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,8 @@ from typing import Any
 
 import zenoh
 
+from netem.wire.access import Guard, Login
+
 OPEN_TIMEOUT_S = 8.0
 MAX_MESSAGE_B = 4 * 1024 * 1024
 PATIENT_LEASE_S = 24 * 3600
@@ -23,40 +25,51 @@ class SessionError(RuntimeError):
     """A session that could not be opened; the text says it in one line."""
 
 
-def open_router(listen: str, patient: bool = False) -> zenoh.Session:
+def open_router(listen: str, patient: bool = False, guard: Guard | None = None) -> zenoh.Session:
     """Open this host's router at ``listen``, for example ``tcp/127.0.0.1:7447``.
 
-    patient: whether who is silent for long is still there. Raises :class:`SessionError` when the
-    endpoint is malformed, not loopback or in use.
+    patient: whether who is silent for long is still there. guard: who may do what; without one,
+    everybody everything. Raises :class:`SessionError` when the endpoint is malformed, not loopback
+    or in use.
     """
     _refuse_all_but_loopback(listen)
     try:
-        return zenoh.open(router_config(listen, patient))
+        return zenoh.open(router_config(listen, patient, guard))
     except zenoh.ZError as error:
         raise SessionError(f"{listen}: {_cause(error)}") from error
 
 
 def open_client(
-    connect: str, timeout_s: float = OPEN_TIMEOUT_S, patient: bool = False
+    connect: str,
+    timeout_s: float = OPEN_TIMEOUT_S,
+    patient: bool = False,
+    login: Login | None = None,
 ) -> zenoh.Session:
     """Open a client of the router at ``connect``; later the client reconnects by itself.
 
-    patient: whether it may be silent for long and is still there. Raises :class:`SessionError`
-    when no router answers within ``timeout_s`` [s].
+    patient: whether it may be silent for long and is still there. login: its name to a router with
+    a guard. Raises :class:`SessionError` when no router answers within ``timeout_s`` [s].
     """
     _address(connect)
     try:
-        return zenoh.open(client_config(connect, timeout_s, patient))
+        return zenoh.open(client_config(connect, timeout_s, patient, login))
     except zenoh.ZError as error:
         raise SessionError(f"no router answers at {connect} within {timeout_s:g} s") from error
 
 
-def router_config(listen: str, patient: bool = False) -> zenoh.Config:
+def router_config(listen: str, patient: bool = False, guard: Guard | None = None) -> zenoh.Config:
     """Return the configuration of a router that listens at one endpoint."""
-    return _config({"mode": "router", "listen": {"endpoints": [listen]}}, patient)
+    router: dict[str, Any] = {"mode": "router", "listen": {"endpoints": [listen]}}
+    if guard is None:
+        return _config(router, patient, {})
+    # A router must have a name, too, though it calls nobody.
+    known = {"user": "router", "password": "", "dictionary_file": str(guard.users)}
+    return _config(router | {"access_control": guard.config()}, patient, known)
 
 
-def client_config(connect: str, timeout_s: float, patient: bool = False) -> zenoh.Config:
+def client_config(
+    connect: str, timeout_s: float, patient: bool = False, login: Login | None = None
+) -> zenoh.Config:
     """Return the configuration of a client that listens nowhere."""
     retry = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2}
     return _config(
@@ -71,10 +84,11 @@ def client_config(connect: str, timeout_s: float, patient: bool = False) -> zeno
             },
         },
         patient,
+        login._asdict() if login is not None else {},
     )
 
 
-def _config(own: dict[str, Any], patient: bool) -> zenoh.Config:
+def _config(own: dict[str, Any], patient: bool, known: dict[str, str]) -> zenoh.Config:
     sending = {"tx": {"lease": PATIENT_LEASE_S * 1000}} if patient else {}
     common = {
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
@@ -82,6 +96,7 @@ def _config(own: dict[str, Any], patient: bool) -> zenoh.Config:
         "transport": {
             "link": {"rx": {"max_message_size": MAX_MESSAGE_B}, **sending},
             "shared_memory": {"enabled": False},
+            **({"auth": {"usrpwd": known}} if known else {}),
         },
     }
     return zenoh.Config.from_json5(json.dumps(common | own))

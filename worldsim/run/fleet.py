@@ -15,7 +15,8 @@ from typing import Any
 from rich.console import Console
 
 from netem import process as netem_process
-from netem.wire.keys import medium_name
+from netem.wire.access import Guard, write_users
+from netem.wire.keys import agent_name, medium_name
 from worldsim.run import process as world_process
 from worldsim.run.child import Exit
 from worldsim.run.kin import Kin
@@ -53,7 +54,7 @@ def run(scenario: Scenario, directory: RunDirectory, terms: Terms) -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     # One thread for receiving is enough for a client, and saves a tenth of its CPU time.
     os.environ.setdefault("ZENOH_RUNTIME", "(rx: (worker_threads: 1))")
-    launch = Launch(scenario, directory, terms)
+    launch = Launch(scenario, directory, terms._replace(users=directory.users))
     try:
         launch.fly()
         status = launch.conclude()
@@ -80,6 +81,7 @@ class Launch:
         self._directory = directory
         self._terms = terms
         self._endpoint = f"tcp/127.0.0.1:{_free_port()}"
+        self._guard = Guard(directory.users, terms.run, scenario.rows)
         self._roster = Roster(directory.path, terms.run, self._endpoint)
         self._kin = Kin(directory.logs, self._child_ended)
         self._zygote, self._zygote_end = Lines.pair()
@@ -135,6 +137,7 @@ class Launch:
         self._kin.end(["zygote"], END_WITHIN_S, None)
         everybody = list(self._kin.pids)
         self._kin.end(everybody, END_WITHIN_S, signal.SIGKILL)
+        self._directory.users.unlink(missing_ok=True)
 
     def _end_world(self) -> None:
         self._landing = True
@@ -142,6 +145,7 @@ class Launch:
 
     def _start(self) -> None:
         agents = range(self._scenario.fleet.agents)
+        write_users(self._directory.users, self._users())
         zygote = self._kin.start("zygote", signal.SIGKILL, self._be_zygote)
         self._zygote_end.close()
         mediums = {
@@ -159,17 +163,23 @@ class Launch:
         self._kin.listen(self._world, self._hear_world)
         self._zygote.send(do="start", whom=[(agent, 0) for agent in agents], after_s=0.0)
 
+    def _users(self) -> list[str]:
+        mediums = [medium_name(shard) for shard in range(self._terms.shards)]
+        agents = [agent_name(agent) for agent in range(self._scenario.rows)]
+        return ["world", "operator", *mediums, *agents]
+
     def _be_zygote(self) -> int:
         for end in (self._zygote, self._world, self._world_end):
             end.close()
         terms = self._terms
-        brood = Brood(terms.run, self._endpoint, self._directory.logs, terms.lockstep)
+        logs, users = self._directory.logs, self._directory.users
+        brood = Brood(terms.run, self._endpoint, logs, terms.lockstep, users)
         return Zygote(self._zygote_end, brood).serve()
 
     def _be_netem(self, shard: int) -> int:
         for end in (self._zygote, self._world, self._world_end):
             end.close()
-        return netem_process.run(self._endpoint, shard, self._terms.lockstep)
+        return netem_process.run(self._endpoint, shard, self._terms.lockstep, self._guard)
 
     def _be_world(self) -> int:
         for end in (self._zygote, self._world):

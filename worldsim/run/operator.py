@@ -4,11 +4,13 @@ from pathlib import Path
 
 import msgspec
 
+from netem.wire.access import AccessError, Login, login_of
 from netem.wire.keys import Keys
 from netem.wire.post import Post, RefusedError
 from netem.wire.session import SessionError, open_client
 from worldsim.run.control import Answer, Request
 from worldsim.run.roster import OperatorError, fleet_of
+from worldsim.run.rundir import USERS
 
 OPEN_WITHIN_S = 3.0
 ANSWER_WITHIN_S = 10.0
@@ -23,13 +25,19 @@ def ask(run: Path, request: Request) -> Answer:
     if not any(row.alive for row in fleet.processes if row.name == "world"):
         raise OperatorError(f"{run}: its fleet flies no more")
     try:
-        with open_client(fleet.endpoint, OPEN_WITHIN_S) as session:
+        with open_client(fleet.endpoint, OPEN_WITHIN_S, login=_login(run)) as session:
             post = Post(session, Keys(fleet.run))
             told = post.ask("control", None, msgspec.json.encode(request), ANSWER_WITHIN_S)
-    except SessionError as error:
+    except (AccessError, SessionError) as error:
         raise OperatorError(f"{run}: {error}") from error
     except RefusedError as refusal:
         raise OperatorError(f"{run}: refused: {refusal}") from refusal
     if told is None:
         raise OperatorError(f"{run}: its world does not answer; it has not taken off, or landed")
     return msgspec.json.decode(told, type=Answer)
+
+
+def _login(run: Path) -> Login | None:
+    """Return the operator's login; None for a fleet that was started by hand, without a guard."""
+    users = run / USERS
+    return login_of(users, "operator") if users.exists() else None

@@ -2,11 +2,13 @@
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import zenoh
 
 from netem.messages import Verdicts
+from netem.wire.access import AccessError, login_of
 from netem.wire.keys import Keys
 from netem.wire.post import Post
 from netem.wire.session import SessionError, open_client
@@ -26,7 +28,8 @@ TOO_LATE_FRACTION = 0.01
 class Terms(NamedTuple):
     """How a run is flown: its name, how much faster than the wall clock, recorded or not.
 
-    lockstep: in turns, at whatever speed that takes; shards: by how many mediums.
+    lockstep: in turns, at whatever speed that takes; shards: by how many mediums; users: the file
+    of passwords, where the router wants one.
     """
 
     run: str
@@ -34,6 +37,7 @@ class Terms(NamedTuple):
     recording: bool = True
     lockstep: bool = False
     shards: int = 1
+    users: Path | None = None
 
     @property
     def mode(self) -> str:
@@ -53,9 +57,10 @@ def run(
     ``directory`` is asked for once the router answers: without one, nothing is made.
     """
     try:
-        with open_client(connect, patient=terms.lockstep) as session:
+        login = login_of(terms.users, "world") if terms.users is not None else None
+        with open_client(connect, patient=terms.lockstep, login=login) as session:
             return conduct(session, scenario, directory(), terms, outside_of)
-    except (SessionError, MusterError, RunDirectoryError) as error:
+    except (AccessError, SessionError, MusterError, RunDirectoryError) as error:
         print(f"world: {error}", file=sys.stderr)
         return 1 if isinstance(error, RunWriteError) else 2
 

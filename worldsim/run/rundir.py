@@ -10,6 +10,7 @@ from worldsim.scenario.file import dump
 from worldsim.scenario.tables import Scenario
 
 RUNS = Path("runs")
+USERS = "users"
 
 
 class RunDirectoryError(Exception):
@@ -64,6 +65,11 @@ class RunDirectory:
             if not self._events_lost:
                 print(f"{self._events}: {_reason(error)}; events are lost", file=sys.stderr)
             self._events_lost = True
+
+    @property
+    def users(self) -> Path:
+        """The passwords of a run's processes, while it lasts."""
+        return self.path / USERS
 
     def nothing_flew(self) -> None:
         """Take away what looks like a flight; scenario and logs stay, and tell why there is none.

@@ -25,12 +25,16 @@ ARRIVED = {signal.SIGSTOP: os.WSTOPPED, signal.SIGCONT: os.WCONTINUED}
 
 
 class Brood(NamedTuple):
-    """What all agents of a run have in common; patient: who is silent for long is still there."""
+    """What all agents of a run have in common.
+
+    patient: who is silent for long is still there. users: the file of passwords.
+    """
 
     run: str
     endpoint: str
     logs: Path
     patient: bool = False
+    users: Path | None = None
 
 
 class Zygote:
@@ -103,7 +107,7 @@ class Zygote:
         self._lines.close()
         time.sleep(after_s)
         brood = self._brood
-        return agent_process.run(agent, brood.run, brood.endpoint, brood.patient)
+        return agent_process.run(agent, brood.run, brood.endpoint, brood.patient, brood.users)
 
     def _bury(self, exit_descriptor: int, pid: int) -> None:
         end = reaped(pid)

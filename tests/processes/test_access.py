@@ -1,0 +1,113 @@
+"""Who may hear and say what: a router with a guard, and outsiders who try."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from netem.wire.access import AccessError, Guard, login_of, write_users
+from netem.wire.keys import Keys
+from netem.wire.post import Post, Ring
+from netem.wire.session import SessionError, open_client, open_router
+from tests.processes.harness import QSWARM, Started, eventually
+
+pytestmark = pytest.mark.processes
+
+USERS = ("world", "operator", "agent-0", "agent-1")
+KEYS = Keys("mine")
+
+
+@pytest.fixture
+def guard(tmp_path: Path) -> Guard:
+    write_users(tmp_path / "users", USERS)
+    return Guard(tmp_path / "users", "mine", 2)
+
+
+@pytest.fixture
+def session_of(guard: Guard, endpoint: str) -> Iterator[Callable[[str], zenoh.Session]]:
+    opened = [open_router(endpoint, guard=guard)]
+
+    def of(user: str) -> zenoh.Session:
+        opened.append(open_client(endpoint, login=guard.login(user)))
+        return opened[-1]
+
+    yield of
+    for session in reversed(opened):
+        session.close()
+
+
+def test_the_file_of_passwords_is_its_owners_alone(guard: Guard) -> None:
+    assert guard.users.stat().st_mode & 0o777 == 0o600
+    assert len({guard.login(user).password for user in USERS}) == len(USERS)
+    with pytest.raises(AccessError, match="no password of agent-7"):
+        login_of(guard.users, "agent-7")
+    with pytest.raises(AccessError, match="cannot be read"):
+        login_of(guard.users.with_name("none"), "world")
+
+
+def test_without_a_password_nobody_comes_in(
+    session_of: Callable[[str], zenoh.Session], guard: Guard, endpoint: str
+) -> None:
+    for login in (None, guard.login("agent-0")._replace(password="guess")):
+        with pytest.raises(SessionError, match="no router answers"):
+            open_client(endpoint, 0.5, login=login)
+
+
+def test_an_agent_hears_its_own_radio_and_nothing_else(
+    session_of: Callable[[str], zenoh.Session],
+) -> None:
+    world, spy = Post(session_of("world"), KEYS), session_of("agent-0")
+    own = Ring(spy, KEYS.of("rx", 0), 4)
+    others = [Ring(spy, key, 64) for key in (KEYS.of("rx", 1), KEYS.every("rx"), "qswarm/**")]
+    puts = [world.putter(topic, agent, lockstep=True) for topic in ("rx",) for agent in (0, 1)]
+    puts += [world.putter("truth"), world.putter("observation", 1), world.putter("tx", 1)]
+    eventually(lambda: puts_reach(own, puts[0]), 5.0)
+    for put in puts:
+        put(b"secret")
+    puts[0](b"last")
+    heard: list[bytes] = []
+    eventually(lambda: heard.extend(own.drain(64)) or b"last" in heard, 5.0)
+    # What the own radio has is all that anybody wider hears, too.
+    assert others[0].drain(64) == []
+    assert {bytes(each) for ring in others[1:] for each in ring.drain(64)} <= {
+        b"probe",
+        b"secret",
+        b"last",
+    }
+    assert sum(each == b"secret" for each in heard) == 1
+
+
+def puts_reach(ring: Ring, put: Callable[[bytes], None]) -> bool:
+    put(b"probe")
+    return bool(ring.drain(64))
+
+
+def test_an_agent_says_nothing_in_anybody_elses_name(
+    session_of: Callable[[str], zenoh.Session],
+) -> None:
+    listener, agent = session_of("world"), Post(session_of("agent-0"), KEYS)
+    own = Ring(listener, KEYS.of("command", 0), 64)
+    forbidden = [
+        Ring(listener, key, 64)
+        for key in (KEYS.of("command", 1), KEYS.of("tx", 1), KEYS.of("over"), KEYS.of("truth"))
+    ]
+    puts = [agent.putter("command", 1), agent.putter("tx", 1)]
+    puts += [agent.putter("over"), agent.putter("truth")]
+    mine = agent.putter("command", 0)
+    eventually(lambda: puts_reach(own, mine), 5.0)
+    for put in puts:
+        put(b"forged")
+    eventually(lambda: puts_reach(own, mine), 5.0)
+    assert [ring.drain(64) for ring in forbidden] == [[]] * 4
+
+
+def test_a_fleets_passwords_last_as_long_as_it_does(
+    start: Callable[..., Started], scenario: Callable[[float], str], tmp_path: Path
+) -> None:
+    run = tmp_path / "run"
+    fleet = start(*QSWARM, "run", scenario(3.0), "--no-recording", "--out", str(run))
+    fleet.says("in place")
+    assert (run / "users").exists()
+    assert fleet.status(15.0) in (0, 1)
+    assert not (run / "users").exists()
