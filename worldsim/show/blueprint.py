@@ -51,6 +51,7 @@ def blueprint_of(stage: Stage, obstacles: bool = False) -> rrb.Blueprint:
         _series("Oldest record kept of a member [s]", layout.RECORD_AGE),
         _series("Neighbours heard directly", layout.NEIGHBOURS),
         rrb.StateTimelineView(origin=layout.ROLES, name="Role"),
+        row_shares=[1, 1, 1, 1, 2],
         name="Team",
     )
     main = rrb.Vertical(

@@ -149,7 +149,8 @@ class RunRecorder:
     def _flush(self) -> None:
         if self._ticks:
             self._team = int(np.count_nonzero(self._ticks[-1].alive))
-            for sheet in self._sheets_of(self._ticks, self._figures):
+            # All are made before any is sent: rows that do not fit leave no half a second behind.
+            for sheet in tuple(self._sheets_of(self._ticks, self._figures)):
                 self._send(sheet)
         if not self._track.rests:
             self._move_slots()
