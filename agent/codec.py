@@ -127,5 +127,5 @@ def _typed(data: bytes, decode_typed: Callable[[bytes], _T], max_bytes: int) -> 
         return decode_typed(data)
     except msgspec.ValidationError as error:
         raise RejectedError("invalid", str(error)) from error
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise RejectedError("garbage", str(error)) from error

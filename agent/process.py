@@ -95,7 +95,7 @@ def _checked(answer: bytes) -> AgentSetup:
         raise GoneError(f"the world sent a setup of {len(answer)} B; {MAX_SETUP_B} B are allowed")
     try:
         return msgspec.json.decode(answer, type=AgentSetup)
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise GoneError(f"the world sent a setup that cannot be read: {error}") from error
 
 

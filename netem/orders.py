@@ -20,7 +20,7 @@ class OrderBook:
             raise WireError(f"oversize: {len(data)} B where {MAX_ORDERS_B} B are allowed")
         try:
             self._waiting.append(msgspec.json.decode(data, type=Orders))
-        except msgspec.DecodeError as error:
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
             raise WireError(f"malformed Orders: {error}") from error
 
     def due(self, slot: int) -> list[RadioOrder]:

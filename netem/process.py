@@ -71,7 +71,7 @@ class Desk:
             return f"{len(payload)} B of conditions where {MAX_CONDITIONS_B} B are allowed"
         try:
             setup = msgspec.json.decode(payload, type=MediumSetup)
-        except msgspec.DecodeError as error:
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
             return f"conditions: {error}"
         if self.run is None:
             self.run, self.setup = run, setup

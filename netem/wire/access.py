@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from netem.wire.keys import EVERY_KEY, Keys, agent_name
 
+OPERATOR = "operator"
 OWN = ("observation", "rx", "tx", "command", "setup")
 """Topics of which each agent has its own."""
 ALL = [
@@ -48,12 +49,14 @@ class Guard(NamedTuple):
         """Return Zenoh's access control: what is not allowed is denied."""
         keys = Keys(self.run)
         agents = [agent_name(agent) for agent in range(self.agents)]
-        others = [user for user in _passwords(self.users) if user not in agents]
+        asking = [user for user in _passwords(self.users) if user == OPERATOR]
+        others = [user for user in _passwords(self.users) if user not in (*agents, OPERATOR)]
         over = [keys.of("over")]
         rules = [
             _rule("hear over", over, ["put"]) | {"flows": ["egress"]},
             _rule("listen to over", over, ["declare_subscriber"]) | {"flows": ["ingress"]},
             _rule("everything", [EVERY_KEY], ALL),
+            _rule("ask", [keys.of("control")], ["query", "reply"]),
         ]
         rules += [_rule(name, _own(keys, agent), ALL) for agent, name in enumerate(agents)]
         policies = [{"rules": ["everything"], "subjects": others}] if others else []
@@ -64,7 +67,7 @@ class Guard(NamedTuple):
             "enabled": True,
             "default_permission": "deny",
             "rules": rules,
-            "subjects": [{"id": user, "usernames": [user]} for user in (*agents, *others)],
+            "subjects": [{"id": user, "usernames": [user]} for user in (*agents, *asking, *others)],
             "policies": policies,
         }
 

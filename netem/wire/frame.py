@@ -143,5 +143,5 @@ def unpack_typed(data: bytes, decode: Callable[[bytes], _T], max_bytes: int) -> 
         raise WireError(f"oversize: {len(data)} B where {max_bytes} B are allowed")
     try:
         return decode(data)
-    except msgspec.MsgspecError as error:
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
         raise WireError(f"malformed: {error}") from error

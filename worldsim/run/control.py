@@ -133,7 +133,7 @@ def _request(asked: bytes) -> Request:
         raise RequestError(f"{len(asked)} B; a request has {MAX_REQUEST_B} B at most")
     try:
         return msgspec.json.decode(asked, type=Request)
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise RequestError(f"a request that cannot be read: {error}") from error
 
 

@@ -15,7 +15,7 @@ from typing import Any
 from rich.console import Console
 
 from netem import process as netem_process
-from netem.wire.access import Guard, write_users
+from netem.wire.access import OPERATOR, Guard, write_users
 from netem.wire.keys import agent_name, medium_name
 from worldsim.run import process as world_process
 from worldsim.run.child import Exit
@@ -166,7 +166,7 @@ class Launch:
     def _users(self) -> list[str]:
         mediums = [medium_name(shard) for shard in range(self._terms.shards)]
         agents = [agent_name(agent) for agent in range(self._scenario.rows)]
-        return ["world", "operator", *mediums, *agents]
+        return ["world", OPERATOR, *mediums, *agents]
 
     def _be_zygote(self) -> int:
         for end in (self._zygote, self._world, self._world_end):

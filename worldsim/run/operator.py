@@ -4,7 +4,7 @@ from pathlib import Path
 
 import msgspec
 
-from netem.wire.access import AccessError, Login, login_of
+from netem.wire.access import OPERATOR, AccessError, Login, login_of
 from netem.wire.keys import Keys
 from netem.wire.post import Post, RefusedError
 from netem.wire.session import SessionError, open_client
@@ -40,4 +40,4 @@ def ask(run: Path, request: Request) -> Answer:
 def _login(run: Path) -> Login | None:
     """Return the operator's login; None for a fleet that was started by hand, without a guard."""
     users = run / USERS
-    return login_of(users, "operator") if users.exists() else None
+    return login_of(users, OPERATOR) if users.exists() else None
