@@ -52,6 +52,7 @@ class Trust:
         self._read_at: Vector | None = None
         self._stuck = False
         self._missed = self._met = 0
+        self._missed_s: dict[int, float] = {}
         self._blind = False
 
     def note(self, observation: Observation) -> bool:
@@ -64,17 +65,17 @@ class Trust:
         """Look whether neighbours near by are sensed where they say they are."""
         if not self._ranging:
             return
-        met = False
-        for beacon in neighbours:
-            missed = self._is_missed(observation, beacon)
-            if missed:
-                self._missed, self._met = self._missed + 1, 0
-                self._blind = self._blind or self._missed >= LOOKS
-                return
-            met = met or missed is False
-        if met:
+        looks = [(beacon, self._is_missed(observation, beacon)) for beacon in neighbours]
+        missed = {beacon.id: beacon.stamp_s for beacon, missed in looks if missed}
+        if missed:
+            # Whoever left is missed too, but says so only once: what it said last stays the last.
+            spoken = any(self._missed_s.get(who) != stamp_s for who, stamp_s in missed.items())
+            self._missed, self._met = self._missed + spoken, 0
+            self._blind = self._blind or self._missed >= LOOKS
+        elif any(missed is False for _, missed in looks):
             self._missed, self._met = 0, self._met + 1
             self._blind = self._blind and self._met < LOOKS
+        self._missed_s = missed
 
     def _note_change(self, observation: Observation) -> None:
         if self._due_s and not observation.scans:

@@ -102,3 +102,11 @@ def test_scans_that_leap_time_after_time_are_wrong_and_quiet_ones_are_right_agai
     calm = [Scan(0, array("H", [1000 + 10 * k] * 61).tobytes()) for k in range(5)]
     believed = [watch.note(seen(16 + 2 * k, 0.8, scans=(scan,))) for k, scan in enumerate(calm)]
     assert believed == [False] * 3 + [True] * 2
+
+
+def test_a_neighbour_that_leaves_is_missed_once_and_no_proof_of_a_blind_sensor():
+    watch = trust()
+    gone = beacon(1, 7, 1.0, at=(1.0, 0.0, 0.0))
+    for tick in range(20, 40, 2):
+        watch.compare(seen(tick), [gone])
+        assert watch.note(seen(tick))
