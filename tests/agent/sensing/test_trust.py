@@ -62,8 +62,8 @@ def test_scans_that_do_not_come_are_missed():
 @pytest.mark.parametrize(("bodies", "believed"), [((), False), (((1.0, 0.1, 0.0),), True)])
 def test_a_neighbour_near_by_must_be_sensed(bodies, believed):
     watch = trust()
-    there = beacon(1, 1, stamp_s=0.0, at=(1.0, 0.0, 0.0))
-    for _ in range(LOOKS):
+    for look in range(LOOKS):
+        there = beacon(1, look, stamp_s=0.01 * look, at=(1.0, 0.0, 0.0))
         watch.compare(seen(0, vehicles=bodies), [there])
     assert watch.note(seen(0, vehicles=bodies)) is believed
 
@@ -82,8 +82,9 @@ def test_old_word_and_far_neighbours_prove_nothing():
 def test_who_was_blind_believes_again_once_it_sees_a_neighbour_not_once_they_have_gone():
     watch, body = trust(), ((1.0, 0.0, 0.0),)
     there, gone = (beacon(1, 1, stamp_s=0.0, at=(x, 0.0, 0.0)) for x in (1.0, 5.0))
-    for _ in range(LOOKS):
-        watch.compare(seen(0), [there])
+    for look in range(LOOKS):
+        speaking = beacon(1, look, stamp_s=0.01 * look, at=(1.0, 0.0, 0.0))
+        watch.compare(seen(0), [speaking])
     for _ in range(2 * LOOKS):
         watch.compare(seen(0), [gone])
         assert not watch.note(seen(0))
