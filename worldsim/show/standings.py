@@ -17,7 +17,7 @@ from worldsim.show import layout, palette
 from worldsim.show.sheet import Latest, Sheet, Thinned
 
 SAMPLES_HZ = 4.0
-LINES_PER_S = 1000
+LINES_PER_S = 500
 """More lines than these in a second are drawn less often."""
 ABSENT = "absent"
 
