@@ -56,10 +56,13 @@ class Guard(NamedTuple):
             _rule("hear over", over, ["put"]) | {"flows": ["egress"]},
             _rule("listen to over", over, ["declare_subscriber"]) | {"flows": ["ingress"]},
             _rule("everything", [EVERY_KEY], ALL),
-            _rule("ask", [keys.of("control")], ["query", "reply"]),
+            _rule("ask", [keys.of("control")], ["query"]) | {"flows": ["ingress"]},
+            _rule("answer", [keys.of("control")], ["reply", "declare_queryable"])
+            | {"flows": ["egress"]},
         ]
         rules += [_rule(name, _own(keys, agent), ALL) for agent, name in enumerate(agents)]
         policies = [{"rules": ["everything"], "subjects": others}] if others else []
+        policies += [{"rules": ["ask", "answer"], "subjects": [user]} for user in asking]
         policies += [
             {"rules": ["hear over", "listen to over", name], "subjects": [name]} for name in agents
         ]

@@ -8,7 +8,7 @@ import zenoh
 
 from netem.wire.access import AccessError, Guard, login_of, write_users
 from netem.wire.keys import Keys
-from netem.wire.post import Post, Ring
+from netem.wire.post import Post, Ring, receive
 from netem.wire.session import SessionError, open_client, open_router
 from tests.processes.harness import QSWARM, Started, eventually
 
@@ -100,6 +100,26 @@ def test_an_agent_says_nothing_in_anybody_elses_name(
         put(b"forged")
     eventually(lambda: puts_reach(own, mine), 5.0)
     assert [ring.drain(64) for ring in forbidden] == [[]] * 4
+
+
+def test_an_operator_asks_and_does_no_more(session_of: Callable[[str], zenoh.Session]) -> None:
+    world, operator = session_of("world"), session_of("operator")
+    questions = Post(world, KEYS).questions("control")
+    over = Ring(world, KEYS.of("over"), 4)
+    asking = Post(operator, KEYS)
+    asking.putter("over")(b"forged")
+
+    def answered() -> bool:
+        replies = operator.get(KEYS.of("control"), payload=b"how is it?", timeout=2.0)
+        query = receive(questions, 1.0)
+        if query is None:
+            return False
+        with query:
+            query.reply(query.key_expr, b"well")
+        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok] == [b"well"]
+
+    eventually(answered, 10.0)
+    assert over.drain(4) == []
 
 
 def test_a_fleets_passwords_last_as_long_as_it_does(
