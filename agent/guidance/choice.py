@@ -15,6 +15,9 @@ from agent.messages import Place
 from agent.setup import AgentSetup
 
 CHOICE_HZ = 5.0
+CALM_S = 4.0
+LONGEST_S = 3.0
+"""Who keeps its place for ``CALM_S`` starts anew; nobody is held to one for longer than this."""
 LISTEN_S = 0.4
 """What is known of the team is acted on once it has not changed for so long."""
 ALONE_S = 1.5
@@ -39,6 +42,7 @@ class Choice:
         self._listening, self._new_at_s, self._changed_s = True, 0.0, 0.0
         self._chosen_for = -1
         self._again_s = -1.0
+        self._changes, self._moved_s = 0, 0.0
 
     @property
     def blocked(self) -> tuple[Place, ...]:
@@ -64,8 +68,18 @@ class Choice:
         before = self._mine.place if self._mine is not None else None
         self._mine = self._targets.choose(mission, team, blocked)
         if self._mine is not None and (before != self._mine.place or new):
-            self._again_s = max(self._again_s, now_s + _age_s(senses.neighbours))
+            self._again_s = now_s + self._held_s(now_s, _age_s(senses.neighbours))
             self.cost_m = dist(senses.position, mission.frame.to_world(self._mine.slot.point))
+
+    def _held_s(self, now_s: float, age_s: float) -> float:
+        """Return for how long a place just taken is kept whatever one hears [s].
+
+        No answer to a claim comes sooner than word takes there and back; and whoever changes its
+        place time after time, since what it knows comes late, does so ever more rarely.
+        """
+        in_a_row = self._changes if now_s - self._moved_s < CALM_S else 0
+        self._changes, self._moved_s = in_a_row + 1, now_s
+        return max(1.0 / CHOICE_HZ, 2.0 * age_s, min(LONGEST_S, 2.0**in_a_row / CHOICE_HZ)) - 1e-9
 
     def _listens(self, now_s: float, team: Sequence[Peer], blocked: frozenset[Place]) -> bool:
         """Whether what an agent knows of its team has only just changed.

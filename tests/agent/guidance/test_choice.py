@@ -112,3 +112,13 @@ def test_a_place_that_others_call_blocked_is_free_where_one_sees_that_nobody_is_
             made = mind.made(senses(now_s + tick * TICK_S, team, vehicles=vehicles, blocked=[APEX]))
         assert made.place == held, "one stands there oneself: nobody else does"
         now_s += 1.0
+
+
+def test_who_changes_its_place_time_after_time_does_so_ever_more_rarely():
+    team = [peer(who) for who in range(6)]
+    mind, now_s = settled(team)
+    mind._moved_s = -10.0
+    held = [mind._held_s(now_s + 0.1 * row, 0.05) for row in range(6)]
+    assert held == pytest.approx([0.2, 0.4, 0.8, 1.6, 3.0, 3.0], abs=1e-6)
+    assert mind._held_s(now_s + 10.0, 0.05) == pytest.approx(0.2, abs=1e-6), "calm since"
+    assert mind._held_s(now_s + 20.0, 0.7) == pytest.approx(1.4, abs=1e-6), "word there and back"
