@@ -53,12 +53,19 @@ class Intake:
         self.rejected: Counter[str] = Counter()
         self._slots_per_tick = setup.slots_per_tick
         self._last: list[tuple[int, int]] = [(-1, -1)] * setup.agents
+        self._early: dict[int, Transmission] = {}
+
+    def due(self, sender: int, slot: int) -> Transmission | None:
+        """Return what came before its slot was played, once it is."""
+        early = self._early.get(sender)
+        return self._early.pop(sender) if early is not None and early.slot <= slot else None
 
     def take(self, sender: int, data: bytes, slot: int) -> Transmission | None:
         """Return a sender's message as it arrived by ``slot``, or None where it is refused.
 
         A process that was stopped for a while answers old observations when it goes on; a copy of
-        an earlier message may come at any time. Neither reaches the air.
+        an earlier message may come at any time. Neither reaches the air. An agent that is quicker
+        than the truth on its way here waits for it: see ``due``.
         """
         try:
             transmission = unpack_transmission(data)
@@ -70,10 +77,13 @@ class Intake:
             self.rejected[cause] += 1
             return None
         self._last[sender] = (transmission.incarnation, transmission.slot)
+        if transmission.slot > slot:
+            self._early[sender] = transmission
+            return None
         return transmission
 
     def _cause(self, sender: int, transmission: Transmission, slot: int) -> str | None:
-        if transmission.slot > slot:
+        if transmission.slot > slot + self._slots_per_tick or sender in self._early:
             return "ahead"
         if transmission.slot < slot - self._slots_per_tick:
             return "stale"
@@ -147,11 +157,14 @@ class Radio:
 
     def _ingest(self, slot: int) -> None:
         for sender, ring in enumerate(self._senders):
+            self._send(sender, self._intake.due(sender, slot))
             for data in ring.drain(SENDER_QUOTA):
-                transmission = self._intake.take(sender, data, slot)
-                if transmission is not None:
-                    sent_s = transmission.slot / self._setup.slot_hz
-                    self._medium.transmit(sender, sent_s, transmission)
+                self._send(sender, self._intake.take(sender, data, slot))
+
+    def _send(self, sender: int, transmission: Transmission | None) -> None:
+        if transmission is not None:
+            sent_s = transmission.slot / self._setup.slot_hz
+            self._medium.transmit(sender, sent_s, transmission)
 
     def _deliver(self, slot: int, newest_s: float, read_at: float) -> None:
         due_s = slot / self._setup.slot_hz

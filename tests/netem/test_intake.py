@@ -51,6 +51,26 @@ def test_mutated_transmissions_are_refused_or_keep_every_limit():
     assert {"malformed", "ahead", "stale"} <= set(refused) <= CAUSES
 
 
+def test_who_is_quicker_than_the_truth_waits_for_it():
+    desk, early = intake(), Transmission(42, 0, ())
+    assert desk.take(0, pack(early), 40) is None
+    assert desk.due(0, 41) is None
+    assert desk.due(0, 42) == early
+    assert desk.due(0, 43) is None
+    assert desk.take(0, pack(early), 43) is None
+    assert desk.rejected == {"repeated": 1}
+
+
+def test_nobody_is_a_tick_ahead_and_one_message_waits_at_most():
+    desk = intake()
+    assert desk.take(0, pack(Transmission(45, 0, ())), 40) is None
+    assert desk.rejected == {"ahead": 1}
+    for slot in (41, 44):
+        assert desk.take(1, pack(Transmission(slot, 0, ())), 40) is None
+    assert desk.rejected == {"ahead": 2}
+    assert desk.due(1, 44) == Transmission(41, 0, ())
+
+
 def test_what_is_too_much_is_refused_before_it_is_read():
     desk = intake()
     assert desk.take(0, bytes(MAX_TRANSMISSION_B + 1), 40) is None

@@ -59,7 +59,7 @@ class RunRecorder:
         say: Callable[[str], None] = complain,
     ) -> None:
         self._say = say
-        self._working = True
+        self._working, self._opened = True, False
         self._scenario = scenario
         self._formation = Formation(scenario.formation, scenario.control.spacing_m)
         shared = np.array(self._formation.common, dtype=np.int16).reshape(-1, 2)
@@ -87,8 +87,10 @@ class RunRecorder:
     def close(self) -> None:
         """Keep what is left, and end the file."""
         self._guarded(self._flush)
+        # What was kept before a failure is ended like any other file: somebody will read it.
+        self._working = self._opened
         self._guarded(self._end)
-        self._working = False
+        self._working = self._opened = False
 
     def _guarded(self, action: Callable[..., None], *details: Any) -> None:
         """Do something for the recording; whatever it meets must not reach the run."""
@@ -123,6 +125,7 @@ class RunRecorder:
             ),
         )
         self._spool.opened()
+        self._opened = True
         rr.set_log_time_enabled(False, recording=self._stream)
         rr.set_log_tick_enabled(False, recording=self._stream)
         self._stream.send_recording_name(run_id)
