@@ -6,7 +6,7 @@ the virtual clock) only carry bytes.
 
 from collections import Counter
 from collections.abc import Callable
-from math import dist, inf
+from math import dist, hypot, inf
 from typing import NamedTuple
 
 from agent.codec import RejectedError, decode_beacon, decode_gossip
@@ -38,6 +38,9 @@ from agent.setup import AgentSetup
 MAX_COST_MM = 2**31 - 1
 TIDY_S = 0.2
 """How often those who fell silent are looked for."""
+IMPLAUSIBLE = 4.0
+"""Who says it flies so many times faster than any vehicle can is not believed: what a controller
+asks for may exceed a limit that the vehicle then keeps."""
 MAX_TOLD = 256
 """So many neighbours are told of at most: a longer array makes a command that is refused."""
 
@@ -67,6 +70,7 @@ class Agent:
         self._incarnation = setup.incarnation
         self._decoders = decoders
         self._slack_s = 2.0 * tick_s
+        self._implausible2 = (IMPLAUSIBLE * setup.fleet_max_speed_mps) ** 2
         self._command_slots = setup.command_ticks * setup.slots_per_tick
         self._controller = Pilot(setup)
         self._neighbours = Neighbours(setup.id, comms.local_hz, self._slack_s)
@@ -139,6 +143,9 @@ class Agent:
         beacon = self._decoders.beacon(payload)
         if beacon.id != source:
             raise RejectedError("spoofed", f"{source} says it is {beacon.id}")
+        u, v, w = beacon.velocity
+        if u * u + v * v + w * w > self._implausible2:
+            raise RejectedError("speed", f"{source} says it flies at {hypot(u, v, w):.1f} m/s")
         self._neighbours.hear(beacon, now_s, self._broadcast.sent_s)
         self._table.adopt_beacon(beacon)
         if beacon.drift is not None or beacon.frame_key != self._missions.frame_key:

@@ -33,7 +33,7 @@ ROLES = ("member", "sub-vertex", "vertex", "distress")
 
 CAUSES = (
     *("oversize", "corrupt", "garbage", "invalid", "spoofed", "replay", "future", "old", "offset"),
-    *("mission", "observation", "batch"),
+    *("mission", "observation", "batch", "speed"),
 )
 """Why a message is refused; RejectedError has the causes of those heard by radio."""
 CauseIndex = Annotated[int, Meta(ge=0, lt=len(CAUSES))]

@@ -112,6 +112,7 @@ CASES = {
     "spoofed own": (beacon(0, 1, 1.0), 0),
     "future": (beacon(2, 1, 1.2), 2),
     "old": (beacon(2, 1, 20.0), 2),
+    "speed": (beacon(2, 1, 1.0, velocity=(1.5, -1.5, 0.5)), 2),
 }
 
 
@@ -146,7 +147,7 @@ def test_a_neighbour_may_say_it_is_anywhere(at, sensors):
     for tick in range(60):
         now_s = tick * TICK_S
         claim = (2**15 - 1, 2**15 - 1, 2**31 - 1)
-        odd = Beacon(1, 0, tick, now_s, at, (100.0,) * 3, at, *claim, 100.0, (), *UNLED)
+        odd = Beacon(1, 0, tick, now_s, at, (1.0,) * 3, at, *claim, 100.0, (), *UNLED)
         hear(core, odd, now_s)
         airworthy(core.step(seen(tick, vehicles=[ORIGIN] if sensors else ())), tick)
     assert core.rejected.total() == 0
