@@ -107,6 +107,7 @@ def _fly(post: Post, setup: AgentSetup, run: str, stop: Stop) -> None:
     print(f"agent-{setup.id} flies in run {run!r}", flush=True)
     try:
         _steer(cockpit, observations, run, ending)
+        cockpit.report()
     except UnwantedError:
         print(f"agent-{setup.id}: the run is over, within a slot", flush=True)
     print(f"agent-{setup.id} is done", flush=True)

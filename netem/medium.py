@@ -115,10 +115,13 @@ class Medium:
                 sent_s,
             )
 
-    def collect(self, receiver: int, now_s: float) -> tuple[Frame, ...]:
+    def collect(
+        self, receiver: int, now_s: float, due_s: list[float] | None = None
+    ) -> tuple[Frame, ...]:
         """Return, and forget, the frames that came due for one receiver by ``now_s`` [s].
 
         No more than fit one batch: what is over stays in flight, and comes first the next time.
+        due_s: a list to which is added when each of them was due [s].
         """
         queue = self._queues[receiver]
         frames: list[Frame] = []
@@ -127,6 +130,8 @@ class Medium:
             room_b -= FRAME_HEAD_B + len(queue[0][-1].payload)
             if room_b < 0:
                 break
+            if due_s is not None:
+                due_s.append(queue[0][0])
             frames.append(heappop(queue)[-1])
         self.in_flight -= len(frames)
         self._fates[Cause.DELIVERED] += len(frames)

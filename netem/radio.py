@@ -13,7 +13,15 @@ import msgspec
 from netem.medium import Medium
 from netem.messages import MAX_TRUTH_B, MediumSetup, Truth, Verdicts
 from netem.orders import OrderBook
-from netem.wire.frame import Batch, Transmission, WireError, pack, unpack, unpack_transmission
+from netem.wire.frame import (
+    MAX_EARLY_US,
+    Delivery,
+    Transmission,
+    WireError,
+    pack,
+    unpack,
+    unpack_transmission,
+)
 from netem.wire.post import Post
 
 ORDERS_RING = 256
@@ -170,6 +178,12 @@ class Radio:
         due_s = slot / self._setup.slot_hz
         group = slot % self._setup.slots_per_tick
         for receiver in range(group, self._setup.agents, self._setup.slots_per_tick):
-            frames = self._medium.collect(receiver, due_s)
-            self._receivers[receiver](pack(Batch(slot, frames)))
+            frames_due_s: list[float] = []
+            frames = self._medium.collect(receiver, due_s, frames_due_s)
+            early_us = tuple([_microseconds(due_s - each_s) for each_s in frames_due_s])
+            self._receivers[receiver](pack(Delivery(slot, frames, early_us)))
         self._lateness.note(due_s, newest_s, read_at)
+
+
+def _microseconds(early_s: float) -> int:
+    return min(round(1e6 * early_s), MAX_EARLY_US)

@@ -29,8 +29,10 @@ from agent.core import Agent
 from agent.messages import Observation
 from netem.messages import Done, Truth, Turn, unpack_done, unpack_turn
 from netem.orders import OrderBook
+from netem.wire.arrivals import Tally, unpack_arrivals
 from netem.wire.frame import (
     Batch,
+    Delivery,
     Frame,
     Inbox,
     Outgoing,
@@ -38,6 +40,7 @@ from netem.wire.frame import (
     WireError,
     pack,
     unpack_batch,
+    unpack_delivery,
     unpack_inbox,
     unpack_transmission,
 )
@@ -130,7 +133,10 @@ def _targets(
     frames = [frame for outbox in outboxes for frame in outbox.frames]
     beacons, gossips = ([data for channel, data in frames if channel == c] for c in (0, 1))
     sent = Transmission(3, 0, tuple(Outgoing(*frame) for frame in frames))
-    batch = pack(Batch(3, tuple(Frame(1, 0, c, 5, data) for c, data in frames)))
+    heard = tuple(Frame(1, 0, c, 5, data) for c, data in frames)
+    batch = pack(Batch(3, heard))
+    tally = Tally(0.0125)
+    tally.note(heard, tuple(range(len(heard))), 0)
     turn = Turn(Truth(3, 0.0375, positions), (3, 7), (0,) * len(positions))
     done = Done(3, ((1, b"page"),), fleet.verdicts)
     return [
@@ -140,6 +146,8 @@ def _targets(
         Target("gossip", lambda data: core.receive(3, 1, data, 2.5), gossips, sealed=True),
         Target("transmission", unpack_transmission, [pack(sent)]),
         Target("batch", unpack_batch, [batch]),
+        Target("delivery", unpack_delivery, [pack(Delivery(3, heard, tuple(range(len(heard)))))]),
+        Target("arrivals", unpack_arrivals, [pack(tally.told(0))]),
         Target("inbox", unpack_inbox, [pack(Inbox(3, (batch,)))]),
         Target("turn", unpack_turn, [pack(turn)]),
         Target("done", unpack_done, [pack(done)]),

@@ -13,13 +13,16 @@ from typing import Any, NamedTuple
 from netem.wire.keys import EVERY_KEY, Keys, agent_name
 
 OPERATOR = "operator"
-OWN = ("observation", "rx", "tx", "command", "setup")
-"""Topics of which each agent has its own."""
+SAYS = ("tx", "command", "arrivals")
+HEARS = ("observation", "rx")
+"""Topics of which each agent has its own, and puts to the ones and gets the others."""
 ALL = [
     *("put", "delete", "declare_subscriber", "query", "reply", "declare_queryable"),
     *("liveliness_token", "liveliness_query", "declare_liveliness_subscriber"),
 ]
-BOTH = ["ingress", "egress"]
+INGRESS, EGRESS = ["ingress"], ["egress"]
+"""From a user to the router, and from the router to a user."""
+BOTH = INGRESS + EGRESS
 Rule = dict[str, Any]
 
 
@@ -51,21 +54,13 @@ class Guard(NamedTuple):
         agents = [agent_name(agent) for agent in range(self.agents)]
         asking = [user for user in _passwords(self.users) if user == OPERATOR]
         others = [user for user in _passwords(self.users) if user not in (*agents, OPERATOR)]
-        over = [keys.of("over")]
-        rules = [
-            _rule("hear over", over, ["put"]) | {"flows": ["egress"]},
-            _rule("listen to over", over, ["declare_subscriber"]) | {"flows": ["ingress"]},
-            _rule("everything", [EVERY_KEY], ALL),
-            _rule("ask", [keys.of("control")], ["query"]) | {"flows": ["ingress"]},
-            _rule("answer", [keys.of("control")], ["reply", "declare_queryable"])
-            | {"flows": ["egress"]},
-        ]
-        rules += [_rule(name, _own(keys, agent), ALL) for agent, name in enumerate(agents)]
+        rules = [_rule("everything", [EVERY_KEY], ALL, BOTH)]
         policies = [{"rules": ["everything"], "subjects": others}] if others else []
-        policies += [{"rules": ["ask", "answer"], "subjects": [user]} for user in asking]
-        policies += [
-            {"rules": ["hear over", "listen to over", name], "subjects": [name]} for name in agents
-        ]
+        allowed = {user: _asking(user, [keys.of("control")]) for user in asking}
+        allowed |= {name: _flying(name, keys, agent) for agent, name in enumerate(agents)}
+        for user, own in allowed.items():
+            rules += own
+            policies.append({"rules": [rule["id"] for rule in own], "subjects": [user]})
         return {
             "enabled": True,
             "default_permission": "deny",
@@ -99,15 +94,33 @@ def _passwords(path: Path) -> dict[str, str]:
     return {user: password for user, _, password in (line.partition(":") for line in lines)}
 
 
-def _own(keys: Keys, agent: int) -> list[str]:
-    return [*(keys.of(topic, agent) for topic in OWN), keys.of("alive", agent_name(agent))]
+def _flying(name: str, keys: Keys, agent: int) -> list[Rule]:
+    """Return what one agent may: say and hear what is its own, show its life, ask for its setup."""
+    said = [keys.of(topic, agent) for topic in SAYS]
+    heard = [keys.of("over"), *(keys.of(topic, agent) for topic in HEARS)]
+    return [
+        _rule(f"{name} says", said, ["put"], INGRESS),
+        _rule(f"{name} is heard", said, ["declare_subscriber"], EGRESS),
+        _rule(f"{name} listens", heard, ["declare_subscriber"], INGRESS),
+        _rule(f"{name} hears", heard, ["put"], EGRESS),
+        _rule(f"{name} lives", [keys.of("alive", name)], ["liveliness_token"], INGRESS),
+        *_asking(name, [keys.of("setup", agent)]),
+    ]
 
 
-def _rule(name: str, key_exprs: list[str], messages: list[str]) -> Rule:
+def _asking(user: str, questions: list[str]) -> list[Rule]:
+    """Return what lets a user ask, and be answered."""
+    return [
+        _rule(f"{user} asks", questions, ["query"], INGRESS),
+        _rule(f"{user} is answered", questions, ["reply", "declare_queryable"], EGRESS),
+    ]
+
+
+def _rule(name: str, key_exprs: list[str], messages: list[str], flows: list[str]) -> Rule:
     return {
         "id": name,
         "permission": "allow",
-        "flows": BOTH,
+        "flows": flows,
         "messages": messages,
         "key_exprs": key_exprs,
     }

@@ -23,11 +23,13 @@ MAX_TRANSMISSION_B = MAX_OUTGOING * (MAX_PAYLOAD_B + 5) + 22
 MAX_BATCH_B = 256 * 1024
 BATCH_RING = 8
 """How many batches wait at an agent that does not read; newer ones push out the oldest."""
+MAX_EARLY_US = 2**32 - 1
 MAX_INBOX_B = BATCH_RING * (MAX_BATCH_B + 5) + 16
 MAX_FRAMES = 4096
 FRAME_HEAD_B = 26
 BATCH_HEAD_B = 13
 """Sizes as msgpack writes the greatest numbers round a payload, and round a batch's frames."""
+MAX_DELIVERY_B = MAX_BATCH_B + 5 * (MAX_FRAMES + 1)
 
 Count = Annotated[int, Meta(ge=0, lt=2**53)]
 AgentId = Annotated[int, Meta(ge=0, lt=2**16)]
@@ -71,6 +73,14 @@ class Batch(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unkno
 
     slot: Count
     frames: Annotated[tuple[Frame, ...], Meta(max_length=MAX_FRAMES)]
+
+
+class Delivery(Batch, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
+    """A batch that says how long before its slot each frame was due [us]; for free-running."""
+
+    early_us: Annotated[
+        tuple[Annotated[int, Meta(ge=0, le=MAX_EARLY_US)], ...], Meta(max_length=MAX_FRAMES)
+    ]
 
 
 class Inbox(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
@@ -119,6 +129,7 @@ def unpack(data: bytes, kind: type[_T], max_bytes: int, max_items: int = MAX_FRA
 
 _transmission = msgspec.msgpack.Decoder(Transmission).decode
 _batch = msgspec.msgpack.Decoder(Batch).decode
+_delivery = msgspec.msgpack.Decoder(Delivery).decode
 _inbox = msgspec.msgpack.Decoder(Inbox).decode
 
 
@@ -130,6 +141,14 @@ def unpack_transmission(data: bytes) -> Transmission:
 def unpack_batch(data: bytes) -> Batch:
     """Decode what the medium delivered, or raise :class:`WireError`."""
     return unpack_typed(data, _batch, MAX_BATCH_B)
+
+
+def unpack_delivery(data: bytes) -> Delivery:
+    """Decode what the medium delivered free-running, or raise :class:`WireError`."""
+    delivery = unpack_typed(data, _delivery, MAX_DELIVERY_B)
+    if len(delivery.early_us) != len(delivery.frames):
+        raise WireError(f"malformed: {len(delivery.early_us)} times of {len(delivery.frames)}")
+    return delivery
 
 
 def unpack_inbox(data: bytes) -> Inbox:

@@ -36,6 +36,7 @@ TOPICS = {
     "command": Topic("cmd/{id}", "agent", "world", "tick_hz", False, "velocity and telemetry"),
     "tx": Topic("radio/tx/{id}", "agent", "netem", "tick_hz", False, "frames to send"),
     "rx": Topic("radio/rx/{id}", "netem", "agent", "tick_hz", False, "a batch of frames heard"),
+    "arrivals": Topic("arrivals/{id}", "agent", "world", "1 Hz and at the end", False, "delays"),
     "done": Topic("done/{id}", "netem", "world", "each slot, lockstep", True, "a slot's fates"),
     "verdicts": Topic("verdicts", "netem", "world", "1 Hz and at the end", False, "counters"),
     "over": Topic("over", "world", "everybody", "once", True, "the run has ended"),

@@ -291,6 +291,14 @@ def test_links_channels_and_both_have_their_own_conditions():
     assert [f.channel for f in radio.collect(2, 0.050)] == [MULTIHOP, MULTIHOP]
 
 
+def test_it_says_when_each_frame_was_due():
+    radio = medium(Conditions(delay_ms=7.0, rate_kbit=8.0, rate_overhead_b=0), agents=2)
+    radio.transmit(0, 1.0, said(b"first", b"other"))
+    due_s = [0.5]
+    assert len(radio.collect(1, 2.0, due_s)) == 2
+    assert due_s == pytest.approx([0.5, 1.0 + 0.007 + 0.005, 1.0 + 0.007 + 0.010])
+
+
 @pytest.mark.parametrize(("size_b", "frames"), [(1200, 600), (0, 9000)])
 def test_what_does_not_fit_one_batch_comes_with_the_next(size_b, frames):
     radio = medium(Conditions(), agents=2)

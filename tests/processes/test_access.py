@@ -88,18 +88,28 @@ def test_an_agent_says_nothing_in_anybody_elses_name(
 ) -> None:
     listener, agent = session_of("world"), Post(session_of("agent-0"), KEYS)
     own = Ring(listener, KEYS.of("command", 0), 64)
-    forbidden = [
-        Ring(listener, key, 64)
-        for key in (KEYS.of("command", 1), KEYS.of("tx", 1), KEYS.of("over"), KEYS.of("truth"))
-    ]
-    puts = [agent.putter("command", 1), agent.putter("tx", 1)]
-    puts += [agent.putter("over"), agent.putter("truth")]
+    topics = [(topic, 1) for topic in ("command", "tx", "arrivals", "rx", "observation")]
+    # Nor does it tell itself what only the world and the radio do.
+    topics += [("rx", 0), ("observation", 0), ("over", None), ("truth", None), ("verdicts", None)]
+    forbidden = [Ring(listener, KEYS.of(*each), 64) for each in topics]
+    puts = [agent.putter(*each) for each in topics]
     mine = agent.putter("command", 0)
     eventually(lambda: puts_reach(own, mine), 5.0)
     for put in puts:
         put(b"forged")
     eventually(lambda: puts_reach(own, mine), 5.0)
-    assert [ring.drain(64) for ring in forbidden] == [[]] * 4
+    assert [ring.drain(64) for ring in forbidden] == [[]] * len(topics)
+
+
+@pytest.mark.parametrize("topic", ["tx", "command", "arrivals"])
+def test_what_an_agent_says_is_heard_and_not_by_itself(
+    session_of: Callable[[str], zenoh.Session], topic: str
+) -> None:
+    agent = session_of("agent-0")
+    heard, echo = Ring(session_of("world"), KEYS.of(topic, 0), 64), Ring(agent, "qswarm/**", 64)
+    put = Post(session_of("agent-0"), KEYS).putter(topic, 0)
+    eventually(lambda: puts_reach(heard, put), 5.0)
+    assert echo.drain(64) == []
 
 
 def test_an_operator_asks_and_does_no_more(session_of: Callable[[str], zenoh.Session]) -> None:

@@ -62,6 +62,12 @@ def test_a_fleet_flies_passes_and_leaves_everything_in_its_folder(
     assert (verification.whole, verification.differences) == (True, ()), verification
     assert summary["invariants"]["I8"]["ticks"] > 6 * 20 / 2
     assert summary["delivery_late_ms"].keys() == {"median", "worst"}
+    delivery = summary["delivery"]
+    assert 0 < delivery["frames"] <= summary["packets"]["delivered"]
+    assert delivery["frames"] == sum(each["frames"] for each in delivery["channels"].values())
+    assert delivery["excess_ms"].keys() == {"p1", "p5", "p50", "p95", "p99", "max"}
+    assert delivery["bound_ms"] == 62.5
+    assert "after due" in fleet.text
     assert [row.alive for row in processes(run)] == [False] * 7
     nobody_left(pids(run))
 

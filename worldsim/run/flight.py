@@ -8,6 +8,7 @@ vehicles.
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
+from typing import Any
 
 from agent.codec import RejectedError, decode_command, encode
 from netem.messages import Truth, Verdicts
@@ -15,6 +16,7 @@ from netem.wire.frame import WireError, pack, unpack
 from netem.wire.post import Post
 from worldsim.judge.tick import Packets
 from worldsim.run.admission import PROCESS_COMMAND_TICKS
+from worldsim.run.arrivals import Punctual
 from worldsim.run.control import Control, Reception
 from worldsim.run.hands import Hands
 from worldsim.run.headway import Headway
@@ -66,11 +68,21 @@ class Flight:
         self._observers = [post.putter("observation", agent) for agent in rows]
         self._commands = [post.ring("command", agent, SENDER_RING) for agent in rows]
         self._reports = post.ring("verdicts", size=SENDER_RING)
+        clock = self.loop.world.clock
+        self._punctual = Punctual(clock.slots_per_tick, 1.0 / clock.slot_hz)
+        self._arrivals = [post.ring("arrivals", agent) for agent in rows]
+        self._slots_a_report = round(clock.slot_hz)
 
     @property
     def late_fraction(self) -> float | None:
         """Share of late ticks."""
         return self.punctuality.late_fraction
+
+    @property
+    def delivery(self) -> dict[str, Any] | None:
+        """How late frames came, as far as the agents told."""
+        delivered = self.verdicts.fates.get("delivered", 0) if self.verdicts is not None else 0
+        return self._punctual.summary(delivered)
 
     @property
     def refused(self) -> Mapping[str, int]:
@@ -105,6 +117,8 @@ class Flight:
                 self._read_report(report)
             if self.verdicts is not None and self.verdicts.slot >= self.loop.world.slot:
                 break
+        for agent in range(len(self._arrivals)):
+            self._read_arrivals(agent)
 
     def _slot(self, unwanted: Callable[[], bool]) -> None:
         slot = self.loop.world.slot
@@ -123,6 +137,9 @@ class Flight:
                 self._obey(agent, data)
         for report in self._reports.drain(SENDER_RING):
             self._read_report(report)
+        # Each agent tells once a second, and so often it is asked, each in a slot of its own.
+        for agent in range(slot % self._slots_a_report, len(self._arrivals), self._slots_a_report):
+            self._read_arrivals(agent)
         self.loop.close(b"")
         self._headway.tell(self._pacer.elapsed_s, self.late_fraction)
 
@@ -155,6 +172,13 @@ class Flight:
             self.verdicts = unpack(data, Verdicts, MAX_VERDICTS_B)
         except WireError:
             self._refused["verdicts"] += 1
+
+    def _read_arrivals(self, agent: int) -> None:
+        for data in self._arrivals[agent].drain(1):
+            try:
+                self._punctual.take(agent, self.loop.team.incarnations[agent], data)
+            except WireError:
+                self._refused["arrivals"] += 1
 
     def _strike_out(self) -> None:
         for loss in self._outside.losses():

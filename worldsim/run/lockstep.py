@@ -33,6 +33,7 @@ class Lockstep:
     """A fleet in the air, everybody waiting for everybody."""
 
     late_fraction: float | None = None
+    delivery: None = None
     refused: Mapping[str, int] = {}
     """Nothing: what the world would refuse ends the run."""
 

@@ -134,6 +134,7 @@ def _summary(
         mode=mode,
         verdicts=flight.verdicts,
         refused=flight.refused,
+        delivery=flight.delivery,
         late_tick_fraction=late,
         real_time_factor=flight.real_time_factor,
         duration_s=flight.loop.world.time_s,

@@ -38,12 +38,13 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
     host_too_slow: bool,
     failure: str | None = None,
     refused: Mapping[str, int] | None = None,
+    delivery: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return summary.json's content: plain values, None for what could not be measured.
 
     mode: "processes", "lockstep" or "virtual". duration_s: how much was flown, in simulated time.
     failure: what ended the run that should not have happened in it. refused: messages that the
-    world refused, by cause.
+    world refused, by cause. delivery: how late frames came.
     """
     judge = loop.judge
     rejected = _rejected(loop, verdicts, refused)
@@ -72,6 +73,7 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
         "direct_links": loop.company.links(),
         "bytes_per_s": loop.company.bytes_per_s(verdicts),
         "invariants": invariants,
+        "delivery": delivery,
         "delivery_late_ms": _delivery_late_ms(verdicts),
         "late_tick_fraction": late_tick_fraction,
         "real_time_factor": real_time_factor,

@@ -51,7 +51,8 @@ def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
     rows = [_expectation(**row) for row in summary["expectations"]]
     reason = f" ({summary['reason']})" if summary["reason"] else ""
     place = f"{folder}/run.rrd" if recorded else f"{folder}/summary.json"
-    told = [_aside(summary), *_refused(summary["rejected_by_cause"])]
+    refused = _refused(summary["rejected_by_cause"])
+    told = [_aside(summary), *_delivery(summary["delivery"]), *refused]
     return "\n".join([head, *rows, *told, f"{summary['outcome']}{reason}  {place}"])
 
 
@@ -100,6 +101,17 @@ def _refused(rejected: dict[str, dict[str, int]]) -> list[str]:
     return [f"  refused: {'; '.join(told)}"] if told else []
 
 
+def _delivery(delivery: dict[str, Any] | None) -> list[str]:
+    """Return how late frames were used in a line, or none where that was not measured."""
+    if delivery is None:
+        return []
+    late, within = delivery["excess_ms"], delivery["within_fraction"]
+    return [
+        f"  frames used {late['p50']:.1f} ms (median), {late['p99']:.1f} ms (p99) after due,"
+        f" {_percent(within, 2)} within {delivery['bound_ms']:g} ms, a slot and a tick"
+    ]
+
+
 def _aside(summary: Summary) -> str:
     residual = summary["phases"][-1]["residual_m"]
     turns = summary["turns_over_limit_fraction"]
@@ -140,5 +152,5 @@ def _figure(value: float | None, unit: str, digits: int) -> str:
     return f"{value:.{digits}f} {unit}" if value is not None else "-"
 
 
-def _percent(fraction: float | None) -> str:
-    return f"{100 * fraction:.1f}%" if fraction is not None else "-"
+def _percent(fraction: float | None, digits: int = 1) -> str:
+    return f"{100 * fraction:.{digits}f}%" if fraction is not None else "-"

@@ -13,22 +13,32 @@ from netem.wire.frame import (
     BATCH_HEAD_B,
     FRAME_HEAD_B,
     MAX_BATCH_B,
+    MAX_DELIVERY_B,
+    MAX_EARLY_US,
+    MAX_FRAMES,
     MAX_OUTGOING,
     MAX_PAYLOAD_B,
     MAX_TRANSMISSION_B,
     Batch,
+    Delivery,
     Frame,
     Outgoing,
     Transmission,
     WireError,
     pack,
     unpack_batch,
+    unpack_delivery,
     unpack_transmission,
 )
 
 MANY = 20_000
 GREATEST = 2**53 - 1
-READERS = [(unpack_transmission, Transmission), (unpack_batch, Batch)]
+READERS = [
+    (unpack_transmission, Transmission),
+    (unpack_batch, Batch),
+    (unpack_delivery, Delivery),
+]
+READER_OF = {kind: reader for reader, kind in READERS}
 
 counts = st.integers(0, GREATEST)
 channels = st.integers(0, 1)
@@ -50,8 +60,7 @@ batches = st.builds(
 
 def kept(message):
     """Whether a message keeps what its type promises: it survives its own codec, unchanged."""
-    reader = unpack_transmission if isinstance(message, Transmission) else unpack_batch
-    return reader(pack(message)) == message
+    return READER_OF[type(message)](pack(message)) == message
 
 
 def survives(reader, kind, data):
@@ -90,6 +99,31 @@ def test_a_batch_is_no_larger_than_its_parts_say():
     assert len(pack(batch)) == BATCH_HEAD_B + 4000 * (FRAME_HEAD_B + MAX_PAYLOAD_B)
 
 
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(batches, st.data())
+def test_a_delivery_is_a_batch_and_a_time_for_each_frame(batch, data):
+    size = len(batch.frames)
+    early_us = tuple(data.draw(st.lists(st.integers(0, MAX_EARLY_US), max_size=10)))
+    delivery = Delivery(batch.slot, batch.frames, early_us)
+    if len(early_us) == size:
+        assert unpack_delivery(pack(delivery)) == delivery
+    else:
+        with pytest.raises(WireError, match="times of"):
+            unpack_delivery(pack(delivery))
+    with pytest.raises(WireError):
+        unpack_batch(pack(delivery))
+    with pytest.raises(WireError):
+        unpack_delivery(pack(batch))
+
+
+def test_the_greatest_delivery_survives_the_wire():
+    room_b = (MAX_BATCH_B - BATCH_HEAD_B) // MAX_FRAMES - FRAME_HEAD_B
+    frame = Frame(2**16 - 1, GREATEST, 1, GREATEST, b"x" * room_b)
+    delivery = Delivery(GREATEST, (frame,) * MAX_FRAMES, (MAX_EARLY_US,) * MAX_FRAMES)
+    assert len(pack(delivery)) <= MAX_DELIVERY_B
+    assert unpack_delivery(pack(delivery)) == delivery
+
+
 @pytest.mark.parametrize(("reader", "kind"), READERS)
 def test_junk_is_refused(reader, kind):
     random = Random(1)
@@ -110,6 +144,7 @@ def test_junk_that_begins_well_is_refused(reader, kind):
     [
         (unpack_transmission, Transmission, Transmission(7, 1, (Outgoing(0, b"abcdefgh"),) * 3)),
         (unpack_batch, Batch, Batch(7, (Frame(3, 1, 1, 900, b"abcdefgh"),) * 3)),
+        (unpack_delivery, Delivery, Delivery(7, (Frame(3, 1, 1, 9, b"ab"),) * 2, (900, 0))),
     ],
 )
 def test_mutations_are_refused_or_still_keep_the_promise(reader, kind, good):
@@ -214,7 +249,12 @@ def test_a_bomb_is_refused(data):
 
 
 @pytest.mark.parametrize(
-    ("reader", "limit_b"), [(unpack_transmission, MAX_TRANSMISSION_B), (unpack_batch, MAX_BATCH_B)]
+    ("reader", "limit_b"),
+    [
+        (unpack_transmission, MAX_TRANSMISSION_B),
+        (unpack_batch, MAX_BATCH_B),
+        (unpack_delivery, MAX_DELIVERY_B),
+    ],
 )
 def test_what_is_too_large_is_not_even_decoded(reader, limit_b, monkeypatch):
     monkeypatch.setattr(msgpack, "unpackb", lambda *_, **__: pytest.fail("it was decoded"))

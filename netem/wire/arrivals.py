@@ -1,0 +1,74 @@
+"""How long after it was due each frame was used: counted by an agent, told to the world.
+
+A frame is due when it was sent, plus its wait for its sender's rate, plus the delay that its link
+drew for it. It is used at an observation. What lies between the two, in simulated time, is its
+excess: never less than nothing, and on a host that keeps up no more than one slot and one tick.
+
+An excess falls into one of equal bins, each an eighth of a slot and its upper edge included, so
+that slots and ticks are edges; a last bin has what lies beyond.
+"""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from netem.wire.frame import CHANNELS, Count, Frame, unpack_typed
+
+BINS_A_SLOT = 8
+SLOTS_SEEN = 32
+BINS = SLOTS_SEEN * BINS_A_SLOT + 2
+"""The first bin is for no excess at all, the last for more than SLOTS_SEEN."""
+SLACK_US = 1.5
+"""Times are told in whole microseconds: so much above an edge is rounding."""
+MAX_ARRIVALS_B = 8 * 1024
+
+Bins = Annotated[tuple[Count, ...], Meta(min_length=BINS, max_length=BINS)]
+
+
+class Arrivals(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
+    """What an agent's process counted since it began: bins for each channel, the greatest excess.
+
+    most_us: channel by channel [us].
+    """
+
+    incarnation: Count
+    counts: Annotated[tuple[Bins, ...], Meta(min_length=len(CHANNELS), max_length=len(CHANNELS))]
+    most_us: Annotated[tuple[Count, ...], Meta(min_length=len(CHANNELS), max_length=len(CHANNELS))]
+
+
+class Tally:
+    """Counts the frames of one agent by their excess, channel by channel; slot_s: of a slot [s]."""
+
+    def __init__(self, slot_s: float) -> None:
+        self._slot_us = 1e6 * slot_s
+        self._bin_us = self._slot_us / BINS_A_SLOT
+        self._counts = [[0] * BINS for _ in CHANNELS]
+        self._most_us = [0] * len(CHANNELS)
+
+    def note(self, frames: Sequence[Frame], early_us: Sequence[int], slots: int) -> None:
+        """Count frames that are used ``slots`` after their batch's slot.
+
+        early_us: how long before that slot each of them was due.
+        """
+        counts, most_us, bin_us, last = self._counts, self._most_us, self._bin_us, BINS - 1
+        since_us = round(slots * self._slot_us)
+        for frame, each_us in zip(frames, early_us, strict=True):
+            excess_us, channel = since_us + each_us, frame.channel
+            # Rounded up: a bin has its upper edge.
+            at = -int((SLACK_US - excess_us) // bin_us)
+            counts[channel][at if at < last else last] += 1
+            most_us[channel] = max(most_us[channel], excess_us)
+
+    def told(self, incarnation: int) -> Arrivals:
+        """Return what was counted so far."""
+        return Arrivals(incarnation, tuple(map(tuple, self._counts)), tuple(self._most_us))
+
+
+_arrivals = msgspec.msgpack.Decoder(Arrivals).decode
+
+
+def unpack_arrivals(data: bytes) -> Arrivals:
+    """Decode what an agent told, or raise WireError."""
+    return unpack_typed(data, _arrivals, MAX_ARRIVALS_B)

@@ -1,0 +1,99 @@
+"""What the agents count together: quantiles of it, and what is not believed."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netem.wire.arrivals import BINS, BINS_A_SLOT, Arrivals
+from netem.wire.frame import WireError, pack
+from worldsim.run.arrivals import Punctual, quantile
+
+SLOT_S = 0.0125
+PLENTY = 10**9
+
+
+def told(bins, multihop=None, incarnation=0, most_us=(62_500, 62_500)):
+    """Return what an agent tells that counted so many frames in each of these bins."""
+    rows = tuple(tuple(row.get(at, 0) for at in range(BINS)) for row in (bins, multihop or {}))
+    return pack(Arrivals(incarnation, rows, most_us))
+
+
+@pytest.fixture
+def punctual():
+    return Punctual(4, SLOT_S)
+
+
+counts = st.lists(st.integers(0, 50), min_size=1, max_size=30).filter(any)
+
+
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(counts, st.floats(0.01, 100.0))
+def test_a_quantile_is_the_least_bin_that_has_so_many_at_or_below_it(bins, percent):
+    at, wanted = quantile(bins, percent), percent / 100.0 * sum(bins)
+    assert bins[at] > 0
+    assert sum(bins[: at + 1]) >= wanted
+    assert at == 0 or sum(bins[:at]) < wanted or not any(bins[:at])
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(st.lists(st.dictionaries(st.integers(0, BINS - 1), st.integers(1, 99)), max_size=4))
+def test_the_sum_over_agents_keeps_every_frame_and_its_order(agents):
+    punctual = Punctual(4, SLOT_S)
+    for agent, bins in enumerate(agents):
+        punctual.take(agent, 0, told(bins, most_us=(9_000_000, 0)))
+    summary = punctual.summary(PLENTY)
+    frames = sum(sum(bins.values()) for bins in agents)
+    if not frames:
+        assert summary is None
+        return
+    assert summary["frames"] == summary["channels"]["local"]["frames"] == frames
+    assert summary["channels"]["multihop"] is None
+    within = sum(n for bins in agents for at, n in bins.items() if at <= 5 * BINS_A_SLOT)
+    assert summary["within_fraction"] == within / frames
+    spread = list(summary["excess_ms"].values())
+    assert spread == sorted(spread)
+    assert spread[-1] == 9000.0
+
+
+def test_the_bound_is_one_slot_and_one_tick(punctual):
+    punctual.take(0, 0, told({16: 1, 40: 2, 41: 1}, {24: 4}, most_us=(63_000, 37_500)))
+    summary = punctual.summary(PLENTY)
+    assert summary["bound_ms"] == 62.5
+    assert summary["within_fraction"] == 7 / 8
+    assert summary["channels"]["local"]["within_fraction"] == 3 / 4
+    assert summary["channels"]["multihop"]["excess_ms"]["p50"] == 37.5
+    assert summary["channels"]["local"]["excess_ms"]["max"] == 63.0
+
+
+def test_the_last_word_of_each_process_counts(punctual):
+    punctual.take(0, 0, told({8: 5}))
+    punctual.take(0, 0, told({8: 7}))
+    punctual.take(0, 1, told({16: 2}, incarnation=1))
+    assert punctual.summary(PLENTY)["frames"] == 9
+
+
+def test_nothing_told_is_nothing_measured(punctual):
+    assert punctual.summary(PLENTY) is None
+    punctual.take(0, 0, told({}, most_us=(0, 0)))
+    assert punctual.summary(PLENTY) is None
+
+
+def test_who_counts_backwards_or_speaks_for_another_process_is_not_believed(punctual):
+    punctual.take(0, 0, told({8: 5}))
+    lies = [
+        told({8: 4, 9: 3}),
+        told({8: 6}, most_us=(12, 62_500)),
+        told({8: 6}, incarnation=1),
+        b"junk",
+    ]
+    for lie in lies:
+        with pytest.raises(WireError):
+            punctual.take(0, 0, lie)
+    assert punctual.summary(PLENTY)["frames"] == 5
+
+
+def test_who_counts_more_than_the_radio_delivered_is_left_out(punctual):
+    punctual.take(0, 0, told({8: 5}))
+    punctual.take(1, 0, told({0: 2**50}))
+    assert punctual.summary(100)["frames"] == 5
+    assert punctual.summary(4) is None
