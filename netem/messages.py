@@ -177,12 +177,14 @@ class Truth(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unkno
     """Where the vehicles truly are at the start of a slot.
 
     positions: row i = agent i [m; world frame], None where no radio is: the agent has no vehicle in
-    the world, or its process is gone.
+    the world, or its process is gone. incarnations: likewise, which of its processes an agent is;
+    free-running (a turn of lockstep has them besides).
     """
 
     slot: Count
     time_s: Annotated[float, Meta(ge=0, le=1e9)]
     positions: tuple[Position | None, ...]
+    incarnations: tuple[Count, ...] = ()
 
 
 class Verdicts(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):

@@ -25,9 +25,6 @@ from netem.wire.frame import (
 from netem.wire.post import Post
 
 ORDERS_RING = 256
-SENDER_RING = 4
-SENDER_QUOTA = 2
-"""How many of one sender's messages are taken a slot: a flooder evicts only its own."""
 LATENESS_KEPT = 4096
 
 
@@ -55,10 +52,14 @@ class Lateness:
 
 
 class Intake:
-    """Decides which of the senders' messages the medium takes, and counts the others by cause."""
+    """Decides which of the senders' messages the medium takes, and counts the others by cause.
+
+    incarnations: which of its processes each agent is at present, as the world has it.
+    """
 
     def __init__(self, setup: MediumSetup) -> None:
         self.rejected: Counter[str] = Counter()
+        self.incarnations: tuple[int, ...] = (0,) * setup.agents
         self._slots_per_tick = setup.slots_per_tick
         self._last: list[tuple[int, int]] = [(-1, -1)] * setup.agents
         self._early: dict[int, Transmission] = {}
@@ -91,6 +92,8 @@ class Intake:
         return transmission
 
     def _cause(self, sender: int, transmission: Transmission, slot: int) -> str | None:
+        if transmission.incarnation != self.incarnations[sender]:
+            return "incarnation"
         if transmission.slot > slot + self._slots_per_tick or sender in self._early:
             return "ahead"
         if transmission.slot < slot - self._slots_per_tick:
@@ -109,7 +112,7 @@ class Radio:
         self._intake = Intake(setup)
         self._lateness = Lateness(setup.speed)
         agents = range(setup.agents)
-        self._senders = [post.ring("tx", agent, SENDER_RING) for agent in agents]
+        self._senders = post.rings("tx", agents)
         self._receivers = [post.putter("rx", agent) for agent in agents]
         self._orders = post.ring("orders", size=ORDERS_RING)
         self._book = OrderBook()
@@ -139,13 +142,15 @@ class Radio:
         except WireError:
             self._intake.rejected["truth"] += 1
             return None
-        if len(truth.positions) != self._setup.agents or truth.slot < self._slot:
+        rows = {len(truth.positions), len(truth.incarnations), self._setup.agents}
+        if len(rows) > 1 or truth.slot < self._slot:
             self._intake.rejected["truth"] += 1
             return None
         return truth
 
     def _play(self, truth: Truth, newest_s: float, read_at: float) -> None:
         self._obey(truth.slot)
+        self._intake.incarnations = truth.incarnations
         self._medium.place(truth.positions)
         self._ingest(truth.slot)
         self._deliver(truth.slot + 1, newest_s, read_at)
@@ -164,9 +169,9 @@ class Radio:
             self._medium.obey(order)
 
     def _ingest(self, slot: int) -> None:
-        for sender, ring in enumerate(self._senders):
+        for sender, said in self._senders.drain():
             self._send(sender, self._intake.due(sender, slot))
-            for data in ring.drain(SENDER_QUOTA):
+            for data in said:
                 self._send(sender, self._intake.take(sender, data, slot))
 
     def _send(self, sender: int, transmission: Transmission | None) -> None:

@@ -10,10 +10,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from netem.wire.arrivals import MAX_ARRIVALS_B
+from netem.wire.frame import MAX_TRANSMISSION_B
 from netem.wire.keys import EVERY_KEY, Keys, agent_name
 
 OPERATOR = "operator"
-SAYS = ("tx", "command", "arrivals")
+MOST_B = {"tx": MAX_TRANSMISSION_B, "command": 4096, "arrivals": MAX_ARRIVALS_B}
+"""Of what an agent says, what is larger goes no further than the router."""
 HEARS = ("observation", "rx")
 """Topics of which each agent has its own, and puts to the ones and gets the others."""
 ALL = [
@@ -70,6 +73,20 @@ class Guard(NamedTuple):
         }
 
 
+def size_limits() -> list[Rule]:
+    """Return Zenoh's filters by size: how long a message on a topic of an agent's may be [B]."""
+    return [
+        {
+            "id": f"size of {topic}",
+            "flows": INGRESS,
+            "messages": ["put"],
+            "key_exprs": [Keys.any_run(topic, "*")],
+            "size_limit": most_b,
+        }
+        for topic, most_b in MOST_B.items()
+    ]
+
+
 def write_users(path: Path, users: Iterable[str]) -> None:
     """Write a new file of passwords, for its owner alone. Raises OSError."""
     lines = [f"{user}:{secrets.token_urlsafe(16)}\n" for user in users]
@@ -96,7 +113,7 @@ def _passwords(path: Path) -> dict[str, str]:
 
 def _flying(name: str, keys: Keys, agent: int) -> list[Rule]:
     """Return what one agent may: say and hear what is its own, show its life, ask for its setup."""
-    said = [keys.of(topic, agent) for topic in SAYS]
+    said = [keys.of(topic, agent) for topic in MOST_B]
     heard = [keys.of("over"), *(keys.of(topic, agent) for topic in HEARS)]
     return [
         _rule(f"{name} says", said, ["put"], INGRESS),

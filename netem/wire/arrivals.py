@@ -38,12 +38,17 @@ class Arrivals(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_un
     most_us: Annotated[tuple[Count, ...], Meta(min_length=len(CHANNELS), max_length=len(CHANNELS))]
 
 
+def bin_of(excess_us: int, slot_s: float) -> int:
+    """Return the bin that an excess [us] belongs to, where a slot takes ``slot_s`` [s]."""
+    # Rounded up: a bin has its upper edge.
+    return min(-int((SLACK_US - excess_us) * BINS_A_SLOT // (1e6 * slot_s)), BINS - 1)
+
+
 class Tally:
     """Counts the frames of one agent by their excess, channel by channel; slot_s: of a slot [s]."""
 
     def __init__(self, slot_s: float) -> None:
-        self._slot_us = 1e6 * slot_s
-        self._bin_us = self._slot_us / BINS_A_SLOT
+        self._slot_s = slot_s
         self._counts = [[0] * BINS for _ in CHANNELS]
         self._most_us = [0] * len(CHANNELS)
 
@@ -52,14 +57,11 @@ class Tally:
 
         early_us: how long before that slot each of them was due.
         """
-        counts, most_us, bin_us, last = self._counts, self._most_us, self._bin_us, BINS - 1
-        since_us = round(slots * self._slot_us)
+        since_us = round(1e6 * slots * self._slot_s)
         for frame, each_us in zip(frames, early_us, strict=True):
             excess_us, channel = since_us + each_us, frame.channel
-            # Rounded up: a bin has its upper edge.
-            at = -int((SLACK_US - excess_us) // bin_us)
-            counts[channel][at if at < last else last] += 1
-            most_us[channel] = max(most_us[channel], excess_us)
+            self._counts[channel][bin_of(excess_us, self._slot_s)] += 1
+            self._most_us[channel] = max(self._most_us[channel], excess_us)
 
     def told(self, incarnation: int) -> Arrivals:
         """Return what was counted so far."""

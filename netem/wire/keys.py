@@ -79,7 +79,7 @@ class Keys:
         return f"qswarm/{self.run}/" + TOPICS[topic].template.format(id="*", name="*")
 
     @staticmethod
-    def any_run(topic: str, who: int | None = None) -> str:
+    def any_run(topic: str, who: int | str | None = None) -> str:
         """Return the key expression of a topic, of whichever run."""
         return "qswarm/*/" + TOPICS[topic].template.format(id=who)
 

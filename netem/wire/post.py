@@ -5,7 +5,7 @@ thread of ours or blocks a sender.
 """
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from operator import call
 from types import FrameType
 from typing import Any, Protocol, TypeVar
@@ -105,6 +105,30 @@ class Ring:
         return [sample.payload.to_bytes() for sample in drained(self._source, quota)]
 
 
+class Rings:
+    """The rings of all who say something on one topic, each read up to a quota at a time.
+
+    Who has more there is read on, up to a reserve that all of them share: so what somebody says is
+    found among much that is said in his name, others lose nothing by it, and the time that it
+    costs is bounded.
+    """
+
+    SIZE = 256
+    QUOTA = 2
+    RESERVE = 256
+
+    def __init__(self, rings: Sequence[Ring]) -> None:
+        self._rings = rings
+
+    def drain(self) -> Iterator[tuple[int, list[bytes]]]:
+        """Yield for each sender the payloads that are there, oldest first."""
+        left = self.RESERVE
+        for sender, ring in enumerate(self._rings):
+            found = ring.drain(self.QUOTA + left)
+            left -= max(0, len(found) - self.QUOTA)
+            yield sender, found
+
+
 class Roll:
     """Who shows a sign of life in a run, by name (``world``, ``netem``, ``agent-3``).
 
@@ -162,6 +186,10 @@ class Post:
     def ring(self, topic: str, who: int | None = None, size: int = 1) -> Ring:
         """Return a ring of the newest messages on a topic."""
         return Ring(self._session, self._keys.of(topic, who), size)
+
+    def rings(self, topic: str, agents: Iterable[int]) -> Rings:
+        """Return the rings of what each of some agents says on a topic."""
+        return Rings([self.ring(topic, agent, Rings.SIZE) for agent in agents])
 
     def roll(self) -> Roll:
         """Return the roll of those who are alive."""

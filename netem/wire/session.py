@@ -10,7 +10,7 @@ from typing import Any
 
 import zenoh
 
-from netem.wire.access import Guard, Login
+from netem.wire.access import Guard, Login, size_limits
 
 OPEN_TIMEOUT_S = 8.0
 MAX_MESSAGE_B = 4 * 1024 * 1024
@@ -59,7 +59,11 @@ def open_client(
 
 def router_config(listen: str, patient: bool = False, guard: Guard | None = None) -> zenoh.Config:
     """Return the configuration of a router that listens at one endpoint."""
-    router: dict[str, Any] = {"mode": "router", "listen": {"endpoints": [listen]}}
+    router: dict[str, Any] = {
+        "mode": "router",
+        "listen": {"endpoints": [listen]},
+        "low_pass_filter": size_limits(),
+    }
     if guard is None:
         return _config(router, patient, {})
     # A router must have a name, too, though it calls nobody.

@@ -17,7 +17,7 @@ from netem.wire.frame import (
     pack,
 )
 
-CAUSES = {"oversize", "malformed", "ahead", "stale", "repeated"}
+CAUSES = {"oversize", "malformed", "incarnation", "ahead", "stale", "repeated"}
 
 
 def intake():
@@ -71,6 +71,15 @@ def test_nobody_is_a_tick_ahead_and_one_message_waits_at_most():
     assert desk.due(1, 44) == Transmission(41, 0, ())
 
 
+def test_only_an_agents_present_process_is_heard():
+    desk = intake()
+    desk.incarnations = (0, 3, 0)
+    for other in (2, 4, 2**52):
+        assert desk.take(1, pack(Transmission(40, other, ())), 40) is None
+    assert desk.rejected == {"incarnation": 3}
+    assert desk.take(1, pack(Transmission(40, 3, ())), 40) is not None
+
+
 def test_what_is_too_much_is_refused_before_it_is_read():
     desk = intake()
     assert desk.take(0, bytes(MAX_TRANSMISSION_B + 1), 40) is None
@@ -80,5 +89,6 @@ def test_what_is_too_much_is_refused_before_it_is_read():
     for message in (many, large):
         assert desk.take(0, pack(message), 40) is None
     assert desk.rejected == {"oversize": 1, "malformed": 2}
+    desk.incarnations = (2**53 - 1,) * 3
     greatest = Transmission(40, 2**53 - 1, (Outgoing(1, bytes(MAX_PAYLOAD_B)),) * MAX_OUTGOING)
     assert desk.take(0, pack(greatest), 40) == greatest

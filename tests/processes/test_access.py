@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from netem.wire.access import AccessError, Guard, login_of, write_users
+from netem.wire.access import MOST_B, AccessError, Guard, login_of, write_users
 from netem.wire.keys import Keys
 from netem.wire.post import Post, Ring, receive
 from netem.wire.session import SessionError, open_client, open_router
@@ -101,7 +101,22 @@ def test_an_agent_says_nothing_in_anybody_elses_name(
     assert [ring.drain(64) for ring in forbidden] == [[]] * len(topics)
 
 
-@pytest.mark.parametrize("topic", ["tx", "command", "arrivals"])
+@pytest.mark.parametrize("topic", MOST_B)
+def test_what_is_too_long_goes_no_further_than_the_router(
+    session_of: Callable[[str], zenoh.Session], topic: str
+) -> None:
+    heard = Ring(session_of("world"), KEYS.of(topic, 0), 64)
+    put = Post(session_of("agent-0"), KEYS).putter(topic, 0)
+    eventually(lambda: puts_reach(heard, put), 5.0)
+    longest = bytes(MOST_B[topic])
+    put(longest + b"x")
+    put(longest)
+    said: list[bytes] = []
+    eventually(lambda: said.extend(heard.drain(64)) or longest in said, 5.0)
+    assert longest + b"x" not in said
+
+
+@pytest.mark.parametrize("topic", MOST_B)
 def test_what_an_agent_says_is_heard_and_not_by_itself(
     session_of: Callable[[str], zenoh.Session], topic: str
 ) -> None:

@@ -9,12 +9,16 @@ from netem.wire.frame import WireError, pack
 from worldsim.run.arrivals import Punctual, quantile
 
 SLOT_S = 0.0125
+BIN_US = 1e6 * SLOT_S / BINS_A_SLOT
 PLENTY = 10**9
+LATE_S = 100.0
 
 
-def told(bins, multihop=None, incarnation=0, most_us=(62_500, 62_500)):
+def told(bins, multihop=None, incarnation=0, most_us=None):
     """Return what an agent tells that counted so many frames in each of these bins."""
-    rows = tuple(tuple(row.get(at, 0) for at in range(BINS)) for row in (bins, multihop or {}))
+    by_channel = (bins, multihop or {})
+    rows = tuple(tuple(row.get(at, 0) for at in range(BINS)) for row in by_channel)
+    most_us = most_us or tuple(int(max(row, default=0) * BIN_US) for row in by_channel)
     return pack(Arrivals(incarnation, rows, most_us))
 
 
@@ -40,7 +44,7 @@ def test_a_quantile_is_the_least_bin_that_has_so_many_at_or_below_it(bins, perce
 def test_the_sum_over_agents_keeps_every_frame_and_its_order(agents):
     punctual = Punctual(4, SLOT_S)
     for agent, bins in enumerate(agents):
-        punctual.take(agent, 0, told(bins, most_us=(9_000_000, 0)))
+        punctual.take(agent, 0, told(bins), LATE_S)
     summary = punctual.summary(PLENTY)
     frames = sum(sum(bins.values()) for bins in agents)
     if not frames:
@@ -52,11 +56,11 @@ def test_the_sum_over_agents_keeps_every_frame_and_its_order(agents):
     assert summary["within_fraction"] == within / frames
     spread = list(summary["excess_ms"].values())
     assert spread == sorted(spread)
-    assert spread[-1] == 9000.0
+    assert spread[-1] == int(max(at for bins in agents for at in bins) * BIN_US) / 1000.0
 
 
 def test_the_bound_is_one_slot_and_one_tick(punctual):
-    punctual.take(0, 0, told({16: 1, 40: 2, 41: 1}, {24: 4}, most_us=(63_000, 37_500)))
+    punctual.take(0, 0, told({16: 1, 40: 2, 41: 1}, {24: 4}, most_us=(63_000, 37_500)), LATE_S)
     summary = punctual.summary(PLENTY)
     assert summary["bound_ms"] == 62.5
     assert summary["within_fraction"] == 7 / 8
@@ -66,34 +70,37 @@ def test_the_bound_is_one_slot_and_one_tick(punctual):
 
 
 def test_the_last_word_of_each_process_counts(punctual):
-    punctual.take(0, 0, told({8: 5}))
-    punctual.take(0, 0, told({8: 7}))
-    punctual.take(0, 1, told({16: 2}, incarnation=1))
+    punctual.take(0, 0, told({8: 5}), LATE_S)
+    punctual.take(0, 0, told({8: 7}), LATE_S)
+    punctual.take(0, 1, told({16: 2}, incarnation=1), LATE_S)
     assert punctual.summary(PLENTY)["frames"] == 9
 
 
 def test_nothing_told_is_nothing_measured(punctual):
     assert punctual.summary(PLENTY) is None
-    punctual.take(0, 0, told({}, most_us=(0, 0)))
+    punctual.take(0, 0, told({}, most_us=(0, 0)), LATE_S)
     assert punctual.summary(PLENTY) is None
 
 
 def test_who_counts_backwards_or_speaks_for_another_process_is_not_believed(punctual):
-    punctual.take(0, 0, told({8: 5}))
+    punctual.take(0, 0, told({8: 5}), LATE_S)
     lies = [
         told({8: 4, 9: 3}),
-        told({8: 6}, most_us=(12, 62_500)),
+        told({8: 6}, most_us=(10_938, 0)),
+        told({8: 6}, most_us=(200_000_000, 0)),
+        told({8: 6, BINS - 1: 1}, most_us=(200_000_000, 0)),
+        told({8: 6}, most_us=(12_500, 2_000)),
         told({8: 6}, incarnation=1),
         b"junk",
     ]
     for lie in lies:
         with pytest.raises(WireError):
-            punctual.take(0, 0, lie)
+            punctual.take(0, 0, lie, LATE_S)
     assert punctual.summary(PLENTY)["frames"] == 5
 
 
 def test_who_counts_more_than_the_radio_delivered_is_left_out(punctual):
-    punctual.take(0, 0, told({8: 5}))
-    punctual.take(1, 0, told({0: 2**50}))
+    punctual.take(0, 0, told({8: 5}), LATE_S)
+    punctual.take(1, 0, told({0: 2**50}), LATE_S)
     assert punctual.summary(100)["frames"] == 5
     assert punctual.summary(4) is None

@@ -1,15 +1,15 @@
 """How late frames came, from what the agents count: the last word of each process, and the sum.
 
-An agent's word is its own, and no more: one that counts backwards, or speaks for a process that is
-not the agent's present one, is refused; one that counts more frames than the radio delivered to
-everybody is left out.
+An agent's word is its own, and no more: one that contradicts itself, counts backwards, or speaks
+for a process that is not the agent's present one, is refused; one that counts more frames than the
+radio delivered to everybody is left out.
 """
 
 from collections.abc import Sequence
 from itertools import accumulate
 from typing import Any
 
-from netem.wire.arrivals import BINS_A_SLOT, Arrivals, unpack_arrivals
+from netem.wire.arrivals import BINS_A_SLOT, Arrivals, bin_of, unpack_arrivals
 from netem.wire.frame import CHANNELS, WireError
 
 PERCENTILES = (1, 5, 50, 95, 99)
@@ -21,12 +21,18 @@ class Punctual:
 
     def __init__(self, slots_per_tick: int, slot_s: float) -> None:
         self._bound_bins = (1 + slots_per_tick) * BINS_A_SLOT
+        self._slot_s = slot_s
         self._bin_ms = 1e3 * slot_s / BINS_A_SLOT
         self._told: dict[tuple[int, int], Arrivals] = {}
 
-    def take(self, agent: int, incarnation: int, data: bytes) -> None:
-        """Take what an agent told of itself. Raises WireError where it is not to be believed."""
+    def take(self, agent: int, incarnation: int, data: bytes, now_s: float) -> None:
+        """Take what an agent told of itself by ``now_s`` [s].
+
+        Raises WireError where it is not to be believed.
+        """
         told = unpack_arrivals(data)
+        if max(told.most_us) > 1e6 * now_s or not self._consistent(told):
+            raise WireError("an excess that none of its frames can have")
         if told.incarnation != incarnation:
             raise WireError(f"of incarnation {told.incarnation}, where {incarnation} flies")
         before = self._told.get((agent, incarnation))
@@ -46,6 +52,11 @@ class Punctual:
         bound_ms = self._bound_bins * self._bin_ms
         each = {name: self._distribution(told, [at]) for at, name in enumerate(CHANNELS)}
         return {"bound_ms": bound_ms, **whole, "channels": each}
+
+    def _consistent(self, told: Arrivals) -> bool:
+        """Whether the greatest excess of each channel is where its last frames are."""
+        last = [max((at for at, n in enumerate(bins) if n), default=0) for bins in told.counts]
+        return last == [bin_of(most_us, self._slot_s) for most_us in told.most_us]
 
     def _distribution(
         self, told: Sequence[Arrivals], channels: Sequence[int]

@@ -28,8 +28,7 @@ from worldsim.run.slots import Opened, Recorder, SlotLoop, world_of
 from worldsim.run.team import Begin, Hold, Stop
 from worldsim.scenario.tables import Scenario
 
-SENDER_RING = 4
-SENDER_QUOTA = 2
+REPORTS_RING = 4
 LOOK_EVERY_S = 0.25
 FINAL_VERDICTS_WITHIN_S = 1.0
 MAX_VERDICTS_B = 64 * 1024
@@ -66,8 +65,8 @@ class Flight:
         self._headway = Headway(scenario.duration_s, self.loop, outside)
         self._truth, self._over = post.putter("truth"), post.putter("over")
         self._observers = [post.putter("observation", agent) for agent in rows]
-        self._commands = [post.ring("command", agent, SENDER_RING) for agent in rows]
-        self._reports = post.ring("verdicts", size=SENDER_RING)
+        self._commands = post.rings("command", rows)
+        self._reports = post.ring("verdicts", size=REPORTS_RING)
         clock = self.loop.world.clock
         self._punctual = Punctual(clock.slots_per_tick, 1.0 / clock.slot_hz)
         self._arrivals = [post.ring("arrivals", agent) for agent in rows]
@@ -132,10 +131,10 @@ class Flight:
         while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not unwanted():
             self._outside.wait(min(left_s, LOOK_EVERY_S))
             self._strike_out()
-        for agent, ring in enumerate(self._commands):
-            for data in ring.drain(SENDER_QUOTA):
+        for agent, said in self._commands.drain():
+            for data in said:
                 self._obey(agent, data)
-        for report in self._reports.drain(SENDER_RING):
+        for report in self._reports.drain(REPORTS_RING):
             self._read_report(report)
         # Each agent tells once a second, and so often it is asked, each in a slot of its own.
         for agent in range(slot % self._slots_a_report, len(self._arrivals), self._slots_a_report):
@@ -153,19 +152,25 @@ class Flight:
             self.loop.event("late", agent, detail="its process is not up by the end of boot_s")
 
     def _send(self, opened: Opened) -> None:
-        self._truth(pack(Truth(opened.slot, opened.time_s, opened.positions)))
+        incarnations = tuple(self.loop.team.incarnations)
+        self._truth(pack(Truth(opened.slot, opened.time_s, opened.positions, incarnations)))
         for agent, observation in opened.observations:
             self._observers[agent](encode(observation))
             self.punctuality.ask(agent, opened.slot, self.loop.world.latest[agent])
 
     def _obey(self, agent: int, data: bytes) -> None:
-        """Take a command; what one who takes no part had still under way moves nothing."""
+        """Take a command; what one who takes no part, or no more, had under way moves nothing."""
         if not self.loop.team.awake[agent]:
             return
         try:
-            self.loop.obey(agent, decode_command(data), data)
+            command = decode_command(data)
         except RejectedError as error:
             self._refused[error.cause] += 1
+            return
+        if command.incarnation == self.loop.team.incarnations[agent]:
+            self.loop.obey(agent, command, data)
+        else:
+            self._refused["incarnation"] += 1
 
     def _read_report(self, data: bytes) -> None:
         try:
@@ -174,9 +179,10 @@ class Flight:
             self._refused["verdicts"] += 1
 
     def _read_arrivals(self, agent: int) -> None:
+        incarnation, now_s = self.loop.team.incarnations[agent], self.loop.world.time_s
         for data in self._arrivals[agent].drain(1):
             try:
-                self._punctual.take(agent, self.loop.team.incarnations[agent], data)
+                self._punctual.take(agent, incarnation, data, now_s)
             except WireError:
                 self._refused["arrivals"] += 1
 

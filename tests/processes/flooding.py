@@ -1,0 +1,100 @@
+"""A rogue with one agent's password, who floods all that this agent may say: python -m, RUN AGENT.
+
+Junk, copies of messages of old, messages of other processes of the agent and of times to come;
+forged: of the present slot besides, as whoever takes an agent over can say them.
+"""
+
+import sys
+import time
+from itertools import cycle
+from pathlib import Path
+from random import Random
+
+import zenoh
+
+from agent.codec import decode_observation, encode
+from agent.messages import Command, Telemetry
+from netem.wire.access import login_of
+from netem.wire.arrivals import Tally
+from netem.wire.frame import Frame, Outgoing, Transmission, pack
+from netem.wire.keys import Keys
+from netem.wire.post import Post, Put
+from netem.wire.session import open_client
+from worldsim.run.roster import fleet_of
+from worldsim.run.rundir import USERS
+
+RATE_HZ = 10_000
+BURST_S = 0.005
+KINDS = 400
+STILL = (0.0, 0.0, 0.0)
+SILENT = Telemetry(STILL, 0.0, None, None, (), (), 0, -1, -1, 0)
+
+
+def command(slot: int, incarnation: int = 0) -> bytes:
+    away = (0.3, 0.3, 0.3)
+    return encode(Command(slot, incarnation, slot + 8, away, 0.0, (0.0, 0.0), SILENT))
+
+
+def transmission(slot: int, incarnation: int = 0) -> bytes:
+    return pack(Transmission(slot, incarnation, (Outgoing(0, bytes(200)), Outgoing(1, bytes(90)))))
+
+
+def arrivals(slot: int, incarnation: int = 0) -> bytes:
+    tally = Tally(0.0125)
+    tally.note((Frame(1, 0, 0, 0, b""),) * (slot % 50), (slot,) * (slot % 50), slot % 7)
+    return pack(tally.told(incarnation))
+
+
+SAYS = {"tx": transmission, "command": command, "arrivals": arrivals}
+
+
+def flood(run: Path, agent: int, seconds: float, forged: bool) -> dict[str, int]:
+    """Flood, and return how many messages were put on each topic."""
+    fleet, login = fleet_of(run), login_of(run / USERS, f"agent-{agent}")
+    with open_client(fleet.endpoint, login=login) as session:
+        post, random = Post(session, Keys(fleet.run)), Random(1)
+        puts = [(post.putter(topic, agent), cycle(_mixed(topic, random))) for topic in SAYS]
+        seen = post.ring("observation", agent)
+        begun, sent = time.monotonic(), 0
+        while (now_s := time.monotonic() - begun) < seconds:
+            for put, messages in puts:
+                _burst(put, messages, int(now_s * RATE_HZ) - sent)
+            sent = int(now_s * RATE_HZ)
+            if forged:
+                _forge(post, agent, seen.drain(1))
+            time.sleep(BURST_S)
+    return dict.fromkeys(SAYS, sent)
+
+
+def _mixed(topic: str, random: Random) -> list[bytes]:
+    make = SAYS[topic]
+    kinds = [
+        lambda: random.randbytes(random.randrange(200)),
+        lambda: make(random.randrange(100)),
+        lambda: make(random.randrange(4000), random.randrange(1, 9)),
+        lambda: make(random.randrange(10**6, 2**52), random.randrange(3)),
+    ]
+    return [random.choice(kinds)() for _ in range(KINDS)]
+
+
+def _burst(put: Put, messages: "cycle[bytes]", count: int) -> None:
+    for _ in range(count):
+        put(next(messages))
+
+
+def _forge(post: Post, agent: int, observed: list[bytes]) -> None:
+    for data in observed:
+        slot = decode_observation(data).slot
+        for topic, make in SAYS.items():
+            post.putter(topic, agent)(make(slot))
+
+
+def main() -> None:
+    run, agent, seconds, *forged = sys.argv[1:]
+    print("floods", flush=True)
+    print(flood(Path(run), int(agent), float(seconds), forged == ["forged"]), flush=True)
+
+
+if __name__ == "__main__":
+    zenoh.init_log_from_env_or("error")
+    main()
