@@ -120,9 +120,17 @@ def _shown(run: Path) -> int:
     from worldsim.scenario.file import as_toml
 
     answer = ask(run, Request())
-    print(f"# at {answer.t_s:.2f} s, {'parted' if answer.parted else 'not parted'}")
-    print(as_toml({"netem": answer.conditions}), end="")
+    standing = {kind: each for kind, each in answer.barriers.items() if each}
+    told = [_counted(kind, len(each)) for kind, each in standing.items() if kind != "partition"]
+    parted = "parted" if "partition" in standing else "not parted"
+    print(f"# at {answer.t_s:.2f} s, {', '.join([parted, *told])}")
+    conditions = {key: value for key, value in answer.conditions.items() if value != {}}
+    print(as_toml({"netem": conditions, **standing}), end="")
     return 0
+
+
+def _counted(kind: str, count: int) -> str:
+    return f"{count} {kind}{'s' if count > 1 else ''}"
 
 
 def _formation(file: Path) -> dict[str, Any]:

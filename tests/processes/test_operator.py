@@ -42,7 +42,11 @@ def test_a_flying_fleet_does_what_it_is_told_and_refuses_what_cannot_be(
     status, said = told("mission", "column.toml", "--to", "2")
     assert (status, "formation agent 2: formation column" in said) == (0, True)
     assert told("fault", "kill", "3", "--for", "1")[0] == 0
-    assert "range_m = 6" in told("netem", "show")[1]
+    assert told("netem", "jam", "centre_m=[9,9,9]", "radius_m=0.5", "--for", "8")[0] == 0
+    shown = told("netem", "show")[1]
+    assert "range_m = 6" in shown
+    assert "not parted, 1 jam" in shown
+    assert "radius_m = 0.5" in shown
     paused = pids(run)["agent-1"]
     assert told("fault", "pause", "1")[0] == 0
     eventually(lambda: state(paused) == "T", 5.0, lambda: state(paused))
@@ -59,7 +63,7 @@ def test_a_flying_fleet_does_what_it_is_told_and_refuses_what_cannot_be(
     assert [phase["formation"] for phase in phases] == ["line", "column"]
     assert phases[1]["residual_m"] < 0.12
     by_operator = [e["kind"] for e in events_of(run) if e.get("by") == "operator"]
-    assert by_operator == ["netem", "formation", "kill", "pause", "resume"]
+    assert by_operator == ["netem", "formation", "kill", "jam", "pause", "resume"]
 
 
 def test_of_a_fleet_by_hand_the_radio_is_changed_and_no_process(

@@ -1,5 +1,6 @@
 """What an operator asks for: done at once, told as the operator's, or refused with a reason."""
 
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from worldsim.scenario.file import formation_tables, load
 DEPLOY = Path("deploy")
 WEDGE = DEPLOY / "scenarios/wedge-9.toml"
 LINES = formation_tables(DEPLOY / "formations/three-horizontal-lines.toml")
+NOTHING: dict[str, list[Any]] = {"partition": [], "jam": [], "flap": []}
 JOINED = "[{ at_s = 15, join = 1 }]"
 
 
@@ -53,6 +55,28 @@ def test_a_change_of_the_radio_holds_and_is_undone() -> None:
     assert operated.fleet.verdicts.fates["dropped_loss"] > 0
 
 
+def test_what_stands_between_radios_is_told_while_it_does() -> None:
+    operated = Operated(
+        event="[{ at_s = 0.5, jam = { centre_m = [0, 0, 0], radius_m = 2 }, for_s = 3 }]"
+    )
+    operated.ask(flap={"period_s": 2, "links": [[0, 1]]}, for_s=1)
+    operated.ask(flap={"period_s": 3})
+    told = operated.ask(partition=[[0, 1], [2]]).barriers
+    assert told["partition"][0]["groups"] == ((0, 1), (2,))
+    assert [jam["since_s"] for jam in told["jam"]] == [0.5]
+    assert [(flap["period_s"], flap["links"]) for flap in told["flap"]] == [
+        (2.0, ((0, 1),)),
+        (3.0, ()),
+    ]
+    operated.fly(2.5)
+    ring = operated.ask(partition={"kind": "ring", "groups": [[0, 1, 2, 3]]}, for_s=0.5).barriers
+    assert [each["kind"] for each in ring["partition"]] == ["ring"]
+    assert [flap["period_s"] for flap in ring["flap"]] == [3.0]
+    operated.fly(4.0)
+    left = operated.ask().barriers
+    assert (left["partition"], left["jam"], len(left["flap"])) == ([], [], 1)
+
+
 def test_processes_are_struck_and_come_back() -> None:
     operated = Operated()
     assert [e["agent"] for e in operated.ask(kill=[3, 2], for_s=1.0).events] == [2, 3]
@@ -90,6 +114,14 @@ REFUSED = [
     ({"resume": ["all"]}, "resume: nobody there whom ['all'] means"),
     ({"join": 1}, "join: 1; fleet.spare leaves room for 0"),
     ({"heal": True}, "heal: no partition to heal"),
+    ({"jam": {"centre_m": [0, 0, 0], "radius_m": -1}}, "jam.radius_m: got -1"),
+    ({"flap": {"period_s": 2, "links": [[0, 9]]}}, "flap.links[0]: no agent 9"),
+    ({"netem": {}}, "netem: no key to set"),
+    ({"netem": {"loss_percent": nan}}, "netem.loss_percent: nothing, or a number that is not"),
+    ({"netem": {"loss_percent": 5}, "for_s": nan}, "for_s: nothing, or a number that is not"),
+    ({"jam": {"centre_m": [0, inf, 0], "radius_m": 1}}, "jam.centre_m[1]: nothing, or a number"),
+    ({"netem": {"distribution": "poisson"}}, "netem.distribution: "),
+    ({"netem": {"gemodel": {"p_percent": 5, "r_percent": 500}}}, "netem.gemodel.r_percent: got 5"),
     ({"partition": [[0, 1], [1]]}, "partition[1]: agent 1 is named twice"),
     ({"netem": {"loss_percent": 101}}, "netem.loss_percent: got 101"),
     ({"netem": {"los_percent": 1}}, "netem.los_percent: unknown key"),
@@ -108,13 +140,14 @@ REFUSED = [
 @pytest.mark.parametrize(("asked", "reason"), REFUSED, ids=[reason for _, reason in REFUSED])
 def test_what_cannot_be_is_refused_and_changes_nothing(asked: dict[str, Any], reason: str) -> None:
     operated = Operated()
-    before, conditions = len(operated.loop.events), operated.ask().conditions
+    before, radio = len(operated.loop.events), operated.ask()
     with pytest.raises(RequestError) as refusal:
         operated.ask(**asked)
     assert str(refusal.value).startswith(reason)
     assert "\n" not in str(refusal.value)
     assert len(operated.loop.events) == before
-    assert (operated.ask().conditions, operated.ask().parted) == (conditions, False)
+    assert operated.ask() == radio
+    assert radio.barriers == NOTHING
     assert operated.loop.team.awake.all()
 
 
@@ -132,10 +165,14 @@ def test_by_hand_processes_are_left_alone_and_the_radio_is_not() -> None:
     operated = Operated(launcher=False)
     with pytest.raises(RequestError, match="kill: this fleet has no launcher"):
         operated.ask(kill=[2])
-    assert operated.ask(partition=[[0, 1]]).parted
+    assert operated.ask(partition=[[0, 1]]).barriers["partition"]
 
 
-@pytest.mark.parametrize("asked", [b"", b"\xff", b"[]", b'{"event": 3}', bytes(MAX_REQUEST_B + 1)])
+JUNK = [b"", b"\xff", b"[]", b'{"event": 3}', bytes(MAX_REQUEST_B + 1)]
+JUNK += [b'{"event":{"netem":' + b"[" * deep + b"]" * deep + b"}}" for deep in (400, 30_000)]
+
+
+@pytest.mark.parametrize("asked", JUNK, ids=range(len(JUNK)))
 def test_what_is_no_request_is_refused(asked: bytes) -> None:
     operated = Operated(0.0)
     with pytest.raises(RequestError):

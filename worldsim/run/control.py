@@ -11,7 +11,9 @@ import msgspec
 import numpy as np
 import zenoh
 
+from netem.messages import Conditions
 from netem.wire.post import Post, Waiting, drained
+from worldsim.run.barriers import in_force
 from worldsim.run.faults import Order
 from worldsim.run.meaning import Deed
 from worldsim.run.slots import Event, SlotLoop
@@ -42,12 +44,15 @@ class Request(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
 
 
 class Answer(msgspec.Struct, frozen=True):
-    """What came of a request: the time [s], the events, and the radio as it is since then."""
+    """What came of a request: the time [s], the events, and the radio as it is since then.
+
+    barriers: what stands between radios, see ``in_force``.
+    """
 
     t_s: float
     events: list[dict[str, Any]]
     conditions: dict[str, Any]
-    parted: bool
+    barriers: dict[str, list[dict[str, Any]]]
 
 
 class RequestError(ValueError):
@@ -73,6 +78,8 @@ class Control:
         return self._told(self._loop.events[before:])
 
     def _event(self, keys: dict[str, Any]) -> EventTable:
+        if (unsaid := _unsaid(keys)) is not None:
+            raise RequestError(f"{unsaid}: nothing, or a number that is not finite")
         try:
             event = decode({**keys, "at_s": self._loop.world.time_s}, EventTable, "")
         except ScenarioError as error:
@@ -80,6 +87,8 @@ class Control:
         broken = broken_now(self._scenario, event, self._present())
         if broken is not None:
             raise RequestError(": ".join(part for part in broken if part))
+        if event.netem == Conditions():
+            raise RequestError("netem: no key to set")
         if event.kind in UPON_PROCESSES and not self._launcher:
             raise RequestError(f"{event.kind}: this fleet has no launcher; do it by hand")
         return event
@@ -124,7 +133,7 @@ class Control:
             round(self._loop.world.time_s, 6),
             [{k: v for k, v in event.items() if k not in UNSPOKEN} for event in events],
             msgspec.to_builtins(timeline.conditions),
-            timeline.parted,
+            in_force(self._loop.events),
         )
 
 
@@ -133,8 +142,21 @@ def _request(asked: bytes) -> Request:
         raise RequestError(f"{len(asked)} B; a request has {MAX_REQUEST_B} B at most")
     try:
         return msgspec.json.decode(asked, type=Request)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise RequestError(f"a request that cannot be read: {error}") from error
+
+
+def _unsaid(keys: dict[str, Any]) -> str | None:
+    """Return where a request says nothing, or None; that is what JSON makes of NaN."""
+    waiting: list[tuple[str, Any]] = list(keys.items())
+    for path, value in waiting:
+        if value is None:
+            return path
+        if isinstance(value, dict):
+            waiting += [(f"{path}.{key}", inner) for key, inner in value.items()]
+        elif isinstance(value, list):
+            waiting += [(f"{path}[{at}]", inner) for at, inner in enumerate(value)]
+    return None
 
 
 class Reception:
