@@ -85,6 +85,7 @@ def test_a_packet_that_is_nowhere_violates_i8(small: Path) -> None:
 
 def test_how_late_the_radio_was_is_told_in_ms(small: Path, flight: Flight) -> None:
     assert summary(small, flight)["delivery_late_ms"] is None
+    assert summary(small, flight)["delivery"] is None
     late = msgspec.structs.replace(flight.verdicts, late_s=(0.0005, 0.25))
     told = summary(small, flight, verdicts=late)
     assert told["delivery_late_ms"] == {"median": 0.5, "worst": 250.0}

@@ -5,6 +5,7 @@ forged: of the present slot besides, as whoever takes an agent over can say them
 """
 
 import sys
+import threading
 import time
 from itertools import cycle
 from pathlib import Path
@@ -55,14 +56,14 @@ def flood(run: Path, agent: int, seconds: float, forged: bool) -> dict[str, int]
         post, random = Post(session, Keys(fleet.run)), Random(1)
         puts = [(post.putter(topic, agent), cycle(_mixed(topic, random))) for topic in SAYS]
         seen = post.ring("observation", agent)
-        begun, sent = time.monotonic(), 0
+        begun, sent, pause = time.monotonic(), 0, threading.Event()
         while (now_s := time.monotonic() - begun) < seconds:
             for put, messages in puts:
                 _burst(put, messages, int(now_s * RATE_HZ) - sent)
             sent = int(now_s * RATE_HZ)
             if forged:
                 _forge(post, agent, seen.drain(1))
-            time.sleep(BURST_S)
+            pause.wait(BURST_S)
     return dict.fromkeys(SAYS, sent)
 
 

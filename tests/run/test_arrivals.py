@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from netem.wire.arrivals import BINS, BINS_A_SLOT, Arrivals
 from netem.wire.frame import WireError, pack
-from worldsim.run.arrivals import Punctual, quantile
+from worldsim.run.arrivals import ArrivalBook, quantile
 
 SLOT_S = 0.0125
 BIN_US = 1e6 * SLOT_S / BINS_A_SLOT
@@ -23,8 +23,8 @@ def told(bins, multihop=None, incarnation=0, most_us=None):
 
 
 @pytest.fixture
-def punctual():
-    return Punctual(4, SLOT_S)
+def book():
+    return ArrivalBook(4, SLOT_S)
 
 
 counts = st.lists(st.integers(0, 50), min_size=1, max_size=30).filter(any)
@@ -42,10 +42,10 @@ def test_a_quantile_is_the_least_bin_that_has_so_many_at_or_below_it(bins, perce
 @settings(derandomize=True, deadline=None, max_examples=100)
 @given(st.lists(st.dictionaries(st.integers(0, BINS - 1), st.integers(1, 99)), max_size=4))
 def test_the_sum_over_agents_keeps_every_frame_and_its_order(agents):
-    punctual = Punctual(4, SLOT_S)
+    book = ArrivalBook(4, SLOT_S)
     for agent, bins in enumerate(agents):
-        punctual.take(agent, 0, told(bins), LATE_S)
-    summary = punctual.summary(PLENTY)
+        book.take(agent, 0, told(bins), LATE_S)
+    summary = book.summary(PLENTY)
     frames = sum(sum(bins.values()) for bins in agents)
     if not frames:
         assert summary is None
@@ -59,9 +59,9 @@ def test_the_sum_over_agents_keeps_every_frame_and_its_order(agents):
     assert spread[-1] == int(max(at for bins in agents for at in bins) * BIN_US) / 1000.0
 
 
-def test_the_bound_is_one_slot_and_one_tick(punctual):
-    punctual.take(0, 0, told({16: 1, 40: 2, 41: 1}, {24: 4}, most_us=(63_000, 37_500)), LATE_S)
-    summary = punctual.summary(PLENTY)
+def test_the_bound_is_one_slot_and_one_tick(book):
+    book.take(0, 0, told({16: 1, 40: 2, 41: 1}, {24: 4}, most_us=(63_000, 37_500)), LATE_S)
+    summary = book.summary(PLENTY)
     assert summary["bound_ms"] == 62.5
     assert summary["within_fraction"] == 7 / 8
     assert summary["channels"]["local"]["within_fraction"] == 3 / 4
@@ -69,21 +69,21 @@ def test_the_bound_is_one_slot_and_one_tick(punctual):
     assert summary["channels"]["local"]["excess_ms"]["max"] == 63.0
 
 
-def test_the_last_word_of_each_process_counts(punctual):
-    punctual.take(0, 0, told({8: 5}), LATE_S)
-    punctual.take(0, 0, told({8: 7}), LATE_S)
-    punctual.take(0, 1, told({16: 2}, incarnation=1), LATE_S)
-    assert punctual.summary(PLENTY)["frames"] == 9
+def test_the_last_word_of_each_process_counts(book):
+    book.take(0, 0, told({8: 5}), LATE_S)
+    book.take(0, 0, told({8: 7}), LATE_S)
+    book.take(0, 1, told({16: 2}, incarnation=1), LATE_S)
+    assert book.summary(PLENTY)["frames"] == 9
 
 
-def test_nothing_told_is_nothing_measured(punctual):
-    assert punctual.summary(PLENTY) is None
-    punctual.take(0, 0, told({}, most_us=(0, 0)), LATE_S)
-    assert punctual.summary(PLENTY) is None
+def test_nothing_told_is_nothing_measured(book):
+    assert book.summary(PLENTY) is None
+    book.take(0, 0, told({}, most_us=(0, 0)), LATE_S)
+    assert book.summary(PLENTY) is None
 
 
-def test_who_counts_backwards_or_speaks_for_another_process_is_not_believed(punctual):
-    punctual.take(0, 0, told({8: 5}), LATE_S)
+def test_who_counts_backwards_or_speaks_for_another_process_is_not_believed(book):
+    book.take(0, 0, told({8: 5}), LATE_S)
     lies = [
         told({8: 4, 9: 3}),
         told({8: 6}, most_us=(10_938, 0)),
@@ -95,12 +95,12 @@ def test_who_counts_backwards_or_speaks_for_another_process_is_not_believed(punc
     ]
     for lie in lies:
         with pytest.raises(WireError):
-            punctual.take(0, 0, lie, LATE_S)
-    assert punctual.summary(PLENTY)["frames"] == 5
+            book.take(0, 0, lie, LATE_S)
+    assert book.summary(PLENTY)["frames"] == 5
 
 
-def test_who_counts_more_than_the_radio_delivered_is_left_out(punctual):
-    punctual.take(0, 0, told({8: 5}), LATE_S)
-    punctual.take(1, 0, told({0: 2**50}), LATE_S)
-    assert punctual.summary(100)["frames"] == 5
-    assert punctual.summary(4) is None
+def test_who_counts_more_than_the_radio_delivered_is_left_out(book):
+    book.take(0, 0, told({8: 5}), LATE_S)
+    book.take(1, 0, told({0: 2**50}), LATE_S)
+    assert book.summary(100)["frames"] == 5
+    assert book.summary(4) is None

@@ -16,7 +16,7 @@ PERCENTILES = (1, 5, 50, 95, 99)
 Counts = Sequence[int]
 
 
-class Punctual:
+class ArrivalBook:
     """What agents told of frames that came; slots_per_tick and slot_s [s] as in the run's clock."""
 
     def __init__(self, slots_per_tick: int, slot_s: float) -> None:

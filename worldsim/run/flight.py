@@ -16,7 +16,7 @@ from netem.wire.frame import WireError, pack, unpack
 from netem.wire.post import Post
 from worldsim.judge.tick import Packets
 from worldsim.run.admission import PROCESS_COMMAND_TICKS
-from worldsim.run.arrivals import Punctual
+from worldsim.run.arrivals import ArrivalBook
 from worldsim.run.control import Control, Reception
 from worldsim.run.hands import Hands
 from worldsim.run.headway import Headway
@@ -68,7 +68,7 @@ class Flight:
         self._commands = post.rings("command", rows)
         self._reports = post.ring("verdicts", size=REPORTS_RING)
         clock = self.loop.world.clock
-        self._punctual = Punctual(clock.slots_per_tick, 1.0 / clock.slot_hz)
+        self._book = ArrivalBook(clock.slots_per_tick, 1.0 / clock.slot_hz)
         self._arrivals = [post.ring("arrivals", agent) for agent in rows]
         self._slots_a_report = round(clock.slot_hz)
 
@@ -81,7 +81,7 @@ class Flight:
     def delivery(self) -> dict[str, Any] | None:
         """How late frames came, as far as the agents told."""
         delivered = self.verdicts.fates.get("delivered", 0) if self.verdicts is not None else 0
-        return self._punctual.summary(delivered)
+        return self._book.summary(delivered)
 
     @property
     def refused(self) -> Mapping[str, int]:
@@ -182,7 +182,7 @@ class Flight:
         incarnation, now_s = self.loop.team.incarnations[agent], self.loop.world.time_s
         for data in self._arrivals[agent].drain(1):
             try:
-                self._punctual.take(agent, incarnation, data, now_s)
+                self._book.take(agent, incarnation, data, now_s)
             except WireError:
                 self._refused["arrivals"] += 1
 
