@@ -66,7 +66,7 @@ class Flown(NamedTuple):
     frame: Frame
 
 
-class Senses(NamedTuple):
+class Senses(msgspec.Struct, frozen=True, gc=False):
     """What a controller decides on: own pose, what is heard, who is known, what is near.
 
     vehicles: bodies within the proximity sensor, relative to the own centre [m; world axes].
@@ -89,7 +89,7 @@ class Senses(NamedTuple):
     obstacles: tuple[Vector, ...] = ()
 
 
-class Intent(NamedTuple):
+class Intent(msgspec.Struct, frozen=True, gc=False):
     """What a controller wants, before the safety filter.
 
     wanted [m/s; world frame]: the velocity it would like, whatever its heading; velocity: what it

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from math import dist, hypot, inf
 from typing import NamedTuple
 
+import msgspec
+
 from agent.codec import RejectedError, decode_beacon, decode_gossip
 from agent.comms.broadcast import LOCAL, Broadcast, OwnState
 from agent.comms.gossip import Table
@@ -45,7 +47,7 @@ MAX_TOLD = 256
 """So many neighbours are told of at most: a longer array makes a command that is refused."""
 
 
-class Outbox(NamedTuple):
+class Outbox(msgspec.Struct, frozen=True, gc=False):
     """What an agent says at the end of a step: to its vehicle, and (channel, payload) to all."""
 
     command: Command
@@ -68,7 +70,7 @@ class Agent:
         self.id = setup.id
         self.rejected: Counter[str] = Counter()
         self._incarnation = setup.incarnation
-        self._decoders = decoders
+        self._decode_beacon, self._decode_gossip = decoders.beacon, decoders.gossip
         self._slack_s = 2.0 * tick_s
         self._implausible2 = (IMPLAUSIBLE * setup.fleet_max_speed_mps) ** 2
         self._command_slots = setup.command_ticks * setup.slots_per_tick
@@ -140,7 +142,7 @@ class Agent:
             self.rejected[error.cause] += 1
 
     def _hear_beacon(self, source: int, payload: bytes, now_s: float) -> None:
-        beacon = self._decoders.beacon(payload)
+        beacon = self._decode_beacon(payload)
         if beacon.id != source:
             raise RejectedError("spoofed", f"{source} says it is {beacon.id}")
         u, v, w = beacon.velocity
@@ -152,7 +154,7 @@ class Agent:
             self._missions.glimpse(beacon)
 
     def _hear_gossip(self, source: int, payload: bytes, now_s: float) -> None:
-        gossip = self._decoders.gossip(payload)
+        gossip = self._decode_gossip(payload)
         if gossip.id != source:
             raise RejectedError("spoofed", f"{source} says it is {gossip.id}")
         self._table.adopt(gossip, now_s, self._slack_s)
@@ -261,7 +263,7 @@ class Agent:
             intent.force,
             intent.target,
             intent.place,
-            tuple([other.id for other in senses.neighbours[:MAX_TOLD]]),
+            self._neighbours.sorted_ids[:MAX_TOLD],
             tuple([(CAUSES.index(cause), n) for cause, n in sorted(self.rejected.items())]),
             self._missions.flown.key,
             self._standing.tier,

@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from math import isfinite
 
+from msgspec.structs import replace
+
 from agent.controller import Controller, Intent, Senses, load
 from agent.messages import Vector
 from agent.setup import AgentSetup
@@ -69,7 +71,8 @@ def _converted(intent: Intent) -> Intent:
     if intent.force < 0.0:
         raise ValueError(f"the Intent's force is {intent.force:g}; it is a magnitude, at least 0")
     pitch, roll = _numbers("tilt", intent.tilt, 2, MAX_ANY)
-    return intent._replace(
+    return replace(
+        intent,
         wanted=_vector("wanted", intent.wanted, MAX_ANY),
         velocity=_vector("velocity", intent.velocity, MAX_ANY),
         yaw=_numbers("yaw", (intent.yaw,), 1, MAX_ANY)[0],

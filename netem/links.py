@@ -4,7 +4,7 @@ A link's memory belongs to it and one channel, and moves on only with frames tha
 link: in range, not barred, sent. They come in the order of their counts.
 """
 
-from typing import NamedTuple
+import msgspec
 
 from netem.chance import SHARING, Numbers, draw
 from netem.link import FRESH, LOST_TO_QUEUE, LinkModel, Memory, Verdict, twice, verdict
@@ -12,7 +12,7 @@ from netem.near import Near
 from netem.wire.frame import Frame
 
 
-class Sending(NamedTuple):
+class Sending(msgspec.Struct, frozen=True, gc=False):
     """A frame on its way: its key, when it was sent, how long its sender's queue took [s]."""
 
     frame: Frame

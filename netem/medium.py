@@ -202,7 +202,7 @@ class Medium:
 
     def _cross_clean(self, sending: Sending, near: Near, delay_s: float) -> None:
         """Deliver a frame to all who are near, after the same delay [s]."""
-        frame, key, sent_s, _ = sending
+        frame, key, sent_s = sending.frame, sending.key, sending.sent_s
         noted = HEAD(*key) + FATE(0, DELIVERED, delay_s, -1.0)
         entry = (sent_s + delay_s, *key, 0, frame)
         queues, pages = self._queues, self._journal.pages

@@ -45,7 +45,7 @@ class Table:
     def adopt_beacon(self, beacon: Beacon) -> None:
         """Take what a neighbour said of itself just now."""
         who, version = beacon.id, (beacon.incarnation, beacon.sequence)
-        if version > self._last.get(who, NEVER) and self._has_room(who):
+        if version > self._last.get(who, NEVER) and (who in self._newest or self._has_room):
             self._last[who] = version
             self._newest[who] = beacon
 
@@ -61,7 +61,7 @@ class Table:
             plausible = record.id != self._own_id and earliest_s <= record.stamp_s <= latest_s
             version = (record.incarnation, record.version)
             news = plausible and version > self._last.get(record.id, NEVER)
-            if news and self._has_room(record.id):
+            if news and (record.id in self._newest or self._has_room):
                 self._last[record.id] = version
                 self._newest[record.id] = record
                 lag_s = self._lag_s.get(record.id, 0.0)
@@ -129,8 +129,9 @@ class Table:
     def _may_be_silent_s(self, who: int) -> float:
         return self._relayed_silence_s + 2.0 * self._lag_s.get(who, 0.0)
 
-    def _has_room(self, who: int) -> bool:
-        return len(self._newest) < MAX_KNOWN or who in self._newest
+    @property
+    def _has_room(self) -> bool:
+        return len(self._newest) < MAX_KNOWN
 
 
 def _record(newest: Beacon | Record) -> Record:

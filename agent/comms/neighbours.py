@@ -28,17 +28,18 @@ MARGIN = 1.2
 class Neighbour:
     """One neighbour: its last beacon, and the radio's quality as its sequence numbers show it."""
 
-    __slots__ = ("beacon", "latency_s", "mean_gap", "place")
+    __slots__ = ("beacon", "key", "latency_s", "mean_gap", "place")
 
     def __init__(self, beacon: Beacon, latency_s: float) -> None:
         self.beacon = beacon
+        self.key = (beacon.incarnation, beacon.sequence)
         self.latency_s = latency_s
         self.mean_gap = 1.0
         self.place = _claim(beacon)
 
-    def hear(self, beacon: Beacon, latency_s: float) -> None:
-        """Take a newer beacon that was under way for ``latency_s`` [s]."""
-        before = self.beacon
+    def hear(self, beacon: Beacon, key: tuple[int, int], latency_s: float) -> None:
+        """Take a newer beacon that was under way for ``latency_s`` [s]; key: which it is."""
+        before, self.key = self.beacon, key
         if beacon.incarnation == before.incarnation:
             gap = beacon.sequence - before.sequence
             self.mean_gap += SMOOTHING * (gap - self.mean_gap)
@@ -60,8 +61,8 @@ class Neighbour:
 class Neighbours:
     """The neighbours of one agent.
 
-    beacon_hz: how often each is expected; slack_s: how far ahead of the own observation a stamp
-    may be, for a message can overtake an observation [s].
+    sorted_ids: who is heard directly. beacon_hz: how often each is expected; slack_s: how far ahead
+    of the own observation a stamp may be, for a message can overtake an observation [s].
     """
 
     def __init__(self, own_id: int, beacon_hz: float, slack_s: float) -> None:
@@ -70,6 +71,7 @@ class Neighbours:
         self._slack_s = slack_s
         self._known: dict[int, Neighbour] = {}
         self._in_order: list[Neighbour] = []
+        self.sorted_ids: tuple[int, ...] = ()
         self._last: dict[int, tuple[int, int]] = {}
 
     def hear(self, beacon: Beacon, now_s: float, own_sent_s: dict[int, float]) -> None:
@@ -78,10 +80,11 @@ class Neighbours:
         own_sent_s: when each of the own recent sequences was sent [s]; a beacon that echoes one
         was sent after it (E22), whatever its stamp says.
         """
-        who, key = beacon.id, (beacon.incarnation, beacon.sequence)
-        if who == self._own_id:
+        who, key, own_id = beacon.id, (beacon.incarnation, beacon.sequence), self._own_id
+        if who == own_id:
             raise RejectedError("spoofed", "a beacon under one's own id")
-        if key <= self._last.get(who, NONE_YET):
+        known = self._known.get(who)
+        if key <= (known.key if known is not None else self._last.get(who, NONE_YET)):
             raise RejectedError("replay", f"sequence {key} of {who} is not new")
         age_s = now_s - beacon.stamp_s
         if age_s < -self._slack_s:
@@ -89,22 +92,20 @@ class Neighbours:
         if age_s > MAX_AGE_S:
             raise RejectedError("old", f"a stamp {age_s:.3f} s old")
         for echoed, sequence in beacon.echoes:
-            if echoed == self._own_id:
+            if echoed == own_id:
                 if beacon.stamp_s + self._slack_s < own_sent_s.get(sequence, -inf):
                     raise RejectedError("offset", "older than a beacon it has heard")
                 break
-        self._last[who] = key
         latency_s = age_s if age_s > 0.0 else 0.0
-        known = self._known.get(who)
-        if known is None:
+        if known is not None:
+            known.hear(beacon, key, latency_s)
+        else:
             self._known[who] = Neighbour(beacon, latency_s)
             self._put_in_order()
-        else:
-            known.hear(beacon, latency_s)
 
     @property
     def ids(self) -> Collection[int]:
-        """Who is heard directly."""
+        """Who is heard directly; to look one up."""
         return self._known.keys()
 
     def forget_silent(self, now_s: float) -> dict[int, float]:
@@ -120,7 +121,7 @@ class Neighbours:
             and now_s - stamp_s > known.silence_s(self._beacon_hz)
         }
         for who in gone:
-            del self._known[who]
+            self._last[who] = self._known.pop(who).key
         if gone:
             self._put_in_order()
         return gone
@@ -137,14 +138,14 @@ class Neighbours:
         heard = []
         for known in self._in_order:
             beacon = known.beacon
-            age_s = now_s - beacon.stamp_s
-            along = 0.0 if age_s < 0.0 else age_s if age_s < FORWARD_S else FORWARD_S
-            (x, y, z), (u, v, w) = beacon.position, beacon.velocity
+            since_s = now_s - beacon.stamp_s
+            age_s = since_s if since_s > 0.0 else 0.0
+            along = age_s if age_s < FORWARD_S else FORWARD_S
+            x, y, z = beacon.position
+            u, v, w = velocity = beacon.velocity
             position = (x + along * u, y + along * v, z + along * w)
             place = known.place if beacon.mission == mission else None
-            heard.append(
-                Heard(beacon.id, max(0.0, age_s), position, beacon.velocity, beacon.target, place)
-            )
+            heard.append(Heard(beacon.id, age_s, position, velocity, beacon.target, place))
         return tuple(heard)
 
     def behind(self, mission: int) -> bool:
@@ -160,7 +161,8 @@ class Neighbours:
         return tuple([(each.beacon.id, each.beacon.sequence) for each in self._in_order])
 
     def _put_in_order(self) -> None:
-        self._in_order = [self._known[who] for who in sorted(self._known)]
+        self.sorted_ids = tuple(sorted(self._known))
+        self._in_order = [self._known[who] for who in self.sorted_ids]
 
 
 def _claim(beacon: Beacon) -> Place | None:

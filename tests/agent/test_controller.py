@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from agent.comms.mission import Missions
 from agent.controller import ControllerError, Heard, Intent, Senses, load
@@ -110,12 +111,12 @@ def test_what_is_plain_is_taken_as_it_is() -> None:
 def test_numbers_of_numpy_become_plain_floats() -> None:
     zero, here = np.zeros(3, dtype=np.float32), np.array(HERE)
     taken = plain(Intent(zero, zero, np.float64(0.5), np.float32(0.0), here, here))
-    assert taken == HOVER._replace(target=HERE)
+    assert taken == replace(HOVER, target=HERE)
     assert {type(number) for number in (*taken.wanted, *taken.heading_for, taken.yaw)} == {float}
 
 
 def test_far_from_the_origin_is_no_fault() -> None:
-    far = HOVER._replace(heading_for=(-9e5, 9e5, 100.5), target=(9e5, 0.0, 0.0), force=1e6)
+    far = replace(HOVER, heading_for=(-9e5, 9e5, 100.5), target=(9e5, 0.0, 0.0), force=1e6)
     assert plain(far) == far
 
 
@@ -137,7 +138,7 @@ def test_far_from_the_origin_is_no_fault() -> None:
 )
 def test_what_no_command_may_hold_is_refused_by_name(field: str, value: Any) -> None:
     with pytest.raises(ValueError, match=f"Intent's {field} "):
-        plain(HOVER._replace(**{field: value}))
+        plain(replace(HOVER, **{field: value}))
 
 
 @pytest.mark.parametrize(
@@ -145,8 +146,8 @@ def test_what_no_command_may_hold_is_refused_by_name(field: str, value: Any) -> 
     [
         (ZeroDivisionError("division by zero"), "ZeroDivisionError: division by zero"),
         (None, "TypeError: decide returned NoneType, not an Intent"),
-        (HOVER._replace(yaw=nan), "ValueError: the Intent's yaw holds nan; at most 100 is allowed"),
-        (HOVER._replace(wanted=("a", "b", "c")), "TypeError: "),
+        (replace(HOVER, yaw=nan), "ValueError: the Intent's yaw holds nan; at most 100 is allowed"),
+        (replace(HOVER, wanted=("a", "b", "c")), "TypeError: "),
     ],
 )
 def test_a_failure_in_flight_names_controller_agent_and_time(
@@ -172,7 +173,7 @@ def heard(x: float, velocity: tuple[float, float, float] = REST) -> Heard:
 
 
 def flock(*neighbours: Heard) -> Intent:
-    senses = SENSES._replace(position=REST, yaw=0.0, neighbours=neighbours)
+    senses = replace(SENSES, position=REST, yaw=0.0, neighbours=neighbours)
     return Flocking(setup_of("flocking")).decide(senses)
 
 

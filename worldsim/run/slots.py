@@ -6,7 +6,6 @@ of a slot, brings the observations to the agents and their commands back to ``ob
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from math import nan
 from typing import Any, Protocol
 
@@ -54,8 +53,7 @@ class Recorder(Protocol):
         """Keep one event: ``t_s``, ``kind``, ``agent`` and what else belongs to the kind."""
 
 
-@dataclass(frozen=True, slots=True)
-class Opened:
+class Opened(msgspec.Struct, frozen=True, gc=False):
     """A slot as it begins: the truth for the medium, an observation for each agent that steps.
 
     positions: where the radios are [m; world frame], None for an agent that takes no part.

@@ -105,7 +105,7 @@ class VirtualFleet:
             for frame in unpack_batch(inbox.popleft()).frames:
                 core.receive(frame.source, frame.channel, frame.payload, observation.time_s)
         outbox = core.step(observation)
-        outgoing = tuple(Outgoing(channel, payload) for channel, payload in outbox.frames)
+        outgoing = tuple([Outgoing(channel, payload) for channel, payload in outbox.frames])
         sent = pack(Transmission(opened.slot, outbox.command.incarnation, outgoing))
         self._medium.transmit(agent, opened.time_s, unpack_transmission(sent))
         command = encode(outbox.command)

@@ -1,7 +1,6 @@
 """What vehicles sense of one another and of obstacles near by, for all that look at once."""
 
-from typing import NamedTuple
-
+import msgspec
 import numpy as np
 
 from agent.messages import Vector
@@ -15,7 +14,7 @@ MAX_POINTS = 32
 """Of so many obstacles the nearest points are told at most: what an Observation holds."""
 
 
-class Sensed(NamedTuple):
+class Sensed(msgspec.Struct, frozen=True, gc=False):
     """Bodies and nearest points of obstacles, relative to the own centre [m; world axes]."""
 
     vehicles: tuple[Vector, ...]

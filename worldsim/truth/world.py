@@ -112,7 +112,15 @@ class World:
         yaw = self.fleet.yaw.take(looking).tolist()
         return [
             Observation(
-                slot, time_s, (x, y, z), (u, v, w), heading, *each, (), scans.get(agent, ())
+                slot,
+                time_s,
+                (x, y, z),
+                (u, v, w),
+                heading,
+                each.vehicles,
+                each.obstacles,
+                (),
+                scans.get(agent, ()),
             )
             for agent, (x, y, z), (u, v, w), heading, each in zip(
                 looking, position, velocity, yaw, sensed, strict=True

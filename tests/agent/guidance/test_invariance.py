@@ -77,7 +77,7 @@ def decided(controller, seed, move=STAY, names=tuple(range(TEAM))):
         Flown(0, formation, Frame(move.shift, move.yaw)),
     )
     mind = load(controller)(setup(names[0]))
-    mind.decide(senses._replace(now_s=0.0))  # it listens first
+    mind.decide(msgspec.structs.replace(senses, now_s=0.0))  # it listens first
     return mind.decide(senses)
 
 
