@@ -29,6 +29,7 @@ from netem.messages import (
     Position,
     RadioOrder,
     Verdicts,
+    packets_of,
 )
 from netem.near import Near, Neighbourhood
 from netem.schedule import Schedule
@@ -151,6 +152,13 @@ class Medium:
     def pages(self) -> Mapping[int, bytes]:
         """Return, at the end of a slot, what a shard noted in it; see ``journal.joined``."""
         return self._journal.torn_out()
+
+    def packets(self) -> dict[str, int]:
+        """Return the counters of packets under their names in summary.json."""
+        fates = dict(zip(FATES, self._fates, strict=True))
+        return packets_of(
+            self.sent, self.addressed, fates, self.duplicated, self.corrupted, self.in_flight
+        )
 
     def verdicts(self, slot: int) -> Verdicts:
         """Return the counters as they stand."""

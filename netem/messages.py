@@ -1,6 +1,6 @@
 """What the world tells the medium: the conditions, each slot the true positions, and orders."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Literal
 
 import msgspec
@@ -210,9 +210,28 @@ class Verdicts(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_un
 
     def packets(self) -> dict[str, int]:
         """Return the counters under their names in summary.json, fates between the others."""
-        counted = {"sent": self.sent, "addressed": self.addressed}
-        marked = {"duplicated": self.duplicated, "corrupted": self.corrupted}
-        return {**counted, **self.fates, **marked, "in_flight": self.in_flight}
+        return packets_of(
+            self.sent, self.addressed, self.fates, self.duplicated, self.corrupted, self.in_flight
+        )
+
+
+def packets_of(
+    sent: int,
+    addressed: int,
+    fates: Mapping[str, int],
+    duplicated: int,
+    corrupted: int,
+    in_flight: int,
+) -> dict[str, int]:
+    """Return counters under their names in summary.json, fates between the others."""
+    return {
+        "sent": sent,
+        "addressed": addressed,
+        **fates,
+        "duplicated": duplicated,
+        "corrupted": corrupted,
+        "in_flight": in_flight,
+    }
 
 
 class Turn(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):

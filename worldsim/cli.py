@@ -251,7 +251,7 @@ attach(app)
 def main() -> None:
     """Run the command line and exit with the contract's status."""
     # Little that a fleet makes holds a cycle: the collector may look more rarely.
-    gc.set_threshold(50_000)
+    gc.set_threshold(200_000)
     # A controller of the user's own is looked for last where the command is given.
     sys.path.append(str(Path.cwd()))
     sys.exit(command(sys.argv[1:]))

@@ -9,22 +9,30 @@ from worldsim.truth.obstacle import Obstacles
 Floats = NDArray[np.float64]
 
 
-def swept_separation(before: Singles, after: Singles) -> Floats:
-    """Return each vehicle's least distance to any other while both move from tick to tick [m].
+class Separation:
+    """Each vehicle's least distance to any other while both move from tick to tick."""
 
-    before, after: (N, 3) [m]; motion between ticks is taken as straight. NaN rows, and a vehicle
-    that is alone, give NaN.
-    """
-    start = _between_rows(before)
-    change = _between_rows(after) - start
-    along = _dot(change, change)
-    along[along == 0.0] = 1.0
-    when = np.minimum(np.maximum(-_dot(start, change) / along, 0.0), 1.0)
-    nearest = start + when * change
-    square = _dot(nearest, nearest)
-    square.flat[:: len(before) + 1] = np.nan
-    least: Floats = np.fmin.reduce(square, axis=1, initial=np.nan)
-    return np.sqrt(least)
+    def __init__(self) -> None:
+        self._between: Floats | None = None
+
+    def swept(self, position: Singles) -> Floats:
+        """Return the distances (N,) [m] since the tick before, of which there is none at first.
+
+        position: (N, 3) [m]; motion between ticks is taken as straight. NaN rows, and a vehicle
+        that is alone, give NaN.
+        """
+        ends = _between_rows(position)
+        starts = self._between if self._between is not None else ends
+        self._between = ends
+        change = ends - starts
+        along = _dot(change, change)
+        along[along == 0.0] = 1.0
+        when = np.minimum(np.maximum(-_dot(starts, change) / along, 0.0), 1.0)
+        nearest = starts + when * change
+        square = _dot(nearest, nearest)
+        square.flat[:: len(position) + 1] = np.nan
+        least: Floats = np.fmin.reduce(square, axis=1, initial=np.nan)
+        return np.sqrt(least)
 
 
 def swept_obstacle_distance(

@@ -16,7 +16,7 @@ from agent.messages import FramePath
 from agent.qstructure.formation import Formation, FormationSpec
 from worldsim.judge.clearance import Clearance
 from worldsim.judge.invariants import Invariants
-from worldsim.judge.metrics import Floats, conserved, swept_separation
+from worldsim.judge.metrics import Floats, Separation, conserved
 from worldsim.judge.phase import Phase
 from worldsim.judge.queues import Queues
 from worldsim.judge.recovery import LOSSES, RETURNS, Recoveries, Recovery
@@ -74,6 +74,7 @@ class Judge:
         self._turns = 0
         self._turns_over = 0
         self._before: Tick | None = None
+        self._separation = Separation()
 
     def note(self, event: dict[str, Any]) -> None:
         """Take an event of the run; of most kinds nothing follows for the judge."""
@@ -90,7 +91,7 @@ class Judge:
         before = self._before if self._before is not None else tick
         self._before = tick
         self.ticks += 1
-        separation = swept_separation(before.position, tick.position)
+        separation = self._separation.swept(tick.position)
         distance, too_near = self.clearance.see(before, tick) if self.clearance else (None, False)
         self.safety_violations += self._see_separation(separation) or too_near
         self._see_packets(tick.packets)

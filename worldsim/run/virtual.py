@@ -23,7 +23,6 @@ from netem.wire.frame import (
     unpack_batch,
     unpack_transmission,
 )
-from worldsim.judge.tick import Packets
 from worldsim.run.faults import Change, Flapping, Heal, Jamming, Partition
 from worldsim.run.meaning import Deed
 from worldsim.run.slots import Event, Opened, Recorder, SlotLoop, world_of
@@ -56,7 +55,9 @@ class VirtualFleet:
         self._decoders = decoders
         self._agents = {agent: self._started(agent, 0) for agent in range(scenario.fleet.agents)}
         self._inboxes = [deque[bytes](maxlen=BATCH_RING) for _ in range(scenario.rows)]
-        self.loop = SlotLoop(scenario, world_of(scenario, COMMAND_TICKS), recorder, self._packets)
+        self.loop = SlotLoop(
+            scenario, world_of(scenario, COMMAND_TICKS), recorder, self._medium.packets
+        )
 
     @property
     def rejected(self) -> int:
@@ -119,9 +120,6 @@ class VirtualFleet:
             if alive[agent]:
                 batch = Batch(slot, self._medium.collect(agent, time_s))
                 self._inboxes[agent].append(pack(batch))
-
-    def _packets(self) -> Packets:
-        return self.verdicts.packets()
 
 
 def fly(
