@@ -5,7 +5,7 @@ that claims it. Agents that know the same find the same, with no negotiation and
 agents that know less find nearly the same, and the claims heard mend the rest.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import sqrt
 
 from agent.controller import Peer
@@ -34,15 +34,7 @@ def allot(
     in the same order in every agent. Claims come first, then the nearest pairs, then pairwise
     exchanges until none saves anything.
     """
-    nowhere = [UNPLACED_M2] * (len(team) - len(places))
-    squares = [[_square(peer.position, slot) for slot in slots] + nowhere for peer in team]
-    column_of = {place: column for column, place in enumerate(places)}
-    claims = _undisputed(team, column_of, squares)
-    for row, column in enumerate(claims):
-        if column is not None:
-            squares[row][column] -= hysteresis_m2
-    chosen = _filled(claims, squares)
-    _exchange(chosen, squares)
+    chosen = _shared_out(team, places, slots, hysteresis_m2, range(len(team)))
     return {
         peer.id: places[column] if column < len(places) else None
         for peer, column in zip(team, chosen, strict=True)
@@ -52,49 +44,94 @@ def allot(
 def own_place(
     own_id: int, team: Sequence[Peer], places: Sequence[Place], slots: Sequence[Vector]
 ) -> Place | None:
-    """Return one member's place as :func:`allot` gives it, without solving what is settled.
+    """Return one member's place much as :func:`allot` gives it, at a cost that grows with N.
 
-    Where everybody claims a place and no two the same, only an exchange with oneself can concern
-    one: that is looked at first, at a cost that grows with N instead of its square.
+    Exchanges are looked at where they concern oneself, or who has no undisputed claim, or whom
+    these displace. Two others with claims see for themselves what they would save, and say so.
     """
-    held = _settled(team, places)
-    if held is not None and not _gains(own_id, team, held, slots):
-        return places[held[own_id]]
-    return allot(team, places, slots)[own_id]
+    me = next(row for row, peer in enumerate(team) if peer.id == own_id)
+    column = _shared_out(team, places, slots, HYSTERESIS_M2, (me,))[me]
+    return places[column] if column < len(places) else None
 
 
-def _settled(team: Sequence[Peer], places: Sequence[Place]) -> dict[int, int] | None:
-    """Return the column each member claims, by id, if the claims share out all places."""
-    if len(places) != len(team):
-        return None
+def _shared_out(
+    team: Sequence[Peer],
+    places: Sequence[Place],
+    slots: Sequence[Vector],
+    hysteresis_m2: float,
+    concerned: Iterable[int],
+) -> list[int]:
+    """Return a column for every row: the places', and past them those of nobody's place.
+
+    concerned: the rows whose exchanges are looked at besides those of rows without a claim.
+    """
     column_of = {place: column for column, place in enumerate(places)}
-    held: dict[int, int] = {}
-    for peer in team:
-        column = column_of.pop(peer.place, None) if peer.place is not None else None
-        if column is None:
-            return None
-        held[peer.id] = column
-    return held
+    claims = _undisputed(team, column_of, slots)
+    costs = _Costs([peer.position for peer in team], slots, claims, hysteresis_m2)
+    chosen = _filled(claims, costs)
+    unclaimed = [row for row, column in enumerate(claims) if column is None]
+    _exchange(chosen, costs, [*concerned, *unclaimed])
+    return chosen
 
 
-def _gains(
-    own_id: int, team: Sequence[Peer], held: dict[int, int], slots: Sequence[Vector]
-) -> bool:
-    """Whether an exchange between oneself and another would save something."""
-    me = next(peer.position for peer in team if peer.id == own_id)
-    mine = slots[held[own_id]]
-    kept = _square(me, mine) - 2.0 * HYSTERESIS_M2
-    for peer in team:
-        if peer.id != own_id:
-            theirs = slots[held[peer.id]]
-            now = kept + _square(peer.position, theirs)
-            if now - _square(me, theirs) - _square(peer.position, mine) > GAIN_M2:
-                return True
-    return False
+class _Costs:
+    """What columns cost rows [m^2]: squared distances, less the hysteresis for who claims one.
+
+    Found where it is asked for.
+    """
+
+    def __init__(
+        self,
+        positions: Sequence[Vector],
+        slots: Sequence[Vector],
+        claims: Sequence[int | None],
+        hysteresis_m2: float,
+    ) -> None:
+        self._positions = positions
+        self._slots = slots
+        self._claims = claims
+        self._hysteresis_m2 = hysteresis_m2
+        self._rows: dict[int, list[float]] = {}
+
+    def row(self, row: int) -> list[float]:
+        """Return what every column costs one row."""
+        found = self._rows.get(row)
+        if found is None:
+            found = self._rows[row] = self._row(row)
+        return found
+
+    def column(self, column: int, rows: Sequence[int]) -> list[float]:
+        """Return what one column costs each of some rows."""
+        if column >= len(self._slots):
+            return [UNPLACED_M2] * len(rows)
+        positions = self._positions
+        found = _squares(self._slots[column], [positions[row] for row in rows])
+        if column in self._claims:
+            found[rows.index(self._claims.index(column))] -= self._hysteresis_m2
+        return found
+
+    def held(self, holders: Sequence[int]) -> list[float]:
+        """Return what each column costs the row that holds it."""
+        slots, claims = self._slots, self._claims
+        return [
+            _square(self._positions[row], slots[column])
+            - self._hysteresis_m2 * (claims[row] == column)
+            if column < len(slots)
+            else UNPLACED_M2
+            for column, row in enumerate(holders)
+        ]
+
+    def _row(self, row: int) -> list[float]:
+        nowhere = [UNPLACED_M2] * (len(self._positions) - len(self._slots))
+        found = _squares(self._positions[row], self._slots) + nowhere
+        claimed = self._claims[row]
+        if claimed is not None:
+            found[claimed] -= self._hysteresis_m2
+        return found
 
 
 def _undisputed(
-    team: Sequence[Peer], column_of: dict[Place, int], squares: list[list[float]]
+    team: Sequence[Peer], column_of: dict[Place, int], slots: Sequence[Vector]
 ) -> list[int | None]:
     """Return each row's claim, with at most one row to a column.
 
@@ -110,8 +147,8 @@ def _undisputed(
             continue
         rival = holder.get(column)
         if rival is not None:
-            theirs = _cost_m(team[rival], squares[rival][column])
-            if _cost_m(peer, squares[row][column]) >= theirs - CONFLICT_M:
+            slot = slots[column]
+            if _cost_m(peer, slot) >= _cost_m(team[rival], slot) - CONFLICT_M:
                 continue
             kept[rival] = None
         holder[column] = row
@@ -119,18 +156,18 @@ def _undisputed(
     return kept
 
 
-def _cost_m(peer: Peer, square: float) -> float:
-    return sqrt(square) if peer.cost_m is None else peer.cost_m
+def _cost_m(peer: Peer, slot: Vector) -> float:
+    return sqrt(_square(peer.position, slot)) if peer.cost_m is None else peer.cost_m
 
 
-def _filled(claims: list[int | None], squares: list[list[float]]) -> list[int]:
+def _filled(claims: Sequence[int | None], costs: _Costs) -> list[int]:
     """Return a column for every row: the claimed one, else greedily the nearest pair first."""
     chosen = list(claims)
     taken = set(claims)
     open_rows = [row for row, column in enumerate(claims) if column is None]
     open_columns = [column for column in range(len(claims)) if column not in taken]
     pairs = sorted(
-        (squares[row][column], row, column) for row in open_rows for column in open_columns
+        (costs.row(row)[column], row, column) for row in open_rows for column in open_columns
     )
     for _, row, column in pairs:
         if chosen[row] is None and column not in taken:
@@ -139,29 +176,47 @@ def _filled(claims: list[int | None], squares: list[list[float]]) -> list[int]:
     return [column for column in chosen if column is not None]
 
 
-def _exchange(chosen: list[int], squares: list[list[float]]) -> None:
+def _exchange(chosen: list[int], costs: _Costs, concerned: Iterable[int]) -> None:
     """Exchange the columns of two rows wherever that saves something, until nothing does.
 
-    In the order of the columns, not of the rows: who is called what decides nothing.
+    Looked at are those who are concerned, and whoever has been exchanged since it was looked at;
+    in the order of the columns, not of the rows: who is called what decides nothing.
     """
-    count = len(chosen)
-    holders = sorted(range(count), key=chosen.__getitem__)
-    improved = True
-    while improved:
-        improved = False
-        for i in range(count):
-            a = holders[i]
-            row_a = squares[a]
-            for j in range(i + 1, count):
-                b = holders[j]
-                row_b = squares[b]
-                saved = row_a[i] + row_b[j] - row_a[j] - row_b[i]
-                if saved > GAIN_M2 and saved > ROUNDING * (row_a[i] + row_b[j]):
-                    holders[i], holders[j] = b, a
-                    a, row_a = b, row_b
-                    improved = True
+    holders = sorted(range(len(chosen)), key=chosen.__getitem__)
+    held = costs.held(holders)
+    pending = {chosen[row] for row in concerned}
+    while pending:
+        column = min(pending)
+        other = _best_exchange(column, holders, held, costs)
+        if other is None:
+            pending.remove(column)
+            continue
+        pending.add(other)
+        a, b = holders[column], holders[other]
+        holders[column], holders[other] = b, a
+        held[column], held[other] = costs.row(b)[column], costs.row(a)[other]
     for column, row in enumerate(holders):
         chosen[row] = column
+
+
+def _best_exchange(column: int, holders: list[int], held: list[float], costs: _Costs) -> int | None:
+    """Return the column that its holder best exchanges this one for; None where none saves.
+
+    holders: the row of each column; held: what it costs that row [m^2].
+    """
+    mine, kept = costs.row(holders[column]), held[column]
+    theirs = costs.column(column, holders)
+    saved = [kept + h - m - t for h, m, t in zip(held, mine, theirs, strict=True)]
+    best = max(saved)
+    if best <= GAIN_M2:
+        return None
+    other = saved.index(best)
+    return other if best > ROUNDING * (kept + held[other]) else None
+
+
+def _squares(here: Vector, there: Sequence[Vector]) -> list[float]:
+    x, y, z = here
+    return [(dx := x - a) * dx + (dy := y - b) * dy + (dz := z - c) * dz for a, b, c in there]
 
 
 def _square(a: Vector, b: Vector) -> float:
