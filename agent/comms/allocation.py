@@ -6,6 +6,7 @@ agents that know less find nearly the same, and the claims heard mend the rest.
 """
 
 from collections.abc import Iterable, Sequence
+from heapq import heapify, heappop, heapreplace
 from math import sqrt
 
 from agent.controller import Peer
@@ -44,14 +45,48 @@ def allot(
 def own_place(
     own_id: int, team: Sequence[Peer], places: Sequence[Place], slots: Sequence[Vector]
 ) -> Place | None:
-    """Return one member's place much as :func:`allot` gives it, at a cost that grows with N.
+    """Return one member's place much as :func:`allot` gives it, without solving what is settled.
 
     Exchanges are looked at where they concern oneself, or who has no undisputed claim, or whom
     these displace. Two others with claims see for themselves what they would save, and say so.
+    Where everybody has one, that is a matter of N steps.
     """
+    held = _settled(team, places)
+    if held is not None and not _gains(own_id, team, held, slots):
+        return places[held[own_id]]
     me = next(row for row, peer in enumerate(team) if peer.id == own_id)
     column = _shared_out(team, places, slots, HYSTERESIS_M2, (me,))[me]
     return places[column] if column < len(places) else None
+
+
+def _settled(team: Sequence[Peer], places: Sequence[Place]) -> dict[int, int] | None:
+    """Return the column each member claims, by id, if the claims share out all places."""
+    if len(places) != len(team):
+        return None
+    column_of = {place: column for column, place in enumerate(places)}
+    held: dict[int, int] = {}
+    for peer in team:
+        column = column_of.pop(peer.place, None) if peer.place is not None else None
+        if column is None:
+            return None
+        held[peer.id] = column
+    return held
+
+
+def _gains(
+    own_id: int, team: Sequence[Peer], held: dict[int, int], slots: Sequence[Vector]
+) -> bool:
+    """Whether an exchange between oneself and another would save something."""
+    me = next(peer.position for peer in team if peer.id == own_id)
+    mine = slots[held[own_id]]
+    kept = _square(me, mine) - 2.0 * HYSTERESIS_M2
+    for peer in team:
+        if peer.id != own_id:
+            theirs = slots[held[peer.id]]
+            now = kept + _square(peer.position, theirs)
+            if now - _square(me, theirs) - _square(peer.position, mine) > GAIN_M2:
+                return True
+    return False
 
 
 def _shared_out(
@@ -69,8 +104,7 @@ def _shared_out(
     claims = _undisputed(team, column_of, slots)
     costs = _Costs([peer.position for peer in team], slots, claims, hysteresis_m2)
     chosen = _filled(claims, costs)
-    unclaimed = [row for row, column in enumerate(claims) if column is None]
-    _exchange(chosen, costs, [*concerned, *unclaimed])
+    _exchange(chosen, costs, [*concerned, *_open(claims)])
     return chosen
 
 
@@ -102,6 +136,9 @@ class _Costs:
 
     def column(self, column: int, rows: Sequence[int]) -> list[float]:
         """Return what one column costs each of some rows."""
+        known = self._rows
+        if len(known) == len(self._positions):
+            return [known[row][column] for row in rows]
         if column >= len(self._slots):
             return [UNPLACED_M2] * len(rows)
         positions = self._positions
@@ -163,17 +200,30 @@ def _cost_m(peer: Peer, slot: Vector) -> float:
 def _filled(claims: Sequence[int | None], costs: _Costs) -> list[int]:
     """Return a column for every row: the claimed one, else greedily the nearest pair first."""
     chosen = list(claims)
-    taken = set(claims)
-    open_rows = [row for row, column in enumerate(claims) if column is None]
-    open_columns = [column for column in range(len(claims)) if column not in taken]
-    pairs = sorted(
-        (costs.row(row)[column], row, column) for row in open_rows for column in open_columns
-    )
-    for _, row, column in pairs:
-        if chosen[row] is None and column not in taken:
+    taken = {column for column in claims if column is not None}
+    free = [column for column in range(len(claims)) if column not in taken]
+    nearest = [(*_cheapest(costs.row(row), free), row) for row in _open(claims)]
+    heapify(nearest)
+    while nearest:
+        _, column, row = nearest[0]
+        if column in taken:
+            free = [column for column in free if column not in taken]
+            heapreplace(nearest, (*_cheapest(costs.row(row), free), row))
+        else:
+            heappop(nearest)
             chosen[row] = column
             taken.add(column)
     return [column for column in chosen if column is not None]
+
+
+def _open(claims: Sequence[int | None]) -> list[int]:
+    """Return the rows without a claim."""
+    return [row for row, column in enumerate(claims) if column is None]
+
+
+def _cheapest(costs: Sequence[float], columns: Sequence[int]) -> tuple[float, int]:
+    """Return the least cost of some columns, and the first of which it is."""
+    return min([(costs[column], column) for column in columns])
 
 
 def _exchange(chosen: list[int], costs: _Costs, concerned: Iterable[int]) -> None:
