@@ -12,7 +12,7 @@ U_tg the exponent is never positive, so nothing overflows (E5).
 """
 
 from collections.abc import Iterable
-from math import exp, sqrt
+from math import dist, exp
 from typing import Protocol
 
 from agent.messages import Vector
@@ -83,17 +83,14 @@ class Potential:
 
         q, q_tg: own position and immediate target [m]; others: the same of each neighbour.
         """
-        qx, qy, qz = q
-        tx, ty, tz = q_tg
-        x, y, z = qx - tx, qy - ty, qz - tz
+        x, y, z = q[0] - q_tg[0], q[1] - q_tg[1], q[2] - q_tg[2]
         for other in others:
-            jx, jy, jz = other.position
-            dx, dy, dz = qx - jx, qy - jy, qz - jz
-            ux, uy, uz = other.target
-            ux, uy, uz = tx - ux, ty - uy, tz - uz
-            push = self._push(sqrt(dx * dx + dy * dy + dz * dz), sqrt(ux * ux + uy * uy + uz * uz))
+            there = other.position
+            push = self._push(dist(q, there), dist(q_tg, other.target))
             if push != 0.0:
-                x, y, z = x + push * dx, y + push * dy, z + push * dz
+                x += push * (q[0] - there[0])
+                y += push * (q[1] - there[1])
+                z += push * (q[2] - there[2])
         return (x, y, z)
 
     def _push(self, r: float, between_targets: float) -> float:
