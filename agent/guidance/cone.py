@@ -3,7 +3,7 @@
 In azimuth only, for vehicles climb and descend freely (E10).
 """
 
-from math import atan2, pi, radians
+from math import atan2, radians, remainder, tau
 from typing import NamedTuple
 
 from agent.setup import Vehicle
@@ -33,5 +33,4 @@ def cone_of(vehicle: Vehicle) -> Cone:
 
 def azimuth_error(x: float, y: float, yaw: float) -> float:
     """Return the angle from a heading to a horizontal direction [rad], in [-pi, pi]."""
-    error = atan2(y, x) - yaw
-    return error - 2.0 * pi * round(error / (2.0 * pi))
+    return remainder(atan2(y, x) - yaw, tau)

@@ -65,7 +65,9 @@ class Trust:
         """Look whether neighbours near by are sensed where they say they are."""
         if not self._ranging:
             return
-        looks = [(beacon, self._is_missed(observation, beacon)) for beacon in neighbours]
+        here = observation.position
+        near = [beacon for beacon in neighbours if dist(here, beacon.position) <= NEAR_M]
+        looks = [(beacon, self._is_missed(observation, beacon)) for beacon in near]
         missed = {beacon.id: beacon.stamp_s for beacon, missed in looks if missed}
         if missed:
             # Whoever left is missed too, but says so only once: what it said last stays the last.
@@ -127,8 +129,6 @@ class Trust:
     def _is_missed(self, observation: Observation, beacon: Beacon) -> bool | None:
         """Whether a neighbour near by is not sensed; None where its word proves nothing."""
         here, there = observation.position, beacon.position
-        if dist(here, there) > NEAR_M:
-            return None
         age_s = max(0.0, observation.time_s - beacon.stamp_s)
         if age_s > FRESH_S:
             return None
