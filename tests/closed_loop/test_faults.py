@@ -113,7 +113,8 @@ def test_the_apex_leaves_and_has_a_successor(seed: int, radio: dict[str, str]) -
     assert max(reformed_s(flight)) <= 10.0
     assert violated(flight) == []
     assert np.isnan(flight.loop.world.fleet.position[gone]).all()
-    assert flight.verdicts.fates["dropped_medium"] > 0
+    # Without delay nothing is on its way to one who has just been handed its batch.
+    assert flight.verdicts.fates["dropped_medium"] > 0 or not radio
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -42,12 +42,12 @@ class Tally:
 
 
 class Invariants:
-    """Watches the allocation of a whole run."""
+    """Watches the allocation of a whole run; bodies: shown every tick."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, bodies: Bodies) -> None:
         self.tallies = {name: Tally() for name in ("I2", "I3", "I4", "I6", "I7")}
         self._reach = Reach(scenario)
-        self._bodies = Bodies(scenario.control.spacing_m)
+        self._bodies = bodies
         self._boot_s = scenario.fleet.boot_s
         self._fault_s = 0.0
         self._look_s = 0.0
@@ -108,15 +108,16 @@ class Invariants:
         self._settled_s = self._fault_s + self._reach.detection_s(found.hops) + self._twice_s
 
     def _find(self, tick: Tick, phase: Phase) -> None:
-        """Find what is broken; in one component that holds until a claim changes.
+        """Find what is broken; in one component that holds until a claim changes, or a body stands.
 
         Where there are more, a vehicle of one may come into a place of another at any time.
         """
+        members = self._members
         seen = (
             *(rows.tobytes() for rows in (tick.place, tick.alive, tick.mission)),
             self._components.label.tobytes() if self._components is not None else b"",
+            b"" if tick.alive.all() else self._bodies.standing(tick).tobytes(),
         )
-        members = self._members
         if seen == self._seen and len(members) == 1:
             return
         self._seen, claims = seen, phase.claims(tick)

@@ -31,13 +31,13 @@ class Recovery:
 
 
 class Recoveries:
-    """Every change of the team in a run, and what became of it; spacing: d_ir [m]."""
+    """Every change of the team in a run, and what became of it; bodies: shown every tick."""
 
-    def __init__(self, spacing: float) -> None:
+    def __init__(self, bodies: Bodies) -> None:
         self.all: list[Recovery] = []
         self._open: list[Recovery] = []
         self._since_s: float | None = None
-        self._bodies = Bodies(spacing)
+        self._bodies = bodies
         self._seen: tuple[bytes, ...] = ()
         self._whole = False
 
@@ -79,7 +79,8 @@ class Recoveries:
         return True
 
     def _is_whole(self, tick: Tick, phase: Phase) -> bool:
-        seen = (tick.place.tobytes(), tick.alive.tobytes(), tick.mission.tobytes())
+        rows = (tick.place, tick.alive, tick.mission, self._bodies.standing(tick))
+        seen = tuple(each.tobytes() for each in rows)
         if seen != self._seen:
             self._seen = seen
             held = [claim for claim in phase.claims(tick) if claim[0] >= 0]

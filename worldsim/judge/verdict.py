@@ -14,6 +14,7 @@ import numpy as np
 from agent.guidance.cone import cone_of
 from agent.messages import FramePath
 from agent.qstructure.formation import Formation, FormationSpec
+from worldsim.judge.bodies import Bodies
 from worldsim.judge.clearance import Clearance
 from worldsim.judge.invariants import Invariants
 from worldsim.judge.metrics import Floats, Separation, conserved
@@ -61,8 +62,9 @@ class Judge:
         formation = Formation(scenario.formation, scenario.control.spacing_m)
         self.phases = [Phase(formation, 0.0, path_of(scenario.frame))]
         self.queues = [Queues(self.phases[0])]
-        self._recoveries = Recoveries(scenario.control.spacing_m)
-        self._allocation = Invariants(scenario) if scenario.expect.converge else None
+        self._bodies = Bodies(scenario.control.spacing_m)
+        self._recoveries = Recoveries(self._bodies)
+        self._allocation = Invariants(scenario, self._bodies) if scenario.expect.converge else None
         self.ticks = 0
         self.min_separation_m: float | None = None
         self.clearance = Clearance(scenario)
@@ -91,6 +93,7 @@ class Judge:
         before = self._before if self._before is not None else tick
         self._before = tick
         self.ticks += 1
+        self._bodies.see(tick)
         separation = self._separation.swept(tick.position)
         distance, too_near = self.clearance.see(before, tick) if self.clearance else (None, False)
         self.safety_violations += self._see_separation(separation) or too_near
