@@ -55,7 +55,8 @@ def own_place(
     if held is not None and not _gains(own_id, team, held, slots):
         return places[held[own_id]]
     me = next(row for row, peer in enumerate(team) if peer.id == own_id)
-    column = _shared_out(team, places, slots, HYSTERESIS_M2, (me,))[me]
+    concerned = (me,) if held is None else range(len(team))
+    column = _shared_out(team, places, slots, HYSTERESIS_M2, concerned)[me]
     return places[column] if column < len(places) else None
 
 
