@@ -6,6 +6,8 @@ from numpy.typing import NDArray
 from worldsim.judge.tick import Packets, Singles
 from worldsim.truth.obstacle import Obstacles
 
+LEAST_M2 = 1e-300
+"""Stands for the square of no motion at all, by which nothing can be divided [m^2]."""
 Floats = NDArray[np.float64]
 
 
@@ -24,11 +26,10 @@ class Separation:
         ends = _between_rows(position)
         starts = self._between if self._between is not None else ends
         self._between = ends
-        change = ends - starts
-        along = _dot(change, change)
-        along[along == 0.0] = 1.0
-        when = np.minimum(np.maximum(-_dot(starts, change) / along, 0.0), 1.0)
-        nearest = starts + when * change
+        back = starts - ends
+        along = np.maximum(_dot(back, back), LEAST_M2)
+        when = np.minimum(np.maximum(_dot(starts, back) / along, 0.0), 1.0)
+        nearest = starts - when * back
         square = _dot(nearest, nearest)
         square.flat[:: len(position) + 1] = np.nan
         least: Floats = np.fmin.reduce(square, axis=1, initial=np.nan)

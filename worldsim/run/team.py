@@ -3,6 +3,7 @@
 A row belongs to one agent for the whole run. Rows of those who have not joined yet are the last.
 """
 
+from math import inf
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -88,7 +89,7 @@ class Team:
     @property
     def next_boot_s(self) -> float:
         """When the next agent has booted [s]; infinite when none is booting."""
-        return min(self._boots.values(), default=np.inf)
+        return min(self._boots.values()) if self._boots else inf
 
     @property
     def first(self) -> int | None:

@@ -78,8 +78,11 @@ class Fleet:
     def within_limits(self, row: int, velocity: Vector) -> Vector:
         """Return a velocity [m/s] as a vehicle flies it: scaled down as a whole, beyond a limit."""
         x, y, z = velocity
-        speed = self._max_speed[row] / max(sqrt(x * x + y * y + z * z), 1e-12)
-        scale = min(1.0, speed, self._max_climb[row] / max(abs(z), 1e-12))
+        max_speed, max_climb = self._max_speed[row], self._max_climb[row]
+        square = x * x + y * y + z * z
+        if square <= max_speed * max_speed and abs(z) <= max_climb:
+            return velocity
+        scale = min(1.0, max_speed / sqrt(square), max_climb / max(abs(z), 1e-12))
         return x * scale, y * scale, z * scale
 
     def _along(self, row: int, velocity: Floats) -> Vector:

@@ -69,9 +69,11 @@ class World:
         self.failures = Failures(sensor.seed)
         self._longest = command_ticks * clock.slots_per_tick
         self._expires = np.zeros(len(yaw), dtype=np.int64)
-        self._velocity = np.zeros((len(yaw), 3))
-        self._yaw = self.fleet.yaw.copy()
-        self._tilt = np.zeros((len(yaw), 2))
+        # A row each: velocity, yaw, pitch and roll, so that a command is one assignment.
+        self._commanded = np.zeros((len(yaw), 6))
+        self._velocity, self._tilt = self._commanded[:, :3], self._commanded[:, 4:]
+        self._yaw = self._commanded[:, 3]
+        self._yaw[:] = self.fleet.yaw
 
     @property
     def time_s(self) -> float:
@@ -151,9 +153,8 @@ class World:
             return False
         self.latest[agent] = command
         self._expires[agent] = min(command.expires_slot, command.slot + self._longest)
-        self._velocity[agent] = self.fleet.within_limits(agent, command.velocity)
-        self._yaw[agent] = command.yaw
-        self._tilt[agent] = command.tilt
+        velocity = self.fleet.within_limits(agent, command.velocity)
+        self._commanded[agent] = (*velocity, command.yaw, *command.tilt)
         return True
 
     def advance(self) -> None:
