@@ -112,6 +112,19 @@ def test_packets_that_went_missing_are_found_in_the_recording(tmp_path: Path) ->
     assert verification.exit_status == 1
 
 
+def test_counters_that_come_late_are_looked_at_from_then_on(tmp_path: Path) -> None:
+    scenario = wedge(4)
+    ticks = list(straight_flight(scenario))
+    for tick in ticks[:3]:
+        tick.packets.clear()
+    recorder = RunRecorder(tmp_path / "run.rrd", scenario, "late", mode="lockstep")
+    judge = record(recorder, scenario, ticks)
+    (tmp_path / "summary.json").write_text(json.dumps(summary_of(judge)))
+    verification = verify(tmp_path)
+    assert verification.invariants["I8"] == {"ticks": len(ticks) - 3, "violations": 0}
+    assert verification.differences == ()
+
+
 def test_nothing_to_judge_is_exit_2(tmp_path: Path) -> None:
     (tmp_path / "text.rrd").write_text("hello")
     for run in (tmp_path / "nowhere", tmp_path, tmp_path / "text.rrd"):

@@ -106,10 +106,12 @@ class Sheets:
 
     def _packets(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
         for cause in dict.fromkeys(cause for tick in ticks for cause in tick.packets):
-            counts = [np.array(tick.packets.get(cause, 0)) for tick in ticks]
-            rows = self._counters.setdefault(cause, Latest()).changes(counts)
-            if rows:
-                values = [float(counts[row]) for row in rows]
+            # What was not told yet is no zero: I8 is not looked at before the first counters.
+            told = [row for row, tick in enumerate(ticks) if cause in tick.packets]
+            counts = [np.array(ticks[row].packets[cause]) for row in told]
+            changes = self._counters.setdefault(cause, Latest()).changes(counts)
+            if changes:
+                rows, values = [told[at] for at in changes], [float(counts[at]) for at in changes]
                 yield Sheet(f"{layout.PACKETS}/{cause}", rows, rr.Scalars.columns(scalars=values))
 
     def _references(self, last: int) -> Iterator[Sheet]:
