@@ -55,7 +55,8 @@ app = typer.Typer(
         "qswarm COMMAND --help",
     )
     + "\n\nExit status: 0 the expectations held; 1 they did not; 2 bad input, nothing started;"
-    " 3 inconclusive, the host was too slow or the run was interrupted.",
+    " 3 inconclusive, the host was too slow or the fleet lost its radio;"
+    " 130 interrupted.",
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -254,7 +255,11 @@ def main() -> None:
     gc.set_threshold(200_000)
     # A controller of the user's own is looked for last where the command is given.
     sys.path.append(str(Path.cwd()))
-    sys.exit(command(sys.argv[1:]))
+    try:
+        status = command(sys.argv[1:])
+    except KeyboardInterrupt:
+        status = _interrupted()
+    sys.exit(status)
 
 
 def command(arguments: list[str]) -> int:
@@ -278,9 +283,13 @@ def command(arguments: list[str]) -> int:
         _say(f"qswarm: {error}")
         return NOT_HELD
     except (typer.Abort, KeyboardInterrupt):
-        _say("qswarm: interrupted")
-        return INTERRUPTED
+        return _interrupted()
     return int(status or HELD)
+
+
+def _interrupted() -> int:
+    _say("qswarm: interrupted")
+    return INTERRUPTED
 
 
 def _admitted(file: Path, overrides: Mapping[str, str], command_ticks: int) -> "Scenario":

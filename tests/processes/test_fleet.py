@@ -3,6 +3,8 @@
 import json
 import os
 import signal
+import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,17 @@ pytestmark = pytest.mark.processes
 
 Start = Callable[..., Started]
 Write = Callable[[float], str]
+
+EARLY_CTRL_C = """
+from worldsim.cli import main
+from worldsim.run import fleet
+
+def ctrl_c(*_):
+    raise KeyboardInterrupt
+
+fleet.write_users = ctrl_c
+main()
+"""
 
 
 @pytest.fixture
@@ -104,6 +117,33 @@ def test_ctrl_c_ends_everything_and_leaves_summary_and_recording(
     nobody_left(pids(run))
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+def test_who_asks_for_the_end_again_and_again_gets_it_whole(
+    start: Start, scenario: Write, run: Path, number: signal.Signals
+) -> None:
+    fleet = launched(start, scenario(60.0), run, "--no-recording")
+    fleet.says("in place")
+    while fleet.process.poll() is None:
+        fleet.kill_group(number)
+        threading.Event().wait(0.02)
+
+    assert fleet.status(8.0) == 130, fleet.text
+    assert "inconclusive (interrupted after " in fleet.text
+    assert summary_of(run)["reason"] in fleet.text
+    assert not (run / "users").exists()
+    nobody_left(pids(run))
+
+
+def test_an_interrupt_before_there_is_a_world_leaves_scenario_and_logs(
+    start: Start, scenario: Write, run: Path
+) -> None:
+    program = [sys.executable, "-c", EARLY_CTRL_C]
+    fleet = start(*program, "run", scenario(60.0), "--out", str(run))
+    assert fleet.status(8.0) == 130, fleet.text
+    assert "Traceback" not in fleet.text
+    assert sorted(file.name for file in run.iterdir()) == ["logs", "scenario.toml"]
+
+
 def test_kill_9_of_the_launcher_leaves_no_process_and_a_summary(
     start: Start, scenario: Write, run: Path
 ) -> None:
@@ -125,6 +165,7 @@ def test_when_the_medium_dies_the_run_ends_and_says_so(
     assert fleet.status(10.0) == 3
     assert "netem was killed by signal 9" in fleet.text
     assert summary_of(run)["outcome"] == "inconclusive"
+    assert summary_of(run)["reason"].startswith("netem was killed by signal 9 after ")
     nobody_left(pids(run))
 
 

@@ -62,8 +62,9 @@ def _live(
     try:
         _follow(parent, death_signal)
         _redirect(log)
-        # Ctrl-C reaches the whole group; the launcher conducts the end.
+        # Ctrl-C, or the terminal's end, reaches the whole group; the launcher conducts the end.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         status = main()
     except SystemExit as leaving:

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as a question that runs ask, so that they end between slots and tell."""
+"""Ctrl-C, SIGTERM and a terminal that goes away, as what a run is asked: to end, and to tell."""
 
 import signal
 from collections.abc import Iterator
@@ -7,6 +7,19 @@ from contextlib import contextmanager
 from netem.wire.stop import Stop
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def interruptible() -> None:
+    """Let SIGTERM interrupt this process as Ctrl-C does, and SIGHUP unless it is ignored."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, signal.default_int_handler)
+
+
+def uninterrupted() -> None:
+    """Let nothing interrupt an end under way: a second Ctrl-C would leave it half done."""
+    for number in (*SIGNALS, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
 
 
 @contextmanager

@@ -95,7 +95,8 @@ def conduct(
     finally:
         flight.land()
         notes.close()
-        summary = _summary(scenario, flight, terms.mode, interrupted=not whole)
+        ended_by = None if whole else outside.stopped or "interrupted"
+        summary = _summary(scenario, flight, terms.mode, ended_by)
         if flight.begun or stop.asked:
             directory.write_summary(summary)
         else:
@@ -125,7 +126,7 @@ def _lateness(verdicts: Verdicts | None) -> str:
 
 
 def _summary(
-    scenario: Scenario, flight: Flight | Lockstep, mode: str, interrupted: bool
+    scenario: Scenario, flight: Flight | Lockstep, mode: str, ended_by: str | None
 ) -> dict[str, Any]:
     late = flight.late_fraction
     return summarise(
@@ -138,7 +139,8 @@ def _summary(
         late_tick_fraction=late,
         real_time_factor=flight.real_time_factor,
         duration_s=flight.loop.world.time_s,
-        interrupted=interrupted,
+        interrupted=ended_by is not None,
+        ended_by=ended_by or "",
         host_too_slow=late is not None and late >= TOO_LATE_FRACTION,
         failure=flight.failure,
     )

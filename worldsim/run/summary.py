@@ -37,20 +37,22 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
     interrupted: bool,
     host_too_slow: bool,
     failure: str | None = None,
+    ended_by: str = "interrupted",
     refused: Mapping[str, int] | None = None,
     delivery: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return summary.json's content: plain values, None for what could not be measured.
 
     mode: "processes", "lockstep" or "virtual". duration_s: how much was flown, in simulated time.
-    failure: what ended the run that should not have happened in it. refused: messages that the
-    world refused, by cause. delivery: how late frames came.
+    failure: what ended the run that should not have happened in it. ended_by: why it was cut off,
+    if it was. refused: messages that the world refused, by cause. delivery: how late frames came.
     """
     judge = loop.judge
     rejected = _rejected(loop, verdicts, refused)
     expectations = judge.expectations()
     invariants = judge.invariants()
-    doubt = _doubt(interrupted, host_too_slow, duration_s, late_tick_fraction)
+    cut_off = f"{ended_by} after {duration_s:.1f} s" if interrupted else None
+    doubt = cut_off or _too_slow(host_too_slow, late_tick_fraction)
     outcome, reason = ("fail", failure) if failure else _outcome(expectations, invariants, doubt)
     summary = {
         "schema": SCHEMA,
@@ -103,15 +105,11 @@ def _outcome(
     return "pass", None
 
 
-def _doubt(
-    interrupted: bool, host_too_slow: bool, duration_s: float, late: float | None
-) -> str | None:
-    if interrupted:
-        return f"interrupted after {duration_s:.1f} s"
-    if host_too_slow:
-        share = f": {100 * late:.1f} % of ticks were late" if late is not None else ""
-        return f"the host was too slow{share}"
-    return None
+def _too_slow(host_too_slow: bool, late: float | None) -> str | None:
+    if not host_too_slow:
+        return None
+    share = f": {100 * late:.1f} % of ticks were late" if late is not None else ""
+    return f"the host was too slow{share}"
 
 
 def _rejected(
