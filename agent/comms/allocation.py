@@ -125,7 +125,7 @@ class _Costs:
         self._positions = positions
         self._slots = slots
         self._claims = claims
-        self._hysteresis_m2 = hysteresis_m2
+        self.hysteresis_m2 = hysteresis_m2
         self._rows: dict[int, list[float]] = {}
 
     def row(self, row: int) -> list[float]:
@@ -135,36 +135,22 @@ class _Costs:
             found = self._rows[row] = self._row(row)
         return found
 
-    def column(self, column: int, rows: Sequence[int]) -> list[float]:
-        """Return what one column costs each of some rows."""
-        known = self._rows
-        if len(known) == len(self._positions):
-            return [known[row][column] for row in rows]
+    def of(self, row: int, column: int) -> float:
+        """Return what a column costs a row."""
+        known = self._rows.get(row)
+        if known is not None:
+            return known[column]
         if column >= len(self._slots):
-            return [UNPLACED_M2] * len(rows)
-        positions = self._positions
-        found = _squares(self._slots[column], [positions[row] for row in rows])
-        if column in self._claims:
-            found[rows.index(self._claims.index(column))] -= self._hysteresis_m2
-        return found
-
-    def held(self, holders: Sequence[int]) -> list[float]:
-        """Return what each column costs the row that holds it."""
-        slots, claims = self._slots, self._claims
-        return [
-            _square(self._positions[row], slots[column])
-            - self._hysteresis_m2 * (claims[row] == column)
-            if column < len(slots)
-            else UNPLACED_M2
-            for column, row in enumerate(holders)
-        ]
+            return UNPLACED_M2
+        cost = _square(self._positions[row], self._slots[column])
+        return cost - self.hysteresis_m2 if self._claims[row] == column else cost
 
     def _row(self, row: int) -> list[float]:
         nowhere = [UNPLACED_M2] * (len(self._positions) - len(self._slots))
         found = _squares(self._positions[row], self._slots) + nowhere
         claimed = self._claims[row]
         if claimed is not None:
-            found[claimed] -= self._hysteresis_m2
+            found[claimed] -= self.hysteresis_m2
         return found
 
 
@@ -234,7 +220,7 @@ def _exchange(chosen: list[int], costs: _Costs, concerned: Iterable[int]) -> Non
     in the order of the columns, not of the rows: who is called what decides nothing.
     """
     holders = sorted(range(len(chosen)), key=chosen.__getitem__)
-    held = costs.held(holders)
+    held = [costs.of(row, column) for column, row in enumerate(holders)]
     pending = {chosen[row] for row in concerned}
     while pending:
         column = min(pending)
@@ -256,13 +242,20 @@ def _best_exchange(column: int, holders: list[int], held: list[float], costs: _C
     holders: the row of each column; held: what it costs that row [m^2].
     """
     mine, kept = costs.row(holders[column]), held[column]
-    theirs = costs.column(column, holders)
-    saved = [kept + h - m - t for h, m, t in zip(held, mine, theirs, strict=True)]
-    best = max(saved)
-    if best <= GAIN_M2:
-        return None
-    other = saved.index(best)
-    return other if best > ROUNDING * (kept + held[other]) else None
+    # What lies farther saves nothing: a cost is at least minus the hysteresis.
+    bound = kept + costs.hysteresis_m2
+    near = [
+        other
+        for other, (cost, theirs) in enumerate(zip(mine, held, strict=True))
+        if cost - theirs < bound
+    ]
+    best, found = GAIN_M2, None
+    for other in near:
+        before = kept + held[other]
+        saved = before - mine[other] - costs.of(holders[other], column)
+        if saved > best and saved > ROUNDING * before:
+            best, found = saved, other
+    return found
 
 
 def _squares(here: Vector, there: Sequence[Vector]) -> list[float]:
