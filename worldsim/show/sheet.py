@@ -5,7 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import rerun as rr
 from numpy.typing import NDArray
+from pyarrow.lib import Array, ListArray, field, list_
+from pyarrow.lib import array as arrow_array
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,19 +21,24 @@ class Sheet:
 
 
 class Latest:
-    """Remembers a value, and finds where a series departs from the one before."""
+    """Remembers a series' last row, and finds where what follows departs from the row before."""
 
     def __init__(self) -> None:
-        self._value: NDArray[Any] | None = None
+        self._row: NDArray[Any] | None = None
 
-    def changes(self, series: Sequence[NDArray[Any]]) -> list[int]:
-        """Return the rows of a series that differ from the row before; the first ever counts."""
-        rows = []
-        for row, value in enumerate(series):
-            if self._value is None or not np.array_equal(self._value, value):
-                rows.append(row)
-                self._value = value
-        return rows
+    def departs(self, series: NDArray[Any]) -> NDArray[np.bool_]:
+        """Return which values of a series (T, ...) differ from the row before; the first all do."""
+        differs = np.ones(series.shape, dtype=np.bool_)
+        differs[1:] = series[1:] != series[:-1]
+        if self._row is not None:
+            differs[0] = series[0] != self._row
+        self._row = series[-1].copy()
+        return differs
+
+    def changes(self, series: NDArray[Any]) -> list[int]:
+        """Return the rows of a series (T, ...) in which any value departs."""
+        differs = self.departs(series).reshape(len(series), -1)
+        return [int(row) for row in np.flatnonzero(differs.any(axis=1))]
 
 
 class Thinned:
@@ -47,3 +55,21 @@ class Thinned:
     def drawn(self, tick: int, lines: int) -> None:
         """Take how many were drawn at a tick."""
         self._next = tick + max(1, round(lines * self._ticks_per_line))
+
+
+def numbers(name: str, rows: NDArray[Any]) -> rr.ComponentColumn:
+    """Return numbers of our own kind (T, ...) as a column.
+
+    Given as an Arrow array: rerun looks at anything else number by number.
+    """
+    values = arrow_array(rows.ravel())
+    lengths = [rows[0].size] * len(rows)
+    return rr.ComponentColumn(name, rr.AnyBatchValue(name, values), lengths=lengths)
+
+
+def strips_of(lines: NDArray[np.float32]) -> Array:
+    """Return lines (K, 2, 3) as rerun keeps strips: given anything else, it looks at each."""
+    points = rr.components.Position3DBatch(lines.reshape(-1, 3)).as_arrow_array()
+    starts = arrow_array(np.arange(0, len(points) + 1, 2, dtype=np.int32))
+    strip = list_(field("item", points.type, nullable=False))
+    return ListArray.from_arrays(starts, points, type=strip)

@@ -5,22 +5,17 @@ counters) has a row where it changed, and a viewer shows the latest.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
-from pyarrow.lib import array as arrow_array
 
 from agent.comms.hierarchy import DISTRESS
 from worldsim.judge.tick import Singles, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.show import layout, palette
-from worldsim.show.sheet import Latest, Sheet, Thinned
-
-LINES_MAX = 400
-LINES_PER_S = 2000
-"""More lines than these at once, or in a second, would cost more than all the rest together."""
+from worldsim.show.hearing import HearingSheets
+from worldsim.show.sheet import Latest, Sheet, numbers
 
 
 class Sheets:
@@ -36,10 +31,9 @@ class Sheets:
         self._shared = shared
         self._limits = limits
         self._colours = Latest()
-        self._heard = Latest()
+        self._hearing = HearingSheets(tick_hz)
         self._flown = Latest()
         self._counters: dict[str, Latest] = {}
-        self._drawn = Thinned(tick_hz, LINES_PER_S)
         near = layout.OBSTACLE_DISTANCE in limits
         self._per_agent = (*(layout.NEAR_OBSTACLES if near else layout.PER_AGENT), *layout.TOLD)
 
@@ -50,69 +44,52 @@ class Sheets:
         yield _state(ticks)
         yield from self._missions(ticks)
         yield from self._coloured(ticks)
-        yield from self._hearing(ticks)
-        yield from self._lines(ticks)
+        yield from self._hearing.of(ticks)
         yield from self._packets(ticks)
         yield from self._references(len(ticks) - 1)
 
     def _coloured(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
-        series = [self._colours_at(tick) for tick in ticks]
+        series = self._colours_of(ticks)
         rows = self._colours.changes(series)
-        yield _trail(ticks, np.concatenate(series))
+        yield _trail(ticks, series.ravel())
         if not rows:
             return
-        colours = np.concatenate([series[row] for row in rows])
-        counts = [len(series[0])] * len(rows)
+        counts = [series.shape[1]] * len(rows)
+        changed = series[rows].ravel()
         for entity, archetype in ((layout.VEHICLES, rr.Boxes3D), (layout.TARGETS, rr.Points3D)):
-            yield Sheet(entity, rows, archetype.columns(colors=colours).partition(counts))
+            yield Sheet(entity, rows, archetype.columns(colors=changed).partition(counts))
         lasting = rr.SeriesLines.columns(colors=series[rows[-1]]).partition(counts[:1])
         for entity in self._per_agent:
             yield Sheet(entity, (), lasting)
 
-    def _colours_at(self, tick: Tick) -> palette.Colours:
-        """Return agents' colours (N,): their queues', but for those in distress and the dead."""
-        colours = palette.of_places(tick.place, self._shared)
-        if tick.standings is not None:
-            colours = np.where(tick.standings.role == DISTRESS, palette.DISTRESS, colours)
-        return np.where(tick.alive, colours, palette.DEAD)
-
-    def _hearing(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
-        # As bits: 5 kB for 200 agents, where pairs of numbers take 20.
-        series = [np.packbits(_hears(tick)) for tick in ticks]
-        rows = self._heard.changes(series)
-        if rows and len(series[0]):
-            bits = np.concatenate([series[row] for row in rows])
-            counts = [len(series[0])] * len(rows)
-            yield Sheet(layout.HEARD, rows, [_column(layout.HEARS, bits, counts)])
+    def _colours_of(self, ticks: Sequence[Tick]) -> palette.Colours:
+        """Return colours (T, N): those of agents' queues, but for the distressed and the dead."""
+        colours = palette.of_places(np.concatenate([tick.place for tick in ticks]), self._shared)
+        colours = colours.reshape(len(ticks), -1)
+        for row, tick in enumerate(ticks):
+            if tick.standings is not None:
+                colours[row, tick.standings.role == DISTRESS] = palette.DISTRESS
+            colours[row, ~tick.alive] = palette.DEAD
+        return colours
 
     def _missions(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
-        series = [tick.mission for tick in ticks]
+        series = np.stack([tick.mission for tick in ticks])
         rows = self._flown.changes(series)
         if rows:
-            keys = np.concatenate([series[row] for row in rows])
-            counts = [len(series[0])] * len(rows)
-            yield Sheet(layout.MISSIONS, rows, [_column(layout.MISSION, keys, counts)])
-
-    def _lines(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
-        rows, strips = [], []
-        for row, tick in enumerate(ticks):
-            if self._drawn.due(tick.index):
-                rows.append(row)
-                strips.append(lines(tick))
-                self._drawn.drawn(tick.index, len(strips[-1]))
-        if rows:
-            columns = rr.LineStrips3D.columns(strips=np.concatenate(strips))
-            yield Sheet(layout.LINKS, rows, columns.partition([len(some) for some in strips]))
+            yield Sheet(layout.MISSIONS, rows, [numbers(layout.MISSION, series[rows])])
 
     def _packets(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
         for cause in dict.fromkeys(cause for tick in ticks for cause in tick.packets):
             # What was not told yet is no zero: I8 is not looked at before the first counters.
             told = [row for row, tick in enumerate(ticks) if cause in tick.packets]
-            counts = [np.array(ticks[row].packets[cause]) for row in told]
+            counts = np.array([ticks[row].packets[cause] for row in told], dtype=np.float64)
             changes = self._counters.setdefault(cause, Latest()).changes(counts)
             if changes:
-                rows, values = [told[at] for at in changes], [float(counts[at]) for at in changes]
-                yield Sheet(f"{layout.PACKETS}/{cause}", rows, rr.Scalars.columns(scalars=values))
+                rows, columns = (
+                    [told[at] for at in changes],
+                    rr.Scalars.columns(scalars=counts[changes]),
+                )
+                yield Sheet(f"{layout.PACKETS}/{cause}", rows, columns)
 
     def _references(self, last: int) -> Iterator[Sheet]:
         """Return the reference lines, drawn on as far as the block goes."""
@@ -120,21 +97,6 @@ class Sheets:
         for metric, values in self._limits.items():
             columns = rr.Scalars.columns(scalars=values * len(rows))
             yield Sheet(layout.limit_of(metric), rows, columns.partition([len(values)] * len(rows)))
-
-
-def lines(tick: Tick) -> NDArray[np.float32]:
-    """Return a line for each pair of which one hears the other (K, 2, 3) [m; world frame].
-
-    Each pair once; of too many, the shortest.
-    """
-    hears = _hears(tick)
-    pairs = np.argwhere(np.triu(hears | hears.T, k=1))
-    ends: Singles = tick.position[pairs]
-    ends = ends[~np.isnan(ends).any(axis=(1, 2))]
-    if len(ends) > LINES_MAX:
-        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        ends = ends[np.sort(np.argsort(length, kind="stable")[:LINES_MAX])]
-    return ends
 
 
 def _trail(ticks: Sequence[Tick], colours: palette.Colours) -> Sheet:
@@ -172,51 +134,26 @@ def _quaternions(attitude: Singles) -> Singles:
 
 def _metrics(ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Sheet]:
     counts = [len(ticks[0].alive)] * len(ticks)
+    near = [seen.obstacle_distance for seen in figures if seen.obstacle_distance is not None]
     for entity, series in (
         (layout.FORCE, [tick.force for tick in ticks]),
         (layout.TURN_DEG, [tick.turn_deg for tick in ticks]),
         (layout.SEPARATION, [seen.separation for seen in figures]),
-        (layout.SLOT_ERROR, [_finite(seen.slot_error) for seen in figures]),
+        (layout.SLOT_ERROR, [seen.slot_error for seen in figures]),
+        *([(layout.OBSTACLE_DISTANCE, near)] if near else ()),
     ):
-        columns = rr.Scalars.columns(scalars=np.concatenate(series)).partition(counts)
+        values = np.concatenate(series)
+        if entity == layout.SLOT_ERROR:
+            values = np.where(np.isfinite(values), values, np.nan)
+        columns = rr.Scalars.columns(scalars=values).partition(counts)
         yield Sheet(entity, range(len(ticks)), columns)
-    near = [seen.obstacle_distance for seen in figures if seen.obstacle_distance is not None]
-    if near:
-        columns = rr.Scalars.columns(scalars=np.concatenate(near)).partition(counts)
-        yield Sheet(layout.OBSTACLE_DISTANCE, range(len(ticks)), columns)
 
 
 def _state(ticks: Sequence[Tick]) -> Sheet:
     """Return what the judge or a reader needs and no view shows."""
-    agents = len(ticks[0].alive)
-    place = np.concatenate([tick.place.ravel() for tick in ticks])
-    alive = np.concatenate([tick.alive for tick in ticks]).astype(np.uint8)
-    attitude = np.concatenate([tick.attitude.ravel() for tick in ticks])
-    counts = [agents] * len(ticks)
     columns = [
-        _column(layout.PLACE, place, [2 * agents] * len(ticks)),
-        _column(layout.ALIVE, alive, counts),
-        _column(layout.ATTITUDE, attitude, [3 * agents] * len(ticks)),
+        numbers(layout.PLACE, np.stack([tick.place for tick in ticks])),
+        numbers(layout.ALIVE, np.stack([tick.alive for tick in ticks]).astype(np.uint8)),
+        numbers(layout.ATTITUDE, np.stack([tick.attitude for tick in ticks])),
     ]
     return Sheet(layout.STATE, range(len(ticks)), columns)
-
-
-def _column(name: str, values: NDArray[Any], counts: list[int]) -> rr.ComponentColumn:
-    """Return numbers of our own kind as a column, ``counts`` of them to a row.
-
-    Given as an Arrow array: rerun looks at anything else number by number.
-    """
-    return rr.ComponentColumn(name, rr.AnyBatchValue(name, arrow_array(values)), lengths=counts)
-
-
-def _finite(error: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.where(np.isfinite(error), error, np.nan)
-
-
-def _hears(tick: Tick) -> NDArray[np.bool_]:
-    """Return who hears whom (N, N), of agents that exist: what an agent tells may be anything."""
-    agents = len(tick.alive)
-    links = tick.links[np.all((tick.links >= 0) & (tick.links < agents), axis=1)]
-    hears = np.zeros((agents, agents), dtype=np.bool_)
-    hears[links[:, 0], links[:, 1]] = True
-    return hears

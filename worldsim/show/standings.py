@@ -14,7 +14,7 @@ from agent.messages import ROLES
 from worldsim.judge.tick import Singles, Standings, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.show import layout, palette
-from worldsim.show.sheet import Latest, Sheet, Thinned
+from worldsim.show.sheet import Latest, Sheet, Thinned, strips_of
 
 SAMPLES_HZ = 4.0
 LINES_PER_S = 500
@@ -34,7 +34,7 @@ class StandingSheets:
         self._every = max(1, round(tick_hz / SAMPLES_HZ))
         self._lines = Thinned(tick_hz, LINES_PER_S)
         self._labels = Latest()
-        self._roles = [Latest() for _ in self._names[: layout.NAMED_MAX]]
+        self._roles = Latest()
 
     def of(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Sheet]:
         """Return the sheets of a block; blocks come in order."""
@@ -47,9 +47,14 @@ class StandingSheets:
             yield from self._lanes(standings)
 
     def _labelled(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
-        """Return vehicles' names, with what sets an agent apart from a plain member."""
-        keys = [_standing_keys(tick) for tick in ticks]
+        """Return vehicles' names, with what sets an agent apart from a plain member.
+
+        Where they are not shown unless one is pointed at, once a block is enough.
+        """
+        keys = np.stack([_standing_keys(tick) for tick in ticks])
         rows = self._labels.changes(keys)
+        if len(self._names) > layout.NAMED_MAX:
+            rows = rows[-1:]
         if rows:
             labels = [label for row in rows for label in self._labels_of(keys[row])]
             columns = rr.Boxes3D.columns(labels=labels)
@@ -73,7 +78,7 @@ class StandingSheets:
                 self._lines.drawn(tick.index, len(ends))
         if rows:
             columns = rr.LineStrips3D.columns(
-                strips=np.concatenate(strips), colors=np.concatenate(colours)
+                strips=strips_of(np.concatenate(strips)), colors=np.concatenate(colours)
             )
             yield Sheet(layout.HIERARCHY, rows, columns.partition([len(some) for some in strips]))
 
@@ -103,12 +108,12 @@ class StandingSheets:
 
     def _lanes(self, standings: Sequence[Standings]) -> Iterator[Sheet]:
         """Return each agent's role over time."""
-        roles = np.stack([standing.role for standing in standings], axis=1)
-        for agent, latest in enumerate(self._roles):
-            rows = latest.changes(list(roles[agent]))
-            if rows:
-                words = [role_word(int(roles[agent, row])) for row in rows]
-                yield Sheet(layout.role_of(agent), rows, rr.StateChange.columns(state=words))
+        roles = np.stack([standing.role[: layout.NAMED_MAX] for standing in standings])
+        departs = self._roles.departs(roles)
+        for agent in map(int, np.flatnonzero(departs.any(axis=0))):
+            rows = [int(row) for row in np.flatnonzero(departs[:, agent])]
+            words = [role_word(int(role)) for role in roles[rows, agent]]
+            yield Sheet(layout.role_of(agent), rows, rr.StateChange.columns(state=words))
 
     def _sampled(self, ticks: Sequence[Tick]) -> list[int]:
         return [row for row, tick in enumerate(ticks) if tick.index % self._every == 0]
