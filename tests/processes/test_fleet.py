@@ -29,6 +29,16 @@ def ctrl_c(*_):
 fleet.write_users = ctrl_c
 main()
 """
+FULL_FROM_THE_START = """
+from pathlib import Path
+from worldsim.cli import main
+
+def full(draft, *_):
+    raise OSError(28, "No space left on device")
+
+Path.replace = full
+main()
+"""
 
 
 @pytest.fixture
@@ -142,6 +152,28 @@ def test_an_interrupt_before_there_is_a_world_leaves_scenario_and_logs(
     assert fleet.status(8.0) == 130, fleet.text
     assert "Traceback" not in fleet.text
     assert sorted(file.name for file in run.iterdir()) == ["logs", "scenario.toml"]
+
+
+def test_a_disk_too_full_for_a_start_is_one_line_and_status_2(
+    start: Start, scenario: Write, run: Path
+) -> None:
+    full = EARLY_CTRL_C.replace("KeyboardInterrupt", "OSError(28, 'No space left on device')")
+    program = [sys.executable, "-c", full]
+    fleet = start(*program, "run", scenario(60.0), "--out", str(run))
+    assert fleet.status(8.0) == 2, fleet.text
+    assert fleet.text.splitlines()[1:] == [f"{run}/users: no space left on device"]
+    assert sorted(file.name for file in run.iterdir()) == ["logs", "scenario.toml"]
+
+
+def test_a_disk_that_fills_up_while_agents_start_ends_the_run_and_leaves_no_password(
+    start: Start, scenario: Write, run: Path
+) -> None:
+    program = [sys.executable, "-c", FULL_FROM_THE_START]
+    fleet = start(*program, "run", scenario(60.0), "--out", str(run))
+    assert fleet.status(15.0) == 1, fleet.text
+    assert fleet.text.splitlines()[1:] == [f"{run}/fleet.json: no space left on device"]
+    assert not (run / "users").exists()
+    assert not list(run.glob("*.part"))
 
 
 def test_kill_9_of_the_launcher_leaves_no_process_and_a_summary(

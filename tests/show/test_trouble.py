@@ -72,6 +72,11 @@ def test_a_full_disk_is_said_once_and_the_run_ends_cleanly(tmp_path: Path) -> No
     assert read_run(path).ticks
 
 
+def test_a_full_disk_that_holds_stderr_too_ends_no_run(tmp_path: Path) -> None:
+    ended = run(f"import sys; sys.stderr = open('/dev/full', 'w')\n{FULL}", tmp_path / "run.rrd")
+    assert ended.stdout == "161\n"
+
+
 @pytest.mark.parametrize("kept", [0.5, 0.75, 0.9, 0.999, 1.0])
 def test_a_file_cut_anywhere_is_read_as_far_as_it_goes(tmp_path: Path, kept: float) -> None:
     path = tmp_path / "run.rrd"

@@ -5,13 +5,15 @@ either, a child would hang.
 """
 
 import ctypes
+import io
 import os
 import signal
 import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 _PR_SET_PDEATHSIG = 1
 
@@ -33,6 +35,30 @@ class Exit(NamedTuple):
         if self.signal is not None:
             return f"was killed by signal {self.signal}"
         return f"ended with status {self.status}"
+
+
+class Log(io.RawIOBase):
+    """Descriptor 1, the log, and what the parent has for stderr where the log takes no more.
+
+    On a full disk the recording's end must still be said, and saying so must stop nobody.
+    """
+
+    def __init__(self, otherwise: int) -> None:
+        self._otherwise = otherwise
+
+    def writable(self) -> bool:
+        """Say that it is."""
+        return True
+
+    def write(self, data: Any, /) -> int:
+        """Write to the log, or else to the other; what neither takes is lost."""
+        try:
+            return os.write(1, data)
+        except OSError:
+            # A terminal that is gone as well leaves nobody to tell.
+            with suppress(OSError):
+                os.write(self._otherwise, data)
+            return len(data)
 
 
 def fork(log: Path | None, death_signal: signal.Signals, main: Callable[[], int]) -> int:
@@ -89,11 +115,15 @@ def _follow(parent: int, death_signal: signal.Signals) -> None:
 def _redirect(log: Path | None) -> None:
     """Read nothing, and write to the log, whatever the parent made of its own streams."""
     _replace(0, os.open(os.devnull, os.O_RDONLY))
-    if log is not None:
-        _replace(1, os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644))
-        os.dup2(1, 2)
-    sys.stdout = os.fdopen(1, "w", buffering=1, closefd=False)
-    sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
+    if log is None:
+        sys.stdout = os.fdopen(1, "w", buffering=1, closefd=False)
+        sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
+        return
+    otherwise = os.dup(2)
+    _replace(1, os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644))
+    os.dup2(1, 2)
+    written = io.BufferedWriter(Log(otherwise))
+    sys.stdout = sys.stderr = io.TextIOWrapper(written, encoding="utf-8", line_buffering=True)
 
 
 def _replace(descriptor: int, other: int) -> None:

@@ -25,7 +25,7 @@ from worldsim.run.lines import Line, Lines
 from worldsim.run.outside import Conducted, Progress
 from worldsim.run.process import Terms
 from worldsim.run.roster import ProcessRow, Roster, processes
-from worldsim.run.rundir import RunDirectory
+from worldsim.run.rundir import RunDirectory, unwritable
 from worldsim.run.summary import EXIT_STATUS
 from worldsim.run.terminal import Terminal
 from worldsim.run.zygote import Brood, Zygote
@@ -151,7 +151,7 @@ class Launch:
 
     def _start(self) -> None:
         agents = range(self._scenario.fleet.agents)
-        write_users(self._directory.users, self._users())
+        self._let_in()
         zygote = self._kin.start("zygote", signal.SIGKILL, self._be_zygote)
         self._zygote_end.close()
         mediums = {
@@ -168,6 +168,13 @@ class Launch:
         self._kin.listen(self._zygote, self._hear_zygote)
         self._kin.listen(self._world, self._hear_world)
         self._zygote.send(do="start", whom=[(agent, 0) for agent in agents], after_s=0.0)
+
+    def _let_in(self) -> None:
+        try:
+            write_users(self._directory.users, self._users())
+        except OSError as error:
+            self._directory.nothing_flew()
+            raise unwritable(self._directory.users, error) from error
 
     def _users(self) -> list[str]:
         mediums = [medium_name(shard) for shard in range(self._terms.shards)]
@@ -207,7 +214,7 @@ class Launch:
                 self._agent_ended(line)
             else:
                 self._world.send(**line)
-        if any("spawned" in line for line in lines):
+        if not self._landing and any("spawned" in line for line in lines):
             self._roster.write()
 
     def _hear_world(self) -> None:

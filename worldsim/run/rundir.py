@@ -2,6 +2,7 @@
 
 import json
 import sys
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -50,7 +51,7 @@ class RunDirectory:
             (directory.path / "scenario.toml").write_text(dump(scenario), encoding="utf-8")
             directory._events.touch()
         except OSError as error:
-            raise RunDirectoryError(directory.path, _reason(error)) from error
+            raise unwritable(directory.path, error) from error
         return directory
 
     def event(self, event: dict[str, Any]) -> None:
@@ -106,7 +107,14 @@ def write_json(path: Path, content: dict[str, Any]) -> None:
         draft.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
         draft.replace(path)
     except OSError as error:
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
         raise RunWriteError(path, _reason(error)) from error
+
+
+def unwritable(path: Path, error: OSError) -> RunDirectoryError:
+    """Return what is said of a file that a run cannot start without."""
+    return RunDirectoryError(path, _reason(error))
 
 
 def _named_after_now(name: str) -> Path:

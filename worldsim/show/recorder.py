@@ -6,7 +6,8 @@ a tenth of sending them one by one, and loses at most that second when the proce
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -34,12 +35,15 @@ from worldsim.truth.obstacle import Obstacles
 Event = dict[str, Any]
 FLUSH_S = 5.0
 UNSPOKEN = frozenset({"t_s", "kind", "agent", "tables", "conditions", "path"})
+_ENCODER = json.JSONEncoder(default=str)
 WARNINGS = frozenset({"kill", "leave", "pause", "partition", "jam", "late"})
 
 
 def complain(text: str) -> None:
     """Say what is wrong with a recording, where a person sees it."""
-    print(f"recording: {text}", file=sys.stderr, flush=True)
+    # Where stderr is a file on the same full disk nobody can be told; the flight goes on.
+    with suppress(OSError):
+        print(f"recording: {text}", file=sys.stderr, flush=True)
 
 
 class RunRecorder:
@@ -152,9 +156,11 @@ class RunRecorder:
     def _flush(self) -> None:
         if self._ticks:
             self._team = int(np.count_nonzero(self._ticks[-1].alive))
+            times = _Times(self._ticks)
             # All are made before any is sent: rows that do not fit leave no half a second behind.
             for sheet in tuple(self._sheets_of(self._ticks, self._figures)):
-                self._send(sheet)
+                at = times.of(sheet.rows)
+                rr.send_columns(sheet.entity, at, sheet.columns, recording=self._stream)
         if not self._track.rests:
             self._move_slots()
         if self._events:
@@ -188,16 +194,10 @@ class RunRecorder:
         for entity, part in scenery.formation():
             self._stream.log(entity, part)
 
-    def _send(self, sheet: Sheet) -> None:
-        ticks = [self._ticks[row] for row in sheet.rows]
-        times = [tick.time_s for tick in ticks]
-        indexes = _indexes(times, [tick.index for tick in ticks]) if ticks else []
-        rr.send_columns(sheet.entity, indexes, sheet.columns, recording=self._stream)
-
     def _send_events(self) -> None:
         times = [float(event["t_s"]) for event in self._events]
         ticks = [self._tick_at(t) for t in times]
-        told = [json.dumps(event, default=str) for event in self._events]
+        told = [_ENCODER.encode(event) for event in self._events]
         columns = [
             *rr.TextLog.columns(
                 text=[sentence(event) for event in self._events],
@@ -223,6 +223,22 @@ def sentence(event: Event) -> str:
     words = (f"{value}" if key == kind else f"{key} {value}" for key, value in rest.items())
     details = ", ".join(words)
     return f"{kind}{agent}" + (f": {details}" if details else "")
+
+
+class _Times:
+    """The times of a block of ticks as rerun's columns: sheets of the same ticks share them."""
+
+    def __init__(self, ticks: Sequence[Tick]) -> None:
+        self._ticks = ticks
+        self._made: dict[tuple[int, ...], list[rr.TimeColumn]] = {(): []}
+
+    def of(self, rows: Sequence[int]) -> list[rr.TimeColumn]:
+        """Return when rows of the block are; nothing for what holds at any time."""
+        key = tuple(rows)
+        if key not in self._made:
+            ticks = [self._ticks[row] for row in rows]
+            self._made[key] = _indexes([t.time_s for t in ticks], [t.index for t in ticks])
+        return self._made[key]
 
 
 def _indexes(times_s: list[float], ticks: list[int]) -> list[rr.TimeColumn]:
