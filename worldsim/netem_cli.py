@@ -9,6 +9,7 @@ import typer
 from worldsim.operating import ForSeconds, radio
 from worldsim.options import Seed, Settings, overrides_of
 
+PICTURES = (".png", ".svg", ".pdf")
 Words = Annotated[
     list[str],
     typer.Argument(
@@ -49,6 +50,8 @@ def _check(file: Path, overrides: dict[str, str], plot: Path | None) -> int:
     from worldsim.survey.survey import survey
 
     scenario = load(file, overrides)
+    if plot is not None and plot.suffix not in PICTURES:
+        raise typer.BadParameter(f"'{plot}'; it ends in {', '.join(PICTURES)}", param_hint="--plot")
     picture = plot or Path("runs") / f"{scenario.name}-netem-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.png"
     if picture.exists():
         raise ScenarioError(picture, "", "exists; nothing is overwritten")

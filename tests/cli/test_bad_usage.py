@@ -39,6 +39,7 @@ BAD = [
     (("sim", "small.toml", "--out", "small.toml/x"), "cannot be made: not a directory"),
     (("run", "small.toml", "--out", "."), "exists; a run is never overwritten"),
     (("sim", "small.toml", "--seeds", "0:2", "--out", "."), "exists"),
+    (("netem", "check", "small.toml", "--plot", "radio.txt"), "'radio.txt'; it ends in .png"),
     (("verify", "none"), "none: no such"),
     (("ps", "none"), "none: no fleet.json"),
 ]
