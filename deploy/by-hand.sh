@@ -11,9 +11,10 @@ endpoint=tcp/127.0.0.1:${QSWARM_PORT:-7447}
 run=by-hand
 out=${2:-runs/by-hand-$(date -u +%Y%m%dT%H%M%SZ)}
 
+resolved=$(.venv/bin/qswarm check "$scenario")
 agents=$("$python" -c '
 import sys, tomllib
-print(tomllib.load(open(sys.argv[1], "rb"))["fleet"]["agents"])' "$scenario")
+print(tomllib.load(sys.stdin.buffer)["fleet"]["agents"])' <<<"$resolved")
 
 pids=()
 trap 'kill "${pids[@]}" 2>/dev/null || true; wait' EXIT
@@ -30,7 +31,7 @@ done
 
 status=0
 wait "$world" || status=$?
-if [[ -f $out/summary.json ]]; then
+if [[ $status != 2 && -f $out/summary.json ]]; then
     "$python" -c '
 import json, sys
 print("outcome:", json.load(open(sys.argv[1]))["outcome"])' "$out/summary.json"

@@ -72,6 +72,20 @@ def test_a_fleet_started_by_a_shell_loop_passes(
     assert "outcome: pass" in fleet.text
 
 
+def test_a_shell_loop_refuses_what_cannot_fly_and_tells_no_older_run(
+    start: Start, scenario: Callable[[float], str], tmp_path: Path
+) -> None:
+    by_hand = ("bash", str(REPOSITORY / "deploy/by-hand.sh"))
+    missing = start(*by_hand, "none.toml")
+    assert (missing.status(15.0), missing.text) == (2, "none.toml: no such file\n")
+    (tmp_path / "older").mkdir()
+    (tmp_path / "older/summary.json").write_text('{"outcome": "pass"}')
+    late = start(*by_hand, scenario(6.0), f"{tmp_path}/older")
+    assert late.status(15.0) == 2
+    assert "older: exists; a run is never overwritten" in late.text
+    assert "outcome" not in late.text
+
+
 def test_netem_that_nobody_asked_ends_when_told_to(start: Start, endpoint: str) -> None:
     netem = start(*PYTHON, "netem", "--listen", endpoint)
     netem.says("netem listens at")
