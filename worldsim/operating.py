@@ -63,6 +63,8 @@ def fault(
 
 def radio(run: Path, verb: str, words: list[str], for_s: float | None) -> int:
     """Change the radio of a running fleet, or show it; return the exit status."""
+    if verb in {"show", "heal"} and words:
+        raise typer.BadParameter(f"{' '.join(words)!r}; {verb} stands alone", param_hint="WORD")
     match verb:
         case "show":
             return _shown(run)
@@ -144,6 +146,10 @@ def _table(settings: list[str]) -> dict[str, Any]:
     from worldsim.options import overrides_of
     from worldsim.scenario.toml import override
 
+    for setting in settings:
+        key, equals, _ = setting.partition("=")
+        if not equals or not key.strip():
+            raise typer.BadParameter(f"{setting!r}; write it as KEY=VALUE", param_hint="WORD")
     table: dict[str, Any] = {}
     override(table, overrides_of(settings, None, None, None), "KEY=VALUE")
     return table
