@@ -58,15 +58,16 @@ class Table:
         latest_s = now_s + slack_s
         earliest_s = now_s - self._relayed_silence_s / (1.0 - 2.0 * LAG_SMOOTHING)
         for record in gossip.records:
-            plausible = record.id != self._own_id and earliest_s <= record.stamp_s <= latest_s
-            version = (record.incarnation, record.version)
-            news = plausible and version > self._last.get(record.id, NEVER)
-            if news and (record.id in self._newest or self._has_room):
-                self._last[record.id] = version
-                self._newest[record.id] = record
-                lag_s = self._lag_s.get(record.id, 0.0)
+            who, version = record.id, (record.incarnation, record.version)
+            if version <= self._last.get(who, NEVER):
+                continue
+            plausible = who != self._own_id and earliest_s <= record.stamp_s <= latest_s
+            if plausible and (who in self._newest or self._has_room):
+                self._last[who] = version
+                self._newest[who] = record
+                lag_s = self._lag_s.get(who, 0.0)
                 age_s = max(0.0, now_s - record.stamp_s)
-                self._lag_s[record.id] = lag_s + LAG_SMOOTHING * (age_s - lag_s)
+                self._lag_s[who] = lag_s + LAG_SMOOTHING * (age_s - lag_s)
 
     def forget_silent(
         self, now_s: float, heard: Collection[int], lost: Mapping[int, float] = NOBODY
@@ -77,6 +78,7 @@ class Table:
         :meth:`Neighbours.forget_silent`. One of whom others tell later than that, or who never was
         a neighbour, may be silent for as long as relays take.
         """
+        lag_s = self._lag_s
         gone = [
             who
             for who, newest in self._newest.items()
@@ -84,7 +86,7 @@ class Table:
                 who not in heard
                 if isinstance(newest, Beacon)
                 else newest.stamp_s <= lost.get(who, -inf)
-                or now_s - newest.stamp_s > self._may_be_silent_s(who)
+                or now_s - newest.stamp_s > self._relayed_silence_s + 2.0 * lag_s.get(who, 0.0)
             )
         ]
         departed = []
@@ -125,9 +127,6 @@ class Table:
         said = [Gossip(self._own_id, own.stamp_s, chunk, None) for chunk in _chunks(records)]
         said += [Gossip(self._own_id, own.stamp_s, (), piece) for piece in pieces]
         return [sealed(encode(gossip)) for gossip in said]
-
-    def _may_be_silent_s(self, who: int) -> float:
-        return self._relayed_silence_s + 2.0 * self._lag_s.get(who, 0.0)
 
     @property
     def _has_room(self) -> bool:
