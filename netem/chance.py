@@ -6,7 +6,7 @@ shape is netem's own default, from -1 to 1.
 """
 
 from collections.abc import Callable
-from hashlib import blake2b
+from hashlib import blake2b, shake_128
 from math import erfc, pow, sqrt
 from statistics import NormalDist
 from struct import Struct as Layout
@@ -14,11 +14,13 @@ from struct import Struct as Layout
 Numbers = tuple[float, ...]
 WIDEST = 32767.0 / 8192.0
 """Where netem's tables end, in standard deviations."""
-SHARING = 4
+SHARING = 32
 """So many destinations share one draw where each needs no more than two numbers."""
 
 _KEY = Layout("<6q").pack
 _NUMBERS = Layout("<8Q").unpack
+_PAIR = Layout("<2Q").unpack_from
+_PAIR_B = 16
 _UNIT = 1.0 / 2**53
 _LEAST = 2.0**-54
 _MOST = 1.0 - 2.0**-53
@@ -33,15 +35,31 @@ def draw(
     destination: int,
     channel: int,
     count: int,
-    purpose: int = 0,
+    purpose: int,
 ) -> Numbers:
     """Return eight numbers in [0, 1) that belong to one frame on one link and to nothing else.
+
+    purpose: over 0, what several draws for one frame and link differ in.
 
     They are keyed, not drawn in sequence: order, process and shard do not matter.
     """
     key = _KEY(source, incarnation, destination, channel, count, purpose)
     drawn = _NUMBERS(blake2b(key, key=seed).digest())
     return tuple([(number >> 11) * _UNIT for number in drawn])
+
+
+def draw_shared(
+    seed: bytes, source: int, incarnation: int, group: int, channel: int, count: int
+) -> bytes:
+    """Return what one frame draws for a group of ``SHARING`` destinations; see ``pair``."""
+    key = _KEY(source, incarnation, group, channel, count, 0)
+    return shake_128(seed + key).digest(SHARING * _PAIR_B)
+
+
+def pair(shared: bytes, destination: int) -> tuple[float, float]:
+    """Return one destination's two numbers in [0, 1) of what its group drew."""
+    first, second = _PAIR(shared, destination % SHARING * _PAIR_B)
+    return (first >> 11) * _UNIT, (second >> 11) * _UNIT
 
 
 def uniform(share: float) -> float:

@@ -7,7 +7,8 @@ for this very frame, and what the link remembers. So the same frame always meets
 from dataclasses import dataclass, field
 from enum import IntEnum
 from math import inf, log10
-from typing import NamedTuple
+
+import msgspec
 
 from netem.air import Air
 from netem.chance import SHAPES, Numbers, below, correlated
@@ -30,7 +31,7 @@ class Cause(IntEnum):
     DROPPED_QUEUE = 5
 
 
-class Verdict(NamedTuple):
+class Verdict(msgspec.Struct, frozen=True, gc=False):
     """What a link decides: the cause, and the delay [s] of a frame that gets across.
 
     turned: which share of its bits along a frame one is that arrives wrong, in [0, 1); negative

@@ -6,7 +6,7 @@ link: in range, not barred, sent. They come in the order of their counts.
 
 import msgspec
 
-from netem.chance import SHARING, Numbers, draw
+from netem.chance import SHARING, draw, draw_shared, pair
 from netem.link import FRESH, LOST_TO_QUEUE, LinkModel, Memory, Verdict, twice, verdict
 from netem.near import Near
 from netem.wire.frame import Frame
@@ -36,14 +36,12 @@ class Links:
             ]
         source, incarnation, channel, count = sending.key
         fates: list[Verdict] = []
-        numbers: Numbers = ()
-        group = -1
+        shared, group = b"", -1
         for receiver, distance_m in near:
             if receiver // SHARING != group:
                 group = receiver // SHARING
-                numbers = draw(self._seed, source, incarnation, group, channel, count)
-            at = receiver % SHARING * 2
-            fates.append(verdict(link, distance_m, numbers[at : at + 2]))
+                shared = draw_shared(self._seed, source, incarnation, group, channel, count)
+            fates.append(verdict(link, distance_m, pair(shared, receiver)))
         waited_s = sending.waited_s
         return [_later(fate, waited_s) for fate in fates] if waited_s else fates
 

@@ -207,7 +207,9 @@ class Medium:
         if waited_s is None:
             self._fates[Cause.DROPPED_QUEUE] += self._others[source]
             if source in self._own:
-                self._journal.pages[source] += HEAD(*sending.key) + FATE(0, *LOST_TO_QUEUE)
+                self._journal.pages[source] += HEAD(*sending.key) + FATE(
+                    0, LOST_TO_QUEUE.cause, 0.0, -1.0
+                )
         return waited_s
 
     def _cross_clean(self, sending: Sending, near: Near, delay_s: float) -> None:
@@ -223,10 +225,18 @@ class Medium:
 
     def _cross_plain(self, sending: Sending, near: Near, link: LinkModel) -> None:
         """Judge a frame on links that are all alike, and no more than late and lossy."""
-        head = HEAD(*sending.key)
-        fates = self._links.plain(link, sending, near)
-        for (receiver, _), fate in zip(near, fates, strict=True):
-            self._note(sending, head, receiver, fate)
+        frame, key, sent_s = sending.frame, sending.key, sending.sent_s
+        head, queues, pages = HEAD(*key), self._queues, self._journal.pages
+        lost = self._fates
+        across = 0
+        for (receiver, _), fate in zip(near, self._links.plain(link, sending, near), strict=True):
+            pages[receiver] += head + FATE(0, fate.cause, fate.delay_s, fate.turned)
+            if fate.cause:
+                lost[fate.cause] += 1
+            else:
+                queues[receiver].append((sent_s + fate.delay_s, *key, 0, frame))
+                across += 1
+        self.in_flight += across
 
     def _cross(self, sending: Sending, near: Near) -> None:
         """Judge a frame on each link to those who may hear it."""
@@ -255,10 +265,10 @@ class Medium:
         self, sending: Sending, head: bytes, receiver: int, fate: Verdict, copy: int = 0
     ) -> None:
         """Enter a verdict in the books, and a frame that gets across in its receiver's queue."""
-        cause, delay_s, turned = fate
-        self._journal.pages[receiver] += head + FATE(copy, cause, delay_s, turned)
-        if cause:
-            self._fates[cause] += 1
+        delay_s, turned = fate.delay_s, fate.turned
+        self._journal.pages[receiver] += head + FATE(copy, fate.cause, delay_s, turned)
+        if fate.cause:
+            self._fates[fate.cause] += 1
             return
         frame = sending.frame
         if turned >= 0.0 and frame.payload:

@@ -5,17 +5,24 @@ from math import inf, nan, sqrt
 
 import pytest
 
-from netem.chance import draw
+from netem.chance import SHARING, draw, draw_shared, pair
 from netem.link import Cause, LinkModel, Verdict, verdict
 
 PACKETS = 100_000
 SEED = bytes(range(32))
-KEY = {"seed": SEED, "source": 0, "incarnation": 0, "destination": 1, "channel": 0, "count": 0}
+SHARED = {"seed": SEED, "source": 0, "incarnation": 0, "group": 0, "channel": 0, "count": 0}
+KEY = {**SHARED, "destination": 1, "purpose": 1}
+KEY.pop("group")
 
 
 def draws(packets=PACKETS, **other):
     key = {**KEY, **other}
     return [draw(**{**key, "count": count}) for count in range(packets)]
+
+
+def pairs(packets=PACKETS, destination=1, **other):
+    key = {**SHARED, **other}
+    return [pair(draw_shared(**{**key, "count": k}), destination) for k in range(packets)]
 
 
 def kolmogorov_smirnov(samples, distribution):
@@ -33,7 +40,7 @@ def uniform(low, high):
 
 @pytest.fixture(scope="module")
 def frames():
-    return draws()
+    return pairs()
 
 
 @pytest.mark.parametrize("loss_percent", [1.0, 10.0, 50.0, 80.0, 99.0])
@@ -97,8 +104,33 @@ def test_one_frame_says_nothing_about_the_next(frames):
 
 def test_a_draw_belongs_to_its_frame_alone():
     assert draw(**KEY) == draw(**KEY)
-    assert len({each for key in KEY if key != "seed" for each in [draw(**{**KEY, key: 9})]}) == 5
+    assert len({each for key in KEY if key != "seed" for each in [draw(**{**KEY, key: 9})]}) == 6
     assert all(0.0 <= number < 1.0 for each in draws(1000) for number in each)
+
+
+def test_a_shared_draw_belongs_to_its_frame_and_group_alone():
+    assert draw_shared(**SHARED) == draw_shared(**SHARED)
+    others = [draw_shared(**{**SHARED, key: 9}) for key in SHARED if key != "seed"]
+    assert len({draw_shared(**SHARED), *others}) == 6
+
+
+def test_of_a_shared_draw_each_destination_has_two_numbers_of_its_own():
+    shared = draw_shared(**SHARED)
+    numbers = [number for destination in range(SHARING) for number in pair(shared, destination)]
+    assert len(set(numbers)) == 2 * SHARING
+    assert all(0.0 <= number < 1.0 for number in numbers)
+    assert pair(shared, SHARING + 3) == pair(shared, 3)
+
+
+@pytest.mark.parametrize("destination", [0, 1, SHARING - 1])
+def test_numbers_of_shared_draws_are_uniform_and_independent(destination):
+    first, second = zip(*pairs(destination=destination), strict=True)
+    beside, _ = zip(*pairs(destination=destination ^ 1), strict=True)
+    for samples in (first, second):
+        assert kolmogorov_smirnov(samples, uniform(0.0, 1.0)) < 1.95 / sqrt(PACKETS)
+    for others in (second, beside):
+        agree = sum((a < 0.5) == (b < 0.5) for a, b in zip(first, others, strict=True))
+        assert abs(agree / PACKETS - 0.5) < 0.0052
 
 
 @pytest.mark.parametrize("distance_m", [6.0 + 1e-9, inf, nan])
