@@ -1,6 +1,6 @@
 """Links with all that they may have: rates, copies, turned bits, overtaking, bursts, soft edges."""
 
-from math import sqrt
+from math import inf, sqrt
 from random import Random
 
 import pytest
@@ -63,6 +63,20 @@ def test_a_link_with_a_rate_of_its_own_has_a_queue_of_its_own():
     assert len(made.collect(2, 0.0)) == 2
     assert [len(made.collect(1, now_s)) for now_s in (0.0999, 0.1001, 9.0)] == [0, 1, 0]
     assert made.verdicts(0).fates["dropped_queue"] == 1
+
+
+def test_a_backlog_goes_out_at_the_rate_that_holds_by_then():
+    air = Air()
+    for _ in range(10):
+        air.enter(0.0, 1000, rate_kbit=1.0, limit=100)  # 8 s each
+    assert air.enter(1.0, 1000, rate_kbit=800.0, limit=100) == pytest.approx(11 * 0.01)
+    assert air.enter(2.0, 1000, rate_kbit=800.0, limit=100) == pytest.approx(0.01)
+
+
+def test_a_rate_next_to_nothing_is_got_over():
+    air = Air()
+    assert air.enter(0.0, 1000, rate_kbit=5e-324, limit=2) == inf
+    assert air.enter(1.0, 1000, rate_kbit=800.0, limit=2) == pytest.approx(0.02)
 
 
 def test_an_idle_queue_starts_anew():
