@@ -16,8 +16,11 @@ MAX_CONDITIONS_B = 1024 * 1024
 MAX_ORDERS_B = 1024 * 1024
 MAX_TURN_B = MAX_TRUTH_B + MAX_ORDERS_B
 MAX_DONE_B = 4 * 1024 * 1024
+MIN_RATE_KBIT = 0.001
+"""A byte in 8 s; below that a frame would be on the air for longer than any flight."""
 
-
+FlapPeriod = Annotated[float, Meta(ge=0.05, le=86_400)]
+"""How long a flap takes [s]; faster than slots it would be down by chance."""
 Percent = Annotated[float, Meta(ge=0, le=100)]
 
 
@@ -66,7 +69,7 @@ class LinkKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_def
     duplicate_percent: Percent | None = None
     corrupt_percent: Percent | None = None
     reorder_percent: Percent | None = None
-    rate_kbit: Annotated[float, Meta(gt=0, le=1e9)] | None = None
+    rate_kbit: Annotated[float, Meta(ge=MIN_RATE_KBIT, le=1e9)] | None = None
     rate_overhead_b: Annotated[int, Meta(ge=0, le=10_000)] | None = None
     limit: Annotated[int, Meta(ge=1, le=1_000_000)] | None = None
     gemodel: GilbertElliott | None = None
@@ -109,7 +112,7 @@ class Flap(_Table, frozen=True):
     links: directed, as (from, to); none: all.
     """
 
-    period_s: Annotated[float, Meta(gt=0, le=86_400)]
+    period_s: FlapPeriod
     from_s: Annotated[float, Meta(ge=0, le=1e9)] = 0.0
     links: Annotated[tuple[tuple[AgentId, AgentId], ...], Meta(max_length=10_000)] = ()
 

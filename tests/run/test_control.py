@@ -117,6 +117,8 @@ REFUSED = [
     ({"jam": {"centre_m": [0, 0, 0], "radius_m": -1}}, "jam.radius_m: got -1"),
     ({"flap": {"period_s": 2, "links": [[0, 9]]}}, "flap.links[0]: no agent 9"),
     ({"netem": {}}, "netem: no key to set"),
+    ({"netem": {"rate_kbit": 1e-300}}, "netem.rate_kbit: got 1e-300; allowed: a number from 0.001"),
+    ({"flap": {"period_s": 1e-300}}, "flap.period_s: got 1e-300; allowed: a number from 0.05"),
     ({"netem": {"loss_percent": nan}}, "netem.loss_percent: nothing, or a number that is not"),
     ({"netem": {"loss_percent": 5}, "for_s": nan}, "for_s: nothing, or a number that is not"),
     ({"jam": {"centre_m": [0, inf, 0], "radius_m": 1}}, "jam.centre_m[1]: nothing, or a number"),

@@ -181,7 +181,8 @@ LINKS = [
     ("gemodel", "{ p_percent = 5, r_percent = 120 }", "r_percent: got 120"),
     ("path_loss", "{ exponent = 3, budget_db = 70 }", "reference_loss_db: is missing"),
     ("path_loss.shadowing_db", "0", "above 0"),
-    ("rate_kbit", "0", "above 0"),
+    ("rate_kbit", "0", "from 0.001 up to"),
+    ("rate_kbit", "1e-300", "from 0.001 up to"),
     ("limit", "0", "from 1"),
     ("limit", "1.5", "a whole number"),
 ]

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from agent.messages import AgentId
 from agent.setup import Table
-from netem.messages import Flap, PartitionKind
+from netem.messages import Flap, FlapPeriod, PartitionKind
 
 Group = Annotated[tuple[AgentId, ...], Meta(min_length=1, max_length=1000)]
 Groups = Annotated[tuple[Group, ...], Meta(min_length=1, max_length=1000)]
@@ -33,7 +33,7 @@ class PartitionTable(Table, frozen=True):
 class FlapTable(Table, frozen=True):
     """Links that go down and up: down for the first half of each period; ``links``: all if none."""
 
-    period_s: Annotated[float, Meta(gt=0, le=86_400)]
+    period_s: FlapPeriod
     links: Annotated[tuple[Pair, ...], Meta(max_length=10_000)] = ()
 
     def from_s(self, time_s: float) -> Flap:
