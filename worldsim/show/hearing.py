@@ -61,15 +61,16 @@ def lines(tick: Tick) -> Singles:
     Each pair once; of too many, the shortest.
     """
     agents = len(tick.alive)
-    pairs = np.stack(np.divmod(_heard(tick), agents))
-    low, high = pairs.min(axis=0), pairs.max(axis=0)
+    hearer, heard = np.divmod(_heard(tick), agents)
+    low, high = np.minimum(hearer, heard), np.maximum(hearer, heard)
     once = np.unique((low * agents + high)[low < high])
     ends: Singles = tick.position[np.stack(np.divmod(once, agents), axis=1)]
-    ends = ends[~np.isnan(ends).any(axis=(1, 2))]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     if len(ends) > LINES_MAX:
-        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        ends = ends[np.sort(np.argsort(length, kind="stable")[:LINES_MAX])]
-    return ends
+        shortest = np.sort(np.argsort(length, kind="stable")[:LINES_MAX])
+        ends, length = ends[shortest], length[shortest]
+    there: Singles = ends[np.isfinite(length)]
+    return there
 
 
 def _heard(tick: Tick) -> Codes:

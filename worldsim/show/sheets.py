@@ -85,10 +85,8 @@ class Sheets:
             counts = np.array([ticks[row].packets[cause] for row in told], dtype=np.float64)
             changes = self._counters.setdefault(cause, Latest()).changes(counts)
             if changes:
-                rows, columns = (
-                    [told[at] for at in changes],
-                    rr.Scalars.columns(scalars=counts[changes]),
-                )
+                rows = [told[at] for at in changes]
+                columns = rr.Scalars.columns(scalars=counts[changes])
                 yield Sheet(f"{layout.PACKETS}/{cause}", rows, columns)
 
     def _references(self, last: int) -> Iterator[Sheet]:
