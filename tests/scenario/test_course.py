@@ -76,6 +76,8 @@ RADIO = [
     ("flap = { period_s = 1, links = [[0, 9]] }", "flap.links[0]", "no agent 9; 0 to 8"),
     ("flap = { period_s = 1, links = [[2, 2]] }", "flap.links[0]", "a link to itself"),
     ("flap = { period_s = 1, links = [[1, 2], [1, 2]] }", "flap.links[1]", "given before"),
+    ("netem = {}", "netem", "no key to set"),
+    ("netem = { local = {} }", "netem", "no key to set"),
     ("netem = { gemodel = { p_percent = 1 } }", "netem.gemodel.r_percent", "is missing"),
     ("netem = { duplicate_percent = 101 }", "netem.duplicate_percent", "up to 100"),
     ("netem = { link = [{ from = 0, to = 9 }] }", "netem.link[0].to", "no agent 9"),

@@ -11,7 +11,6 @@ import msgspec
 import numpy as np
 import zenoh
 
-from netem.messages import Conditions
 from netem.wire.post import Post, Waiting, drained
 from worldsim.run.barriers import in_force
 from worldsim.run.faults import Order
@@ -87,8 +86,6 @@ class Control:
         broken = broken_now(self._scenario, event, self._present())
         if broken is not None:
             raise RequestError(": ".join(part for part in broken if part))
-        if event.netem == Conditions():
-            raise RequestError("netem: no key to set")
         if event.kind in UPON_PROCESSES and not self._launcher:
             raise RequestError(f"{event.kind}: this fleet has no launcher; do it by hand")
         return event

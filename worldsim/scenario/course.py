@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from agent.codec import encode_formation
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
+from netem.messages import Conditions
 from worldsim.scenario.events import ACTIONS, UNDONE, EventTable
 from worldsim.scenario.frame import FrameTable, broken_key, changed
 from worldsim.scenario.radio import flap_faults, partition_faults
@@ -119,6 +120,8 @@ def _one_action(event: EventTable) -> Finding | None:
         return Finding(others[0], f"not beside {first}; one action an event")
     if event.heal is False:
         return Finding("heal", "true; a partition that holds needs no event")
+    if event.netem == Conditions():
+        return Finding("netem", "no key to set")
     if event.for_s is not None and first not in UNDONE:
         return Finding("for_s", f"{first} is not undone; for_s goes with {', '.join(UNDONE)}")
     return None
