@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.processes.harness import QSWARM, Started, events_of, pids
+from tests.processes.harness import QSWARM, Started, events_of, eventually, pids
 from worldsim.run.virtual import fly
 from worldsim.scenario.file import load
 
@@ -132,6 +132,26 @@ def test_a_medium_that_dies_ends_the_run_with_a_line(
     os.kill(pids(run)["netem-1"], signal.SIGKILL)
     assert fleet.status(15.0) == 1
     assert summary_of(run)["reason"] == "netem-1 was killed by signal 9"
+
+
+@pytest.mark.parametrize(
+    ("stopped", "awaited"), [("agent-2", "agent-2's command of slot"), ("netem", "")]
+)
+def test_whom_a_run_in_turns_waits_for_is_told_once(
+    start: Start, scenario: Write, run: Path, stopped: str, awaited: str
+) -> None:
+    fleet = in_turns(start, scenario(3000.0), run, "--no-recording")
+    fleet.says("in place")
+    pid = pids(run)[stopped]
+    os.kill(pid, signal.SIGSTOP)
+    fleet.says(f"standing still, waiting for {awaited}", within_s=10.0)
+    fleet.says(f"; stopped: {stopped}\n")
+    os.kill(pid, signal.SIGCONT)
+    flown = fleet.text.count(" of 3000 s")
+    eventually(lambda: fleet.text.count(" of 3000 s") > flown, 10.0)
+    fleet.kill_group(signal.SIGINT)
+    assert fleet.status(10.0) == 130, fleet.text
+    assert fleet.text.count("standing still") == 1
 
 
 def test_ctrl_c_ends_a_run_in_turns_as_any_other(start: Start, scenario: Write, run: Path) -> None:

@@ -227,6 +227,9 @@ class Launch:
                 self._pass_on(line)
             elif "missing" in line:
                 self._missing = line["missing"]
+            elif "waiting" in line:
+                why = f"waiting for {line['waiting']}{self._roster.stopped()}"
+                self.terminal.say(f"standing still, {why}")
             else:
                 self._landing = True
 
@@ -234,6 +237,7 @@ class Launch:
         """Hand what the world wants done to the zygote, which has the agents."""
         if line["do"] == "kill":
             self._doomed.update((agent, incarnation) for agent, incarnation in line["whom"])
+        self._roster.note(line["do"], line["whom"])
         self._zygote.send(**line)
 
     def _agent_ended(self, line: Line) -> None:

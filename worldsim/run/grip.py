@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from netem.messages import RadioOrder
 from netem.wire.turns import ANSWER_WITHIN_S, LockstepError, UnwantedError
 from worldsim.run.faults import Change, Flapping, Heal, Jamming, Partition
+from worldsim.run.headway import Standstill
 from worldsim.run.meaning import Deed
 from worldsim.run.muster import Muster
 from worldsim.run.outside import Outside
@@ -74,7 +75,7 @@ class Grip:
             self._until(lambda: self._outside.has_done(kind, whom), f"a {kind} of {whom}")
 
     def _until(self, there: Callable[[], bool], what: str) -> None:
-        waited_s = 0.0
+        waited_s, standstill = 0.0, Standstill(what, self._outside)
         while not there():
             if self._unwanted():
                 raise UnwantedError
@@ -82,3 +83,4 @@ class Grip:
                 raise LockstepError(f"{what} has not come within {ANSWER_WITHIN_S:g} s")
             self._outside.wait(LOOK_EVERY_S)
             waited_s += LOOK_EVERY_S
+            standstill.lasts(LOOK_EVERY_S)

@@ -1,4 +1,4 @@
-"""How far a flight is, told now and then to whoever follows it."""
+"""How far a flight is, told now and then to whoever follows it; and what keeps it from going on."""
 
 import numpy as np
 
@@ -7,6 +7,7 @@ from worldsim.run.outside import Outside, Progress
 from worldsim.run.slots import SlotLoop
 
 TELL_EVERY_S = 0.25
+STANDSTILL_S = 2.0
 
 
 class Headway:
@@ -35,3 +36,19 @@ class Headway:
             self._loop.judge.min_separation_m,
             late,
         )
+
+
+class Standstill:
+    """A wait for what has to come before a flight goes on; told once, when it has become long."""
+
+    def __init__(self, what: str, outside: Outside) -> None:
+        self._what = what
+        self._outside = outside
+        self._waited_s = 0.0
+
+    def lasts(self, more_s: float) -> None:
+        """Go on waiting, for ``more_s`` [s] more."""
+        before_s = self._waited_s
+        self._waited_s += more_s
+        if before_s < STANDSTILL_S <= self._waited_s:
+            self._outside.waiting(self._what)

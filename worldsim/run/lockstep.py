@@ -13,12 +13,19 @@ from netem.journal import Digest, joined
 from netem.messages import Done, Truth, Turn, Verdicts, together, unpack_done
 from netem.wire.frame import WireError, pack
 from netem.wire.keys import medium_name
-from netem.wire.post import Post
-from netem.wire.turns import TURN_RING, LockstepError, UnwantedError, answer, same_slot
+from netem.wire.post import Post, Ring
+from netem.wire.turns import (
+    LOOK_EVERY_S,
+    TURN_RING,
+    LockstepError,
+    UnwantedError,
+    answer,
+    same_slot,
+)
 from worldsim.judge.tick import Packets
 from worldsim.run.control import Control, Reception
 from worldsim.run.grip import Grip
-from worldsim.run.headway import Headway
+from worldsim.run.headway import Headway, Standstill
 from worldsim.run.meaning import Deed
 from worldsim.run.muster import Muster
 from worldsim.run.outside import Outside
@@ -127,7 +134,7 @@ class Lockstep:
 
     def _obey(self, agent: int, slot: int) -> None:
         what = f"agent-{agent}'s command of slot {slot}"
-        data = answer(self._commands[agent], what, self._look)
+        data = self._answer(self._commands[agent], what)
         try:
             command = decode_command(data)
         except RejectedError as error:
@@ -147,16 +154,22 @@ class Lockstep:
     def _part(self, shard: int, slot: int) -> Done:
         what = f"{medium_name(shard)}'s word of slot {slot}"
         try:
-            done = unpack_done(answer(self._done[shard], what, self._look))
+            done = unpack_done(self._answer(self._done[shard], what))
         except WireError as error:
             raise LockstepError(f"{what}: {error}") from error
         same_slot(what, done.slot, slot)
         return done
 
-    def _look(self) -> bool:
-        """While waiting: see who is lost, and whether the run is still wanted."""
-        self._watch()
-        return self._over_already()
+    def _answer(self, ring: Ring, what: str) -> bytes:
+        """Wait for a message; meanwhile see who is lost, and whether the run is still wanted."""
+        standstill = Standstill(what, self._outside)
+
+        def over() -> bool:
+            standstill.lasts(LOOK_EVERY_S)
+            self._watch()
+            return self._over_already()
+
+        return answer(ring, what, over)
 
     def _over_already(self) -> bool:
         return self._unwanted()

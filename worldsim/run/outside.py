@@ -86,6 +86,9 @@ class Outside(Protocol):
     def progress(self, progress: Progress) -> None:
         """Say how far the flight is."""
 
+    def waiting(self, what: str) -> None:
+        """Say for what the flight has been standing still."""
+
     def landing(self) -> None:
         """Say that the run is over, before the others hear of it and end."""
 
@@ -138,6 +141,10 @@ class Conducted:
     def progress(self, progress: Progress) -> None:
         """Tell the launcher how far the flight is."""
         self._lines.offer(progress=progress._asdict())
+
+    def waiting(self, what: str) -> None:
+        """Tell the launcher for what the flight stands still."""
+        self._lines.offer(waiting=what)
 
     def landing(self) -> None:
         """Tell the launcher that from now on everybody ends as planned."""
@@ -198,6 +205,10 @@ class ByHand:
         """Print how far the flight is, every two seconds."""
         if self._due():
             print(progress, flush=True)
+
+    def waiting(self, what: str) -> None:
+        """Print for what the flight stands still."""
+        print(f"waiting for {what}", flush=True)
 
     def landing(self) -> None:
         """Print what is ahead: the end."""

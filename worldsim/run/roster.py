@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
+from netem.wire.keys import agent_name
 from worldsim.run.rundir import RunDirectoryError, write_json
 
 FILE = "fleet.json"
@@ -28,10 +29,25 @@ class Roster:
         self._path = folder / FILE
         self._content = {"run": run, "endpoint": endpoint}
         self._processes: dict[str, tuple[int, int | None]] = {}
+        self._paused: set[str] = set()
 
     def add(self, name: str, pid: int) -> None:
         """Note a process that was just started; it takes the place of an earlier one."""
         self._processes[name] = (pid, _started(pid))
+
+    def note(self, deed: str, whom: list[tuple[int, int]]) -> None:
+        """Note a deed on agents, (agent, incarnation) each: who is paused is meant to be."""
+        names = {agent_name(agent) for agent, _ in whom}
+        self._paused = self._paused | names if deed == "pause" else self._paused - names
+
+    def stopped(self) -> str:
+        """Return in words whose process is stopped though nobody planned that; "" for none."""
+        names = [
+            name
+            for name, (pid, _) in self._processes.items()
+            if name not in self._paused and _stat(pid)[:1] == ["T"]
+        ]
+        return f"; stopped: {', '.join(names)}" if names else ""
 
     def write(self) -> None:
         """Write the file. Raises RunDirectoryError when the disk fails."""
@@ -78,9 +94,14 @@ def _started(pid: int) -> int | None:
 
     Pids come back; a pid with its start time does not.
     """
+    state, *fields = _stat(pid) or ["X"]
+    return None if state in "ZX" else int(fields[18])
+
+
+def _stat(pid: int) -> list[str]:
+    """Return what the kernel tells of a process, from its state on; nothing when it is gone."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
     except OSError:
-        return None
-    state, *fields = stat.rpartition(")")[2].split()
-    return None if state in "ZX" else int(fields[18])
+        return []
+    return stat.rpartition(")")[2].split()
