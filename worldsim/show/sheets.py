@@ -127,7 +127,7 @@ def _quaternions(attitude: Singles) -> Singles:
             cy * cp * cr + sy * sp * sr,
         ],
         axis=1,
-    )
+    ) + np.float32(0.0)  # no negative zeros: a level fleet's are all alike, and packed as one
 
 
 def _metrics(ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Sheet]:
