@@ -16,7 +16,7 @@ Json = Annotated[
 
 
 def bench(repeats: Repeats = 3, json: Json = None) -> int:
-    """Measure what a control step, a frame in the medium and virtual time cost.
+    """Measure what a control step, a frame in the medium, virtual time and a recording cost.
 
     CPU time of one core, never the wall clock; a busy host still adds to it. Takes half a minute.
     """

@@ -7,6 +7,7 @@ import pytest
 from worldsim.bench import table
 from worldsim.bench.fleets import wedge
 from worldsim.bench.parts import control_step_us, frame_us
+from worldsim.bench.recording import recording_mb, recording_us
 from worldsim.bench.table import MEASURES, Row, measured
 from worldsim.cli import command
 
@@ -36,6 +37,8 @@ def test_a_goal_is_a_bound_on_the_right_side(more, reached):
 def test_each_part_takes_some_time():
     assert control_step_us(50) > 0.0
     assert frame_us(9) > 0.0
+    assert recording_us(9) > 0.0
+    assert recording_mb(50) > recording_mb(9) > 1.0
     assert len({name for name, *_ in MEASURES}) == len(MEASURES)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from netem.messages import Conditions
 from worldsim.bench.fleets import IN_RANGE_M, flown_cpu_s, wedge
 from worldsim.bench.parts import control_step_us, frame_us
+from worldsim.bench.recording import recording_mb, recording_us
 
 TICK_HZ = 20.0
 WEDGE_S = 20.0
@@ -53,6 +54,8 @@ MEASURES: tuple[tuple[str, str, float, bool, Callable[[], float]], ...] = (
     ("virtual time, N = 9, one core", "x real time", 50.0, True, _real_time),
     ("virtual time, N = 10", "agent-steps/CPU s", 10_000.0, True, _steps(10, 10.0)),
     ("virtual time, N = 100", "agent-steps/CPU s", 20_000.0, True, _steps(100, 2.0)),
+    ("recording, a tick, N = 200", "us", 500.0, False, lambda: recording_us(200)),
+    ("recording, N = 200", "MB a minute", 25.0, False, lambda: recording_mb(200)),
 )
 
 
