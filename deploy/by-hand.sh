@@ -19,8 +19,13 @@ print(tomllib.load(sys.stdin.buffer)["fleet"]["agents"])' <<<"$resolved")
 pids=()
 trap 'kill "${pids[@]}" 2>/dev/null || true; wait' EXIT
 
-"$python" -m netem --listen "$endpoint" &
+# Nobody else starts before netem listens: at a port in use another netem would answer them.
+exec {netem}< <(exec "$python" -m netem --listen "$endpoint")
 pids+=($!)
+read -r line <&"$netem" || exit 2
+echo "$line"
+cat <&"$netem" &
+exec {netem}<&-
 "$python" -m worldsim "$scenario" --connect "$endpoint" --run "$run" --out "$out" &
 world=$!
 pids+=("$world")

@@ -86,6 +86,25 @@ def test_a_shell_loop_refuses_what_cannot_fly_and_tells_no_older_run(
     assert "outcome" not in late.text
 
 
+def test_a_shell_loop_flies_through_no_other_netem(
+    start: Start,
+    scenario: Callable[[float], str],
+    endpoint: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    other = start(*PYTHON, "netem", "--listen", endpoint)
+    other.says("netem listens at")
+    monkeypatch.setenv("QSWARM_PORT", endpoint.rpartition(":")[2])
+    out = tmp_path / "run"
+    fleet = start("bash", str(REPOSITORY / "deploy/by-hand.sh"), scenario(8.0), str(out))
+    assert fleet.status(30.0) == 2, fleet.text
+    assert fleet.text == f"netem: {endpoint}: the port is in use\n"
+    assert not out.exists()
+    assert other.process.poll() is None
+    assert "serves" not in other.text
+
+
 def test_netem_that_nobody_asked_ends_when_told_to(start: Start, endpoint: str) -> None:
     netem = start(*PYTHON, "netem", "--listen", endpoint)
     netem.says("netem listens at")
