@@ -5,7 +5,7 @@ that claims it. Agents that know the same find the same, with no negotiation and
 agents that know less find nearly the same, and the claims heard mend the rest.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Sequence
 from heapq import heapify, heappop, heapreplace
 from math import sqrt
 
@@ -28,14 +28,24 @@ def allot(
     places: Sequence[Place],
     slots: Sequence[Vector],
     hysteresis_m2: float = HYSTERESIS_M2,
+    concerned: Container[int] | None = None,
 ) -> dict[int, Place | None]:
     """Return a place for each member of the team, by id; None where there are too few.
 
     team: sorted by id; places, slots [m; world frame]: as many as the team has members, or fewer;
     in the same order in every agent. Claims come first, then the nearest pairs, then pairwise
-    exchanges until none saves anything.
+    exchanges until none saves anything. concerned: ids of those whose exchanges are looked at
+    besides those of members without an undisputed claim; everybody's when left out.
     """
-    chosen = _shared_out(team, places, slots, hysteresis_m2, range(len(team)))
+    claims = _undisputed(team, {place: column for column, place in enumerate(places)}, slots)
+    costs = _Costs([peer.position for peer in team], slots, claims, hysteresis_m2)
+    chosen = _filled(claims, costs)
+    looked_at = {
+        chosen[row]
+        for row, peer in enumerate(team)
+        if concerned is None or claims[row] is None or peer.id in concerned
+    }
+    _exchange(chosen, costs, looked_at)
     return {
         peer.id: places[column] if column < len(places) else None
         for peer, column in zip(team, chosen, strict=True)
@@ -54,10 +64,8 @@ def own_place(
     held = _settled(team, places)
     if held is not None and not _gains(own_id, team, held, slots):
         return places[held[own_id]]
-    me = next(row for row, peer in enumerate(team) if peer.id == own_id)
-    concerned = (me,) if held is None else range(len(team))
-    column = _shared_out(team, places, slots, HYSTERESIS_M2, concerned)[me]
-    return places[column] if column < len(places) else None
+    concerned = (own_id,) if held is None else None
+    return allot(team, places, slots, concerned=concerned)[own_id]
 
 
 def _settled(team: Sequence[Peer], places: Sequence[Place]) -> dict[int, int] | None:
@@ -88,25 +96,6 @@ def _gains(
             if now - _square(me, theirs) - _square(peer.position, mine) > GAIN_M2:
                 return True
     return False
-
-
-def _shared_out(
-    team: Sequence[Peer],
-    places: Sequence[Place],
-    slots: Sequence[Vector],
-    hysteresis_m2: float,
-    concerned: Iterable[int],
-) -> list[int]:
-    """Return a column for every row: the places', and past them those of nobody's place.
-
-    concerned: the rows whose exchanges are looked at besides those of rows without a claim.
-    """
-    column_of = {place: column for column, place in enumerate(places)}
-    claims = _undisputed(team, column_of, slots)
-    costs = _Costs([peer.position for peer in team], slots, claims, hysteresis_m2)
-    chosen = _filled(claims, costs)
-    _exchange(chosen, costs, [*concerned, *_open(claims)])
-    return chosen
 
 
 class _Costs:
@@ -213,15 +202,14 @@ def _cheapest(costs: Sequence[float], columns: Sequence[int]) -> tuple[float, in
     return min([(costs[column], column) for column in columns])
 
 
-def _exchange(chosen: list[int], costs: _Costs, concerned: Iterable[int]) -> None:
+def _exchange(chosen: list[int], costs: _Costs, pending: set[int]) -> None:
     """Exchange the columns of two rows wherever that saves something, until nothing does.
 
-    Looked at are those who are concerned, and whoever has been exchanged since it was looked at;
-    in the order of the columns, not of the rows: who is called what decides nothing.
+    pending: the columns looked at, and after them those exchanged; in the order of the columns, not
+    of the rows: who is called what decides nothing.
     """
     holders = sorted(range(len(chosen)), key=chosen.__getitem__)
     held = [costs.of(row, column) for column, row in enumerate(holders)]
-    pending = {chosen[row] for row in concerned}
     while pending:
         column = min(pending)
         other = _best_exchange(column, holders, held, costs)
