@@ -29,6 +29,20 @@ def ctrl_c(*_):
 fleet.write_users = ctrl_c
 main()
 """
+SOMEBODY_NEVER_COMES = """
+from worldsim.cli import main
+from worldsim.run import fleet, process
+
+def wait(muster, speed, unwanted, outside):
+    outside.missing(["agent-3"])
+    while not unwanted():
+        outside.wait(0.02)
+    return False
+
+fleet.PATIENCE_S = 0.1
+process.assemble = wait
+main()
+"""
 FULL_FROM_THE_START = """
 from pathlib import Path
 from worldsim.cli import main
@@ -152,6 +166,21 @@ def test_an_interrupt_before_there_is_a_world_leaves_scenario_and_logs(
     assert fleet.status(8.0) == 130, fleet.text
     assert "Traceback" not in fleet.text
     assert sorted(file.name for file in run.iterdir()) == ["logs", "scenario.toml"]
+
+
+def test_an_interrupt_before_take_off_says_so_and_judges_nothing(
+    start: Start, scenario: Write, run: Path
+) -> None:
+    program = [sys.executable, "-c", SOMEBODY_NEVER_COMES]
+    fleet = start(*program, "run", scenario(60.0), "--out", str(run))
+    fleet.says("still waiting for agent-3")
+    fleet.kill_group(signal.SIGINT)
+    assert fleet.status(8.0) == 130, fleet.text
+    assert fleet.text.endswith(f"interrupted before take-off; logs in {run}/logs\n")
+    assert "HELD" not in fleet.text
+    assert "to look at it" not in fleet.text
+    assert sorted(file.name for file in run.glob("*.*")) == ["fleet.json", "scenario.toml"]
+    assert "world: interrupted before take-off" in (run / "logs/world.log").read_text()
 
 
 def test_a_disk_too_full_for_a_start_is_one_line_and_status_2(

@@ -111,13 +111,14 @@ class Launch:
         self._end_world()
 
     def interrupt(self) -> None:
-        """Let the world finish the recording, and tell the verdict on what there was."""
+        """Let the world finish the recording, and tell the verdict on what there was, if any."""
         self.terminal.say("interrupted: ending the run")
         self._end_world()
-        if self._missing is None and not self._directory.summary.exists():
-            self._directory.nothing_flew()
-        else:
+        if self._flying or self._directory.summary.exists():
             self.conclude()
+        else:
+            self._directory.nothing_flew()
+            self.terminal.say(f"interrupted before take-off; logs in {self._directory.logs}")
 
     def conclude(self) -> int:
         """Tell the verdict from the run's summary; return the exit status."""

@@ -76,7 +76,7 @@ def conduct(
 
     Raises MusterError when not everybody comes. Whatever ends the flight, SIGTERM or an error of
     ours, the recording is finished and a summary written of what there was; a fleet that never
-    took off for want of somebody leaves neither.
+    took off leaves neither.
     """
     stop = Stop()
     post = Post(session, Keys(terms.run))
@@ -97,11 +97,12 @@ def conduct(
         notes.close()
         ended_by = None if whole else outside.stopped or "interrupted"
         summary = _summary(scenario, flight, terms.mode, ended_by)
-        if flight.begun or stop.asked:
+        if flight.begun:
             directory.write_summary(summary)
         else:
             directory.nothing_flew()
-    print(f"world: {summary['outcome']}{_lateness(flight.verdicts)}", flush=True)
+    told = summary["outcome"] if flight.begun else f"{ended_by} before take-off"
+    print(f"world: {told}{_lateness(flight.verdicts)}", flush=True)
     return EXIT_STATUS[summary["outcome"]]
 
 
