@@ -15,6 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+ENDING = frozenset({signal.SIGINT, signal.SIGHUP, signal.SIGTERM})
 _PR_SET_PDEATHSIG = 1
 
 
@@ -69,9 +70,14 @@ def fork(log: Path | None, death_signal: signal.Signals, main: Callable[[], int]
     parent = os.getpid()
     sys.stdout.flush()
     sys.stderr.flush()
-    pid = os.fork()
-    if pid == 0:
-        _live(parent, log, death_signal, main)
+    # Until it has handlers of its own, a child that is ended would run its parent's.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    try:
+        pid = os.fork()
+        if pid == 0:
+            _live(parent, log, death_signal, main)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
     return pid
 
 
@@ -86,12 +92,13 @@ def _live(
 ) -> None:
     status = 1
     try:
-        _follow(parent, death_signal)
-        _redirect(log)
         # Ctrl-C, or the terminal's end, reaches the whole group; the launcher conducts the end.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
+        _follow(parent, death_signal)
+        _redirect(log)
         status = main()
     except SystemExit as leaving:
         status = leaving.code if isinstance(leaving.code, int) else 1
