@@ -25,6 +25,8 @@ SEEDS = range(3)
 class Watcher:
     """Keeps every tick."""
 
+    shows = True
+
     def __init__(self) -> None:
         self.ticks: list[Tick] = []
 

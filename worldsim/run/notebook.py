@@ -22,6 +22,7 @@ class Notebook:
     def __init__(self, directory: RunDirectory, recorder: ClosingRecorder | None) -> None:
         self._directory = directory
         self._recorder = recorder
+        self.shows = recorder is not None
 
     def tick(self, tick: Tick, figures: Figures) -> None:
         """Record one tick."""

@@ -46,6 +46,10 @@ Event = dict[str, Any]
 class Recorder(Protocol):
     """Keeps what a run showed. It must never fail the run: it reports its own troubles."""
 
+    @property
+    def shows(self) -> bool:
+        """Whether it keeps ticks; links and standings, which are only shown, are gathered then."""
+
     def tick(self, tick: Tick, figures: Figures) -> None:
         """Keep one tick."""
 
@@ -108,6 +112,7 @@ class SlotLoop:
         self._planned: dict[str, Any] = {}
         self._formation = scenario.formation
         self._recorder = recorder
+        self._shows = recorder is not None and recorder.shows
         self._packets = packets
         self._places: list[tuple[int, int] | None] = [None] * scenario.rows
         self._headings = world.fleet.yaw.tolist()
@@ -288,9 +293,9 @@ class SlotLoop:
             self.event("role", agent, role="vertex" if now and now[1] == 0 else "member")
 
     def _show(self) -> None:
-        awake, shown = self.team.awake, self._recorder is not None
+        awake = self.team.awake
         self.company.tick(awake)
-        tick = tick_of(self.world, self._told, awake, shown, self._packets())
+        tick = tick_of(self.world, self._told, awake, self._shows, self._packets())
         self.figures = self.judge.see(tick)
-        if self._recorder is not None:
+        if self._recorder is not None and self._shows:
             self._recorder.tick(tick, self.figures)

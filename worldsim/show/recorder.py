@@ -53,6 +53,8 @@ class RunRecorder:
     The process must not fork after this. mode: "processes", "lockstep" or "virtual".
     """
 
+    shows = True
+
     def __init__(
         self,
         path: Path,
