@@ -80,8 +80,8 @@ class Neighbours:
         own_sent_s: when each of the own recent sequences was sent [s]; a beacon that echoes one
         was sent after it (E22), whatever its stamp says.
         """
-        who, key, own_id = beacon.id, (beacon.incarnation, beacon.sequence), self._own_id
-        if who == own_id:
+        who, key = beacon.id, (beacon.incarnation, beacon.sequence)
+        if who == self._own_id:
             raise RejectedError("spoofed", "a beacon under one's own id")
         known = self._known.get(who)
         if key <= (known.key if known is not None else self._last.get(who, NONE_YET)):
@@ -91,17 +91,22 @@ class Neighbours:
             raise RejectedError("future", f"a stamp {-age_s:.3f} s ahead")
         if age_s > MAX_AGE_S:
             raise RejectedError("old", f"a stamp {age_s:.3f} s old")
-        for echoed, sequence in beacon.echoes:
-            if echoed == own_id:
-                if beacon.stamp_s + self._slack_s < own_sent_s.get(sequence, -inf):
-                    raise RejectedError("offset", "older than a beacon it has heard")
-                break
+        # Nothing was sent later than a fresh stamp: only an old one can be found out.
+        if age_s > self._slack_s and self._answers_later(beacon, own_sent_s):
+            raise RejectedError("offset", "older than a beacon it has heard")
         latency_s = age_s if age_s > 0.0 else 0.0
         if known is not None:
             known.hear(beacon, key, latency_s)
         else:
             self._known[who] = Neighbour(beacon, latency_s)
             self._put_in_order()
+
+    def _answers_later(self, beacon: Beacon, own_sent_s: dict[int, float]) -> bool:
+        """Whether a beacon echoes one of one's own that was sent after its stamp."""
+        for echoed, sequence in beacon.echoes:
+            if echoed == self._own_id:
+                return beacon.stamp_s + self._slack_s < own_sent_s.get(sequence, -inf)
+        return False
 
     @property
     def ids(self) -> Collection[int]:

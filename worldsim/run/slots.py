@@ -5,7 +5,7 @@ of a slot, brings the observations to the agents and their commands back to ``ob
 ``close``. Nothing here knows how messages travel.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from math import nan
 from typing import Any, Protocol
 
@@ -119,10 +119,15 @@ class SlotLoop:
         self._told = [UNTOLD] * scenario.rows
         self.refusals = Refusals()
 
-    def due(self) -> Iterator[Deed]:
-        """Yield what is to happen before the present slot: do each, and ``take`` it, in turn."""
+    def due(self) -> Iterable[Deed]:
+        """Return what is to happen before the present slot: do each, and ``take`` it, in turn."""
         time_s = self.world.time_s
-        for action in self.timeline.due(time_s) if self.timeline.next_s <= time_s + 1e-9 else ():
+        if min(self.timeline.next_s, self.team.next_boot_s) > time_s + 1e-9:
+            return ()
+        return self._due(time_s)
+
+    def _due(self, time_s: float) -> Iterator[Deed]:
+        for action in self.timeline.due(time_s):
             yield self.deed(action)
         if self.team.next_boot_s <= time_s + 1e-9:
             yield self.team.booted(time_s)
