@@ -37,25 +37,24 @@ os.kill(os.getpid(), signal.SIGTERM)
 """
 
 
-def test_a_child_that_is_ended_at_once_does_not_run_its_parents_handler() -> None:
-    ended = subprocess.run(
-        [sys.executable, "-c", ENDED_AT_ONCE],
+def ran(program: str) -> subprocess.CompletedProcess[str]:
+    """Run a program to its end."""
+    return subprocess.run(
+        [sys.executable, "-c", program],
         capture_output=True,
         text=True,
         timeout=DEADLINE_S,
         check=False,
     )
+
+
+def test_a_child_that_is_ended_at_once_does_not_run_its_parents_handler() -> None:
+    ended = ran(ENDED_AT_ONCE)
     assert ended.stdout == "was killed by signal 15\n"
     assert ended.stderr.count("Traceback") == 1  # the parent's own
 
 
 def test_a_log_on_a_full_disk_is_heard_on_stderr_and_stops_nobody() -> None:
-    ended = subprocess.run(
-        [sys.executable, "-c", FULL_LOG],
-        capture_output=True,
-        text=True,
-        timeout=DEADLINE_S,
-        check=False,
-    )
+    ended = ran(FULL_LOG)
     assert ended.stdout == "ended with status 7\n"
     assert ended.stderr == "what the log cannot hold\n"
