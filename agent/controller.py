@@ -1,6 +1,6 @@
 """The interface a controller implements; the Q-structure is one, a user brings another.
 
-A controller is a class that takes an :class:`~agent.setup.AgentSetup` and has ``decide``. It owns
+A controller is a class that takes an :class:`~agent.config.AgentSetup` and has ``decide``. It owns
 no socket, clock, thread or global random state: time is in what it senses. The agent around it
 keeps the neighbours, applies the safety filter to what the controller wants, and talks to radio
 and vehicle.
@@ -13,10 +13,10 @@ from typing import NamedTuple, Protocol
 
 import msgspec
 
+from agent.config import AgentSetup
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation
-from agent.qstructure.frame import Frame
-from agent.setup import AgentSetup
+from agent.qstructure.target_frame import Frame
 
 BUILT_IN = {
     "q_structure": "agent.guidance.q_structure:QStructure",

@@ -11,16 +11,18 @@ from typing import NamedTuple
 
 import msgspec
 
+from agent.checked_controller import Pilot
 from agent.codec import RejectedError, decode_beacon, decode_gossip
 from agent.comms.broadcast import LOCAL, Broadcast, OwnState
 from agent.comms.gossip import Table
 from agent.comms.hierarchy import ALONE, Hierarchy
 from agent.comms.mission import Missions
 from agent.comms.neighbours import Neighbours
-from agent.comms.silent import SAME_BODY_M, SilentBodies, TellsOf
+from agent.comms.unidentified_vehicles import SAME_BODY_M, SilentBodies, TellsOf
+from agent.config import AgentSetup
 from agent.controller import Intent, Peer, Senses
-from agent.guidance.guard import STAND, Guard
-from agent.guidance.safety import Told
+from agent.guidance.safety_filter import Told
+from agent.guidance.safety_monitor import STAND, Guard
 from agent.messages import (
     CAUSES,
     MAX_PLACES,
@@ -33,9 +35,7 @@ from agent.messages import (
     Telemetry,
     Vector,
 )
-from agent.pilot import Pilot
-from agent.sensing.eyes import Eyes
-from agent.setup import AgentSetup
+from agent.sensing.obstacle_perception import Eyes
 
 MAX_COST_MM = 2**31 - 1
 TIDY_S = 0.2

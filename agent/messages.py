@@ -111,8 +111,8 @@ class Mission(Message, frozen=True):
 class Scan(Message, frozen=True):
     """What a scanning sensor met: for each ray or beam, in the order of its pattern, how far.
 
-    kind: index of agent.sensing.pattern.KINDS. ranges: unsigned 16-bit little-endian [mm]; 65535:
-    nothing, within its range.
+    kind: index of agent.sensing.ray_pattern.KINDS. ranges: unsigned 16-bit little-endian [mm];
+    65535: nothing, within its range.
     """
 
     kind: Annotated[int, Meta(ge=0, lt=8)]

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import msgspec
 
-from agent.cockpit import Cockpit, Partner
+from agent.config import AgentSetup
 from agent.controller import ControllerError
-from agent.setup import AgentSetup
+from agent.free_running import Cockpit, Partner
 from netem.wire.access import AccessError, login_of
-from netem.wire.ending import Ending
+from netem.wire.barrier import LockstepError, UnwantedError
+from netem.wire.bus import Post, RefusedError, Ring
 from netem.wire.keys import Keys, agent_name
-from netem.wire.post import Post, RefusedError, Ring
 from netem.wire.session import SessionError, open_client
+from netem.wire.shutdown import Ending
 from netem.wire.stop import Stop
-from netem.wire.turns import LockstepError, UnwantedError
 
 WAIT_S = 0.2
 SILENCE_S = 30.0

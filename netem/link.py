@@ -10,9 +10,9 @@ from math import inf, log10
 
 import msgspec
 
-from netem.air import Air
-from netem.chance import SHAPES, Numbers, below, correlated
 from netem.messages import GilbertElliott, PathLoss
+from netem.random_draws import SHAPES, Numbers, below, correlated
+from netem.rate_queue import Air
 
 DEFAULT_LIMIT = 1000
 """tc-netem's own [frames]."""

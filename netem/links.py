@@ -6,9 +6,9 @@ link: in range, not barred, sent. They come in the order of their counts.
 
 import msgspec
 
-from netem.chance import SHARING, draw, draw_shared, pair
 from netem.link import FRESH, LOST_TO_QUEUE, LinkModel, Memory, Verdict, twice, verdict
-from netem.near import Near
+from netem.random_draws import SHARING, draw, draw_shared, pair
+from netem.range_index import Near
 from netem.wire.frame import Frame
 
 

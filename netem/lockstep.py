@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 from netem.medium import Medium
 from netem.messages import Done, MediumSetup, Turn, unpack_turn
+from netem.wire.barrier import TURN_RING, LockstepError, answer, same_slot
+from netem.wire.bus import Post
 from netem.wire.frame import (
     BATCH_RING,
     Batch,
@@ -15,8 +17,6 @@ from netem.wire.frame import (
     pack,
     unpack_transmission,
 )
-from netem.wire.post import Post
-from netem.wire.turns import TURN_RING, LockstepError, answer, same_slot
 
 
 class Waiting(NamedTuple):

@@ -13,9 +13,8 @@ from math import inf
 
 import msgspec
 
-from netem.air import Air
 from netem.barriers import Barriers
-from netem.journal import FATE, HEAD, Journal
+from netem.delivery_log import FATE, HEAD, Journal
 from netem.link import LOST_TO_PARTITION, LOST_TO_QUEUE, Cause, LinkModel, Verdict
 from netem.links import Links, Sending
 from netem.messages import (
@@ -31,7 +30,8 @@ from netem.messages import (
     Verdicts,
     packets_of,
 )
-from netem.near import Near, Neighbourhood
+from netem.range_index import Near, Neighbourhood
+from netem.rate_queue import Air
 from netem.schedule import Schedule
 from netem.wire.frame import (
     BATCH_HEAD_B,

@@ -10,16 +10,16 @@ import msgspec
 import zenoh
 from zenoh.handlers import RingChannel
 
+from netem.free_running import Radio
 from netem.lockstep import Turns
 from netem.messages import MAX_CONDITIONS_B, MediumSetup
-from netem.radio import Radio
 from netem.wire.access import AccessError, Guard
-from netem.wire.ending import Ending
+from netem.wire.barrier import LockstepError, UnwantedError
+from netem.wire.bus import Post, Ring, Waiting, drained, receive
 from netem.wire.keys import Keys, medium_name
-from netem.wire.post import Post, Ring, Waiting, drained, receive
 from netem.wire.session import SessionError, open_client, open_router
+from netem.wire.shutdown import Ending
 from netem.wire.stop import Stop
-from netem.wire.turns import LockstepError, UnwantedError
 
 WAIT_S = 0.2
 SILENCE_S = 30.0

@@ -27,9 +27,8 @@ from agent.codec import (
 )
 from agent.core import Agent
 from agent.messages import Observation
+from netem.fault_queue import OrderBook
 from netem.messages import Done, Truth, Turn, unpack_done, unpack_turn
-from netem.orders import OrderBook
-from netem.wire.arrivals import Tally, unpack_arrivals
 from netem.wire.frame import (
     Batch,
     Delivery,
@@ -44,8 +43,9 @@ from netem.wire.frame import (
     unpack_inbox,
     unpack_transmission,
 )
-from worldsim.run.control import RequestError, _request
-from worldsim.run.virtual import VirtualFleet
+from netem.wire.latency import Tally, unpack_arrivals
+from worldsim.engine.virtual import VirtualFleet
+from worldsim.fleet.control import RequestError, _request
 from worldsim.scenario.file import load
 
 WEDGE = Path(__file__).parents[1] / "deploy/scenarios/wedge-9.toml"

@@ -144,7 +144,11 @@ def _shortened(name: str) -> list[str]:
 
 
 def _trace(words: list[str], out: Path) -> str:
-    command = [sys.executable, "-c", "import sys; from worldsim.cli import main; sys.exit(main())"]
+    command = [
+        sys.executable,
+        "-c",
+        "import sys; from worldsim.commands.app import main; sys.exit(main())",
+    ]
     flown = subprocess.run(
         [*command, *words, "--no-recording", "--out", str(out)],
         cwd=ROOT,

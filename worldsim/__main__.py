@@ -6,11 +6,11 @@ import sys
 from pathlib import Path
 
 from netem.wire.keys import Keys
-from worldsim.run.admission import PROCESS_COMMAND_TICKS, admit
-from worldsim.run.outside import ByHand
-from worldsim.run.process import Terms, run
-from worldsim.run.roster import Roster
-from worldsim.run.rundir import RunDirectory
+from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, admit
+from worldsim.fleet.launcher_link import ByHand
+from worldsim.fleet.process import Terms, run
+from worldsim.fleet.process_table import Roster
+from worldsim.results.run_folder import RunDirectory
 from worldsim.scenario.file import load
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError

@@ -10,7 +10,7 @@ from math import inf
 from types import MappingProxyType
 
 from agent.codec import MAX_RADIO_B, SEAL_B, encode, sealed
-from agent.comms.silent import Departed, Member
+from agent.comms.unidentified_vehicles import Departed, Member
 from agent.controller import Peer
 from agent.messages import Beacon, Gossip, Piece, Place, Record
 

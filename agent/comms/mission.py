@@ -18,8 +18,8 @@ from agent.codec import RejectedError, decode, decode_formation, encode, encode_
 from agent.controller import Flown
 from agent.messages import AT_HOME, Beacon, Drift, FramePath, Message, Mission, Piece, Pose
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
-from agent.qstructure.frame import Frame
-from agent.qstructure.path import Track
+from agent.qstructure.frame_path import Track
+from agent.qstructure.target_frame import Frame
 
 ORIGINS = 2**16
 PIECE_B = 900

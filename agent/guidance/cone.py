@@ -6,7 +6,7 @@ In azimuth only, for vehicles climb and descend freely (E10).
 from math import atan2, radians, remainder, tau
 from typing import NamedTuple
 
-from agent.setup import Vehicle
+from agent.config import Vehicle
 
 SLACK = 1e-9
 

@@ -9,11 +9,11 @@ controller.
 
 from math import dist, hypot
 
+from agent.config import AgentSetup
 from agent.controller import Heard, Intent, Senses
 from agent.guidance.cone import cone_of
 from agent.guidance.movement import saturated, steer
 from agent.messages import Vector
-from agent.setup import AgentSetup
 
 APART = 4.0
 """Speed away for each metre that another is nearer than ``spacing_m`` [1/s]."""

@@ -6,17 +6,17 @@ potentials (18)-(28), then move or turn. Plain floats throughout.
 
 from math import dist, hypot, pi, radians, sqrt
 
+from agent.config import AgentSetup
 from agent.controller import Intent, Senses
 from agent.guidance.bobber import bobber, cast_zone
-from agent.guidance.choice import Choice
 from agent.guidance.cone import azimuth_error, cone_of
 from agent.guidance.constellation import avoidance
-from agent.guidance.dodge import Dodge
+from agent.guidance.deadlock_escape import Dodge
 from agent.guidance.movement import DEAD_BAND_MPS, saturated, steer
 from agent.guidance.potential import Potential
+from agent.guidance.slot_selection import Choice
 from agent.messages import Vector
-from agent.qstructure.frame import Frame
-from agent.setup import AgentSetup
+from agent.qstructure.target_frame import Frame
 
 GAIN = 2.0
 """c of (28) [1/s]."""

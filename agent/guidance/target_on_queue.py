@@ -10,11 +10,11 @@ from math import dist, hypot
 from typing import NamedTuple
 
 from agent.comms.allocation import own_place
-from agent.comms.silent import SURE_RANGE_M
+from agent.comms.unidentified_vehicles import SURE_RANGE_M
 from agent.controller import Flown, Peer
 from agent.messages import MAX_PLACES, Place, Vector
 from agent.qstructure.formation import Layout, Slot
-from agent.qstructure.frame import Frame
+from agent.qstructure.target_frame import Frame
 
 
 class OwnTarget(NamedTuple):

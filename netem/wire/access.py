@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from netem.wire.arrivals import MAX_ARRIVALS_B
 from netem.wire.frame import MAX_TRANSMISSION_B
 from netem.wire.keys import EVERY_KEY, Keys, agent_name
+from netem.wire.latency import MAX_ARRIVALS_B
 
 OPERATOR = "operator"
 MOST_B = {"tx": MAX_TRANSMISSION_B, "command": 4096, "arrivals": MAX_ARRIVALS_B}

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from agent.checked_controller import FaultyControllerError, Pilot, plain
 from agent.comms.mission import Missions
+from agent.config import AgentSetup
 from agent.controller import ControllerError, Heard, Intent, Senses, load
 from agent.guidance.flocking import Flocking
 from agent.guidance.q_structure import QStructure
-from agent.pilot import FaultyControllerError, Pilot, plain
-from agent.setup import AgentSetup
 from worldsim.scenario.file import load as load_scenario
 
 SCENARIO = Path(__file__).parents[2] / "deploy" / "scenarios" / "flocking-9.toml"

@@ -9,10 +9,10 @@ import pytest
 
 from agent.codec import MAX_RADIO_B, decode_command, encode, sealed, unsealed
 from agent.comms.broadcast import LOCAL, MULTIHOP
+from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.core import Agent
 from agent.messages import Beacon, Gossip, Observation
 from agent.qstructure.formation import FormationSpec
-from agent.setup import AgentSetup, Comms, Control, Vehicle
 from netem.wire.frame import Outgoing, Transmission, pack, unpack_transmission
 from tests.agent.comms.making import FAR, GREATEST, ORIGIN, UNLED, beacon, greatest_record, record
 

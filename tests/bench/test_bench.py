@@ -6,10 +6,10 @@ import pytest
 
 from worldsim.bench import table
 from worldsim.bench.fleets import wedge
-from worldsim.bench.parts import control_step_us, frame_us
-from worldsim.bench.recording import recording_mb, recording_us
+from worldsim.bench.part_costs import control_step_us, frame_us
+from worldsim.bench.recording_cost import recording_mb, recording_us
 from worldsim.bench.table import MEASURES, Row, measured
-from worldsim.cli import command
+from worldsim.commands.app import command
 
 
 @pytest.fixture

@@ -1,9 +1,9 @@
 """The Q-structure without choice: each agent takes the place of its number, and keeps it."""
 
+from agent.config import AgentSetup
 from agent.controller import Senses
 from agent.guidance.q_structure import QStructure
 from agent.guidance.target_on_queue import OwnTarget
-from agent.setup import AgentSetup
 
 
 class ByNumber:

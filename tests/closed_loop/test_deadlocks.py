@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from worldsim.run.virtual import fly
+from worldsim.engine.virtual import fly
 from worldsim.scenario.file import load, parse
 
 HEAD_ON = Path(__file__).parents[2] / "deploy" / "scenarios" / "head-on-1.toml"

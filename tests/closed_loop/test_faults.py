@@ -7,10 +7,10 @@ from random import Random
 import numpy as np
 import pytest
 
+from worldsim.engine.step import Event
+from worldsim.engine.virtual import Flight, fly
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
-from worldsim.run.slots import Event
-from worldsim.run.virtual import Flight, fly
 from worldsim.scenario.file import load
 from worldsim.scenario.tables import Scenario
 

@@ -9,8 +9,8 @@ import pytest
 
 from agent.messages import Place
 from agent.qstructure.formation import Formation
-from worldsim.run.admission import PROCESS_COMMAND_TICKS, admit
-from worldsim.run.virtual import Flight, fly
+from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, admit
+from worldsim.engine.virtual import Flight, fly
 from worldsim.scenario.file import load
 from worldsim.scenario.tables import Scenario
 

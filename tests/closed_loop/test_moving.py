@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from worldsim.run.virtual import VirtualFleet, fly
+from worldsim.engine.virtual import VirtualFleet, fly
 from worldsim.scenario.file import load
 
 DEPLOY = Path(__file__).parents[2] / "deploy" / "scenarios"

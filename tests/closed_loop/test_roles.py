@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from agent.comms.hierarchy import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
-from worldsim.run.virtual import VirtualFleet
+from worldsim.engine.virtual import VirtualFleet
 from worldsim.scenario.file import load, parse
 
 WEDGE = Path(__file__).parents[2] / "deploy" / "scenarios" / "wedge-9.toml"

@@ -10,7 +10,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from worldsim.run.virtual import VirtualFleet
+from worldsim.engine.virtual import VirtualFleet
 from worldsim.scenario.file import parse
 
 TOLERANCE_M = 1e-9

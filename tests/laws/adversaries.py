@@ -15,7 +15,7 @@ import numpy as np
 
 from agent.guidance.cone import SLACK
 from agent.guidance.movement import DEAD_BAND_MPS
-from agent.guidance.safety import PASSES, ROUNDING_MPS, SHARE
+from agent.guidance.safety_filter import PASSES, ROUNDING_MPS, SHARE
 
 D_OB = 0.25
 TICK_S = 0.05

@@ -9,9 +9,9 @@ from math import cos, dist, hypot, pi, sin
 
 import numpy as np
 
+from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.controller import Senses
-from agent.guidance.guard import Guard
-from agent.setup import AgentSetup, Comms, Control, Vehicle
+from agent.guidance.safety_monitor import Guard
 from tests.laws.speck import SPECK
 from worldsim.truth.vehicle import Fleet
 

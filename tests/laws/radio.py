@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import combinations
 from math import dist
 
-from worldsim.run.virtual import VirtualFleet
+from worldsim.engine.virtual import VirtualFleet
 from worldsim.scenario.file import parse
 
 ROUNDING_M = 1e-9

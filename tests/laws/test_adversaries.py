@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from agent.guidance.cone import Cone
-from agent.guidance.safety import RangingFilter, limited
+from agent.guidance.safety_filter import RangingFilter, limited
 from tests.laws.adversaries import (
     D_OB,
     FLEETS,

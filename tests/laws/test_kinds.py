@@ -5,10 +5,10 @@ from random import Random
 
 import pytest
 
+from agent.config import Vehicle
 from agent.guidance import guard
-from agent.guidance.forward import forward_kept
-from agent.guidance.safety import Bound, approach_of
-from agent.setup import Vehicle
+from agent.guidance.nonholonomic import forward_kept
+from agent.guidance.safety_filter import Bound, approach_of
 from tests.laws.kinds import Craft, anything, least_distance, straight
 
 D_OB, CLEARANCE = 0.25, 0.5

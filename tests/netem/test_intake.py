@@ -6,8 +6,8 @@ from random import Random
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from netem.free_running import Intake
 from netem.messages import Conditions, MediumSetup
-from netem.radio import Intake
 from netem.wire.frame import (
     MAX_OUTGOING,
     MAX_PAYLOAD_B,

@@ -5,8 +5,8 @@ from math import inf, nan, sqrt
 
 import pytest
 
-from netem.chance import SHARING, draw, draw_shared, pair
 from netem.link import Cause, LinkModel, Verdict, verdict
+from netem.random_draws import SHARING, draw, draw_shared, pair
 
 PACKETS = 100_000
 SEED = bytes(range(32))

@@ -5,12 +5,12 @@ from random import Random
 
 import pytest
 
-from netem.air import Air
-from netem.chance import SHAPES, WIDEST, correlated
 from netem.link import Cause, LinkModel, Memory, Verdict, edge_m, received, verdict
 from netem.medium import Medium
 from netem.messages import Conditions, DirectedLink, GilbertElliott, MediumSetup, PathLoss
-from netem.near import LARGE, Neighbourhood
+from netem.random_draws import SHAPES, WIDEST, correlated
+from netem.range_index import LARGE, Neighbourhood
+from netem.rate_queue import Air
 from netem.wire.frame import LOCAL, MULTIHOP, Outgoing, Transmission
 
 EDGE = PathLoss(3.0, 40.0, 70.0)

@@ -5,7 +5,7 @@ from random import Random
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netem.journal import Digest, joined
+from netem.delivery_log import Digest, joined
 from netem.medium import Medium
 from netem.messages import (
     Conditions,

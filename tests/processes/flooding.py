@@ -16,13 +16,13 @@ import zenoh
 from agent.codec import decode_observation, encode
 from agent.messages import Command, Telemetry
 from netem.wire.access import login_of
-from netem.wire.arrivals import Tally
+from netem.wire.bus import Post, Put
 from netem.wire.frame import Frame, Outgoing, Transmission, pack
 from netem.wire.keys import Keys
-from netem.wire.post import Post, Put
+from netem.wire.latency import Tally
 from netem.wire.session import open_client
-from worldsim.run.roster import fleet_of
-from worldsim.run.rundir import USERS
+from worldsim.fleet.process_table import fleet_of
+from worldsim.results.run_folder import USERS
 
 RATE_HZ = 10_000
 BURST_S = 0.005

@@ -36,7 +36,7 @@ delay_ms = 10
 [expect]
 converge_within_s = 6.0
 """  # noqa: E501
-QSWARM = [sys.executable, "-c", "from worldsim.cli import main; main()"]
+QSWARM = [sys.executable, "-c", "from worldsim.commands.app import main; main()"]
 
 
 class Started:

@@ -7,8 +7,8 @@ import pytest
 import zenoh
 
 from netem.wire.access import MOST_B, AccessError, Guard, login_of, write_users
+from netem.wire.bus import Post, Ring, receive
 from netem.wire.keys import Keys
-from netem.wire.post import Post, Ring, receive
 from netem.wire.session import SessionError, open_client, open_router
 from tests.processes.harness import QSWARM, Started, eventually
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from tests.processes.harness import QSWARM, Started, events_of, eventually, pids
-from worldsim.run.fleet import processes
+from worldsim.fleet.launcher import processes
 
 pytestmark = pytest.mark.processes
 
@@ -20,18 +20,18 @@ Start = Callable[..., Started]
 Write = Callable[[float], str]
 
 EARLY_CTRL_C = """
-from worldsim.cli import main
-from worldsim.run import fleet
+from worldsim.commands.app import main
+from worldsim.fleet import launcher
 
 def ctrl_c(*_):
     raise KeyboardInterrupt
 
-fleet.write_users = ctrl_c
+launcher.write_users = ctrl_c
 main()
 """
 SOMEBODY_NEVER_COMES = """
-from worldsim.cli import main
-from worldsim.run import fleet, process
+from worldsim.commands.app import main
+from worldsim.fleet import launcher, process
 
 def wait(muster, speed, unwanted, outside):
     outside.missing(["agent-3"])
@@ -39,13 +39,13 @@ def wait(muster, speed, unwanted, outside):
         outside.wait(0.02)
     return False
 
-fleet.PATIENCE_S = 0.1
+launcher.PATIENCE_S = 0.1
 process.assemble = wait
 main()
 """
 FULL_FROM_THE_START = """
 from pathlib import Path
-from worldsim.cli import main
+from worldsim.commands.app import main
 
 def full(draft, *_):
     raise OSError(28, "No space left on device")
@@ -93,7 +93,7 @@ def test_a_fleet_flies_passes_and_leaves_everything_in_its_folder(
     assert summary["packets"]["delivered"] > 0
     assert {event["agent"] for event in events_of(run) if event["kind"] == "slot"} == {0, 1, 2, 3}
     assert "held" in fleet.text
-    from worldsim.show.verify import verify  # noqa: PLC0415 - a second that other tests save
+    from worldsim.recording.verify import verify  # noqa: PLC0415 - a second that other tests save
 
     verification = verify(run)
     assert (verification.whole, verification.differences) == (True, ()), verification

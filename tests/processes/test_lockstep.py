@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.processes.harness import QSWARM, Started, events_of, eventually, pids
-from worldsim.run.virtual import fly
+from worldsim.engine.virtual import fly
 from worldsim.scenario.file import load
 
 pytestmark = pytest.mark.processes
@@ -88,7 +88,7 @@ def test_a_clean_run_is_that_of_virtual_time_and_passes(
     assert summary["late_tick_fraction"] is None
     assert summary["real_time_factor"] > 0.0
     assert summary["packets"]["delivered"] == flight.verdicts.fates["delivered"]
-    from worldsim.show.verify import verify  # noqa: PLC0415 - a second that other tests save
+    from worldsim.recording.verify import verify  # noqa: PLC0415 - a second that other tests save
 
     verification = verify(run)
     assert (verification.whole, verification.differences) == (True, ()), verification

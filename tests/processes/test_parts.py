@@ -9,8 +9,8 @@ import msgspec
 import pytest
 
 from netem.messages import Conditions, MediumSetup
+from netem.wire.bus import Post, RefusedError
 from netem.wire.keys import Keys
-from netem.wire.post import Post, RefusedError
 from netem.wire.session import SessionError, open_client, open_router
 from tests.processes.harness import Started
 

@@ -6,17 +6,16 @@ from pathlib import Path
 import pytest
 
 from agent.messages import Command, Telemetry
+from netem.free_running import Intake, Lateness
 from netem.messages import Conditions, MediumSetup
-from netem.radio import Intake, Lateness
+from netem.wire.bus import RefusedError
 from netem.wire.frame import MAX_TRANSMISSION_B, Outgoing, Transmission, pack
-from netem.wire.post import RefusedError
-from worldsim.run import muster
-from worldsim.run.lines import Lines
-from worldsim.run.muster import MusterError, assemble, shortened
-from worldsim.run.outside import ByHand, Conducted, Loss
-from worldsim.run.pace import Pacer, Punctuality
-from worldsim.run.roster import Roster, processes
-from worldsim.run.rundir import RunDirectoryError
+from worldsim.fleet.ipc import Lines
+from worldsim.fleet.launcher_link import ByHand, Conducted, Loss
+from worldsim.fleet.pacing import Pacer, Punctuality
+from worldsim.fleet.process_table import Roster, processes
+from worldsim.fleet.startup import MusterError, assemble, shortened
+from worldsim.results.run_folder import RunDirectoryError
 
 
 class Clock:
@@ -187,7 +186,7 @@ def test_a_muster_ends_when_all_are_there_or_nobody_wants_it() -> None:
 
 
 def test_a_muster_says_who_did_not_come(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(muster, "MUSTER_WITHIN_S", 0.05)
+    monkeypatch.setattr(startup, "MUSTER_WITHIN_S", 0.05)
     with pytest.raises(MusterError, match=r"not there within 0\.05 s: agent-1"):
         assemble(SparseMuster(["agent-1"]), 1.0, lambda: False, ByHand(list))
 

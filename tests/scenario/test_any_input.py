@@ -10,7 +10,7 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
-from worldsim.scenario.describing import allowed
+from worldsim.scenario.allowed_values import allowed
 from worldsim.scenario.file import dump, load, parse
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError

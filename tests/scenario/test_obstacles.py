@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from worldsim.run.admission import VIRTUAL_COMMAND_TICKS, admit
+from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS, admit
 from worldsim.scenario.file import dump, load, parse
-from worldsim.scenario.obstacles import Cylinder, Sphere
+from worldsim.scenario.obstacle_tables import Cylinder, Sphere
 from worldsim.scenario.toml import ScenarioError
 
 WEDGE = Path("deploy/scenarios/wedge-9.toml")

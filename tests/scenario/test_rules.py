@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from worldsim.run.admission import VIRTUAL_COMMAND_TICKS, admit
-from worldsim.run.virtual import COMMAND_TICKS
+from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS, admit
+from worldsim.engine.virtual import COMMAND_TICKS
 from worldsim.scenario.file import load
 from worldsim.scenario.rules import cautions, too_fast
 from worldsim.scenario.tables import Scenario

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator, ValidationError
 
-from worldsim.cli import command
+from worldsim.commands.app import command
 from worldsim.scenario.file import dump, parse
-from worldsim.scenario.gallery import FOLDER
+from worldsim.scenario.library import FOLDER
 from worldsim.scenario.schema import schema
 from worldsim.scenario.template import template
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from worldsim.run.virtual import fly
+from worldsim.engine.virtual import fly
 from worldsim.scenario.file import load
 from worldsim.scenario.toml import ScenarioError
 

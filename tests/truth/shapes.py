@@ -5,7 +5,7 @@ from math import atan2, cos, hypot, pi, radians, sin
 import numpy as np
 from hypothesis import strategies as st
 
-from worldsim.scenario.obstacles import Box, Cylinder, Sphere, Wall
+from worldsim.scenario.obstacle_tables import Box, Cylinder, Sphere, Wall
 
 sizes = st.floats(0.1, 3.0)
 coordinates = st.floats(-5.0, 5.0)

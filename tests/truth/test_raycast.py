@@ -9,8 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from tests.truth.shapes import any_shape, coordinates, triples
-from worldsim.scenario.obstacles import Box, Sphere, Wall
-from worldsim.truth.obstacle import Obstacles
+from worldsim.scenario.obstacle_tables import Box, Sphere, Wall
+from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.raycast import cast, cast_at_spheres
 
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-QSWARM = "from worldsim.cli import main\n\nmain()\n"
+QSWARM = "from worldsim.commands.app import main\n\nmain()\n"
 PIP = """
 import sys, tomllib
 from pathlib import Path

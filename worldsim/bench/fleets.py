@@ -6,8 +6,8 @@ from time import process_time
 from agent.qstructure.formation import FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
 from netem.messages import Conditions
-from worldsim.run.virtual import VirtualFleet
-from worldsim.scenario.starting import BoxStart
+from worldsim.engine.virtual import VirtualFleet
+from worldsim.scenario.start import BoxStart
 from worldsim.scenario.tables import Fleet, Scenario
 
 EDGES = ((-1.0, 1.0, 1.0), (-1.0, -1.0, 1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, -1.0))

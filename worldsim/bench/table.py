@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from netem.messages import Conditions
 from worldsim.bench.fleets import IN_RANGE_M, flown_cpu_s, wedge
-from worldsim.bench.parts import control_step_us, frame_us
-from worldsim.bench.recording import recording_mb, recording_us
+from worldsim.bench.part_costs import control_step_us, frame_us
+from worldsim.bench.recording_cost import recording_mb, recording_us
 
 TICK_HZ = 20.0
 WEDGE_S = 20.0

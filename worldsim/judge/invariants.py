@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agent.messages import Place
-from worldsim.judge.bodies import Bodies
+from worldsim.judge.connectivity import Components, Reach
+from worldsim.judge.hovering_vehicles import Bodies
 from worldsim.judge.phase import CONVERGED_S, Phase
-from worldsim.judge.reach import Components, Reach
 from worldsim.judge.recovery import LOSSES, RETURNS
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worldsim.judge.tick import Packets, Singles
-from worldsim.truth.obstacle import Obstacles
+from worldsim.truth.obstacles import Obstacles
 
 LEAST_M2 = 1e-300
 """Stands for the square of no motion at all, by which nothing can be divided [m^2]."""

@@ -13,8 +13,8 @@ import numpy as np
 
 from agent.messages import AT_HOME, FramePath, Place
 from agent.qstructure.formation import Formation, Slot
-from agent.qstructure.frame import Frame
-from agent.qstructure.path import Track
+from agent.qstructure.frame_path import Track
+from agent.qstructure.target_frame import Frame
 from worldsim.judge.metrics import Floats
 from worldsim.judge.tick import Tick
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from agent.messages import Place
-from worldsim.judge.bodies import Bodies
+from worldsim.judge.hovering_vehicles import Bodies
 from worldsim.judge.phase import CONVERGED_S, Phase
 from worldsim.judge.tick import Tick
 

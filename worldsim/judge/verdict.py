@@ -14,16 +14,16 @@ import numpy as np
 from agent.guidance.cone import cone_of
 from agent.messages import FramePath
 from agent.qstructure.formation import Formation, FormationSpec
-from worldsim.judge.bodies import Bodies
-from worldsim.judge.clearance import Clearance
+from worldsim.judge.hovering_vehicles import Bodies
 from worldsim.judge.invariants import Invariants
 from worldsim.judge.metrics import Floats, Separation, conserved
+from worldsim.judge.obstacle_clearance import Clearance
 from worldsim.judge.phase import Phase
-from worldsim.judge.queues import Queues
+from worldsim.judge.queue_convergence import Queues
 from worldsim.judge.recovery import LOSSES, RETURNS, Recoveries, Recovery
 from worldsim.judge.tick import Packets, Tick
-from worldsim.scenario.frame import path_of
 from worldsim.scenario.tables import Scenario
+from worldsim.scenario.target_frame import path_of
 
 TURN_LIMIT_SLACK_DEG = 1e-6
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar, Union, get_args, get_ori
 
 import msgspec
 
-from worldsim.scenario.describing import allowed, got, tags
+from worldsim.scenario.allowed_values import allowed, got, tags
 from worldsim.scenario.toml import ScenarioError
 
 T = TypeVar("T")

@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from agent.config import Positive, Table
 from agent.qstructure.formation import FormationSpec
-from agent.setup import Positive, Table
 from netem.messages import Conditions, Jam
-from worldsim.scenario.frame import FrameChange, Time
-from worldsim.scenario.radio import FlapTable, Groups, PartitionTable
-from worldsim.scenario.starting import BoxStart, ListStart
+from worldsim.scenario.radio_faults import FlapTable, Groups, PartitionTable
+from worldsim.scenario.start import BoxStart, ListStart
+from worldsim.scenario.target_frame import FrameChange, Time
 
 Selector = Annotated[
     int | str,

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from agent.qstructure.formation import Formation
-from agent.qstructure.path import tip_speed
-from worldsim.scenario.frame import broken_key, path_of
-from worldsim.scenario.obstacles import obstacle_problem
-from worldsim.scenario.starting import BoxStart
+from agent.qstructure.frame_path import tip_speed
+from worldsim.scenario.obstacle_tables import obstacle_problem
+from worldsim.scenario.start import BoxStart
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
+from worldsim.scenario.target_frame import broken_key, path_of
 from worldsim.scenario.toml import ScenarioError
 
 TARGET_FLOOR_M = 0.25

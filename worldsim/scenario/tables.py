@@ -9,14 +9,14 @@ from typing import Annotated, Any, get_type_hints
 import msgspec
 from msgspec import Meta
 
+from agent.config import AgentSetup, Comms, Control, Hertz, Positive, Sensors, Table, Vehicle
 from agent.messages import AgentId
 from agent.qstructure.formation import FormationSpec
-from agent.setup import AgentSetup, Comms, Control, Hertz, Positive, Sensors, Table, Vehicle
 from netem.messages import Conditions, MediumSetup
 from worldsim.scenario.events import EventTable
-from worldsim.scenario.frame import FrameTable, path_of
-from worldsim.scenario.obstacles import ObstacleField, Obstacles
-from worldsim.scenario.starting import BoxStart, ListStart
+from worldsim.scenario.obstacle_tables import ObstacleField, Obstacles
+from worldsim.scenario.start import BoxStart, ListStart
+from worldsim.scenario.target_frame import FrameTable, path_of
 
 SLOTS_PER_TICK = 4
 MAX_AGENTS = 1000

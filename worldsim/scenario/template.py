@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import msgspec
 from msgspec import NODEFAULT, inspect
 
+from worldsim.scenario.allowed_values import allowed_by
 from worldsim.scenario.decoding import decode
-from worldsim.scenario.describing import allowed_by
 from worldsim.scenario.tables import RunName, Scenario
 from worldsim.scenario.toml import ScenarioError
 

@@ -6,7 +6,7 @@ Only + - * / sqrt and comparisons cross rows here. A ray that begins within a bo
 import numpy as np
 from numpy.typing import NDArray
 
-from worldsim.truth.obstacle import Obstacles
+from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
 
 PARALLEL = 1e-12

@@ -9,8 +9,8 @@ from math import cos, isnan, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from agent.config import Vehicle
 from agent.messages import Vector
-from agent.setup import Vehicle
 
 Floats = NDArray[np.float64]
 _TURN = 2.0 * np.pi

@@ -10,11 +10,11 @@ from math import isnan
 import numpy as np
 from numpy.typing import NDArray
 
+from agent.config import Vehicle
 from agent.messages import Command, Observation, Scan, Vector
-from agent.setup import Vehicle
-from worldsim.truth.failing import Failures
-from worldsim.truth.scan import Scans
-from worldsim.truth.sensor import ProximitySensor, Sensed
+from worldsim.truth.proximity_sensor import ProximitySensor, Sensed
+from worldsim.truth.scanning_sensors import Scans
+from worldsim.truth.sensor_faults import Failures
 from worldsim.truth.vehicle import Fleet, Floats
 
 NOTHING = Sensed(())

@@ -7,7 +7,7 @@ from random import Random
 import pytest
 
 from agent.guidance.cone import Cone
-from agent.guidance.safety import RangingFilter, limited
+from agent.guidance.safety_filter import RangingFilter, limited
 
 D_OB = 0.25
 SLOTS = 4

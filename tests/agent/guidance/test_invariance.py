@@ -7,12 +7,12 @@ from typing import NamedTuple
 import msgspec
 import pytest
 
+from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.controller import Flown, Heard, Peer, Senses, load
 from agent.messages import Place
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
-from agent.qstructure.frame import Frame
 from agent.qstructure.shape import Ray
-from agent.setup import AgentSetup, Comms, Control, Vehicle
+from agent.qstructure.target_frame import Frame
 
 TEAM = 8
 ROUNDING = 1e-9

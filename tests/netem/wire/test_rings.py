@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netem.wire.post import Rings
+from netem.wire.bus import Rings
 
 
 class Said:

@@ -7,8 +7,8 @@ import pytest
 import zenoh
 from zenoh.handlers import RingChannel
 
-from netem.wire.post import receive
-from netem.wire.turns import LockstepError, UnwantedError, answer, same_slot
+from netem.wire.barrier import LockstepError, UnwantedError, answer, same_slot
+from netem.wire.bus import receive
 
 ALONE = {
     "mode": "router",

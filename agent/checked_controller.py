@@ -1,0 +1,98 @@
+"""A controller at work: what it wants is checked, and what goes wrong in it bears its name."""
+
+from collections.abc import Iterable
+from math import isfinite
+
+from msgspec.structs import replace
+
+from agent.config import AgentSetup
+from agent.controller import Controller, Intent, Senses, load
+from agent.messages import Vector
+
+NUMBERS = 13
+"""An intent's numbers besides its target: three vectors, two angles of tilt, yaw and force."""
+MAX_ANY = 100.0
+"""What no number of a command may exceed, but for positions and the force."""
+MAX_M, MAX_FORCE = 1e6, 1e9
+
+
+class FaultyControllerError(RuntimeError):
+    """A controller that failed at its work; the text names it, its agent and what happened."""
+
+
+class Pilot:
+    """One agent's controller. Raises ControllerError if it cannot be had.
+
+    Whatever the controller raises, here or in ``decide``, is raised as FaultyControllerError.
+    """
+
+    def __init__(self, setup: AgentSetup) -> None:
+        self._who = f"controller {setup.control.controller!r} of agent {setup.id}"
+        kind = load(setup.control.controller)
+        try:
+            self._controller: Controller = kind(setup)
+        except Exception as error:
+            raise self._fault("when it was made", error) from error
+
+    def decide(self, senses: Senses) -> Intent:
+        """Return what the controller wants, in plain floats within the bounds of a command."""
+        try:
+            return plain(self._controller.decide(senses))
+        except Exception as error:
+            raise self._fault(f"at {senses.now_s:g} s", error) from error
+
+    def _fault(self, when: str, error: Exception) -> FaultyControllerError:
+        return FaultyControllerError(f"{self._who} failed {when}: {type(error).__name__}: {error}")
+
+
+def plain(intent: Intent) -> Intent:
+    """Return an intent in plain floats, numpy's being welcome.
+
+    Raises TypeError for what is no Intent, ValueError for numbers that no command may hold.
+    """
+    if not isinstance(intent, Intent):
+        raise TypeError(f"decide returned {type(intent).__name__}, not an Intent")
+    numbers = (
+        *intent.wanted,
+        *intent.velocity,
+        *intent.heading_for,
+        *intent.tilt,
+        intent.yaw,
+        intent.force,
+    )
+    target = () if intent.target is None else intent.target
+    total = sum(map(abs, (*numbers, *target)))
+    # As good as always: one look shows that all are plain, finite and small.
+    sound = type(total) is float and total <= MAX_ANY and intent.force >= 0.0
+    return intent if sound and len(numbers) == NUMBERS else _converted(intent)
+
+
+def _converted(intent: Intent) -> Intent:
+    if intent.force < 0.0:
+        raise ValueError(f"the Intent's force is {intent.force:g}; it is a magnitude, at least 0")
+    pitch, roll = _numbers("tilt", intent.tilt, 2, MAX_ANY)
+    return replace(
+        intent,
+        wanted=_vector("wanted", intent.wanted, MAX_ANY),
+        velocity=_vector("velocity", intent.velocity, MAX_ANY),
+        yaw=_numbers("yaw", (intent.yaw,), 1, MAX_ANY)[0],
+        force=_numbers("force", (intent.force,), 1, MAX_FORCE)[0],
+        heading_for=_vector("heading_for", intent.heading_for, MAX_M),
+        target=None if intent.target is None else _vector("target", intent.target, MAX_M),
+        tilt=(pitch, roll),
+    )
+
+
+def _vector(name: str, given: Iterable[float], bound: float) -> Vector:
+    x, y, z = _numbers(name, given, 3, bound)
+    return (x, y, z)
+
+
+def _numbers(name: str, given: Iterable[float], count: int, bound: float) -> list[float]:
+    numbers = [float(each) for each in given]
+    if len(numbers) != count:
+        raise ValueError(f"the Intent's {name} has {len(numbers)} numbers instead of {count}")
+    for number in numbers:
+        if not isfinite(number) or abs(number) > bound:
+            raise ValueError(f"the Intent's {name} holds {number:g}; at most {bound:g} is allowed")
+    return numbers

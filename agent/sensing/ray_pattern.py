@@ -1,0 +1,114 @@
+"""Where a sensor's rays point: known to the agent from its setup, cast by the world.
+
+The body frame has x ahead, y to the left and z up.
+"""
+
+from math import cos, pi, radians, sin
+from typing import NamedTuple
+
+from agent.config import Laser, Sensors, Sonar
+from agent.messages import Vector
+
+IN_BEAM = 6
+"""Rays on each of a beam's two rings about its axis."""
+SAME_RAY_RAD = 0.03
+"""Within so much a ray looks at a point, not past it."""
+KINDS = ("laser", "sonar")
+"""Sensors that scan, in the order of a Scan's ``kind``."""
+
+
+class Grid(NamedTuple):
+    """A laser's rays: ``rows`` rings of ``columns``; half the field of view in each [rad]."""
+
+    rows: int
+    columns: int
+    tilt: float
+    half: float
+
+    def towards(self, azimuth: float, up: float) -> int | None:
+        """Return the ray that looks in a direction [rad; body frame], None if none does."""
+        row = _nearest(up, self.tilt, self.rows)
+        column = _nearest(azimuth, self.half, self.columns)
+        return None if row is None or column is None else row * self.columns + column
+
+
+class Pattern(NamedTuple):
+    """One sensor's axes, unit vectors [body frame]; each beam is a bundle of rays about its axis.
+
+    kind: index of KINDS. every: it scans at each so many-th tick. grid: how a laser's are laid out.
+    """
+
+    kind: int
+    axes: tuple[Vector, ...]
+    beams: tuple[tuple[Vector, ...], ...]
+    range_m: float
+    every: int
+    grid: Grid | None = None
+
+
+def pattern_of(kind: str, sensors: Sensors, tick_hz: float) -> Pattern:
+    """Return the pattern of a sensor that scans."""
+    if kind == "laser":
+        return _laser_pattern(sensors.laser, tick_hz)
+    axes = _sonar_axes(sensors.sonar)
+    half = 0.5 * radians(sensors.sonar.beam_deg)
+    beams = tuple(_beam(axis, half) for axis in axes)
+    return Pattern(1, axes, beams, sensors.sonar.range_m, _every(sensors.sonar.rate_hz, tick_hz))
+
+
+def _laser_pattern(laser: Laser, tick_hz: float) -> Pattern:
+    half, tilt = 0.5 * radians(laser.field_deg), radians(laser.elevation_deg)
+    rays = tuple(
+        (cos(up) * cos(azimuth), cos(up) * sin(azimuth), sin(up))
+        for up in _spread(-tilt, tilt, laser.rings)
+        for azimuth in _spread(-half, half, laser.rays)
+    )
+    beams, every = tuple((ray,) for ray in rays), _every(laser.rate_hz, tick_hz)
+    grid = Grid(laser.rings, laser.rays, tilt, half)
+    return Pattern(0, rays, beams, laser.range_m, every, grid)
+
+
+def _nearest(angle: float, half: float, count: int) -> int | None:
+    """Return the ray nearest to an angle [rad] of ``count`` spread over +-half."""
+    if count == 1:
+        return 0 if abs(angle) <= SAME_RAY_RAD else None
+    step = 2.0 * half / (count - 1)
+    index = round((angle + half) / step)
+    if not 0 <= index < count or abs(angle + half - index * step) > SAME_RAY_RAD:
+        return None
+    return index
+
+
+def _every(rate_hz: float, tick_hz: float) -> int:
+    return max(1, round(tick_hz / rate_hz))
+
+
+def _spread(first: float, last: float, count: int) -> list[float]:
+    if count == 1:
+        return [0.5 * (first + last)]
+    return [first + (last - first) * k / (count - 1) for k in range(count)]
+
+
+def _sonar_axes(sonar: Sonar) -> tuple[Vector, ...]:
+    ring = [(cos(a), sin(a), 0.0) for a in (2.0 * pi * k / sonar.ring for k in range(sonar.ring))]
+    return (*ring, (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)) if sonar.up_down else tuple(ring)
+
+
+def _beam(axis: Vector, half: float) -> tuple[Vector, ...]:
+    """Return the axis, and two rings of rays about it within the half angle [rad]."""
+    x, y, z = axis
+    side = (-y, x, 0.0) if z == 0.0 else (1.0, 0.0, 0.0)
+    over = (y * side[2] - z * side[1], z * side[0] - x * side[2], x * side[1] - y * side[0])
+    rays = [axis]
+    for angle in (0.5 * half, half):
+        for k in range(IN_BEAM):
+            turn = 2.0 * pi * k / IN_BEAM
+            a, b, c = cos(angle), sin(angle) * cos(turn), sin(angle) * sin(turn)
+            rays.append(
+                (
+                    a * x + b * side[0] + c * over[0],
+                    a * y + b * side[1] + c * over[1],
+                    a * z + b * side[2] + c * over[2],
+                )
+            )
+    return tuple(rays)

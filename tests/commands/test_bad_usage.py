@@ -1,0 +1,76 @@
+"""Bad input on the command line: one line on stderr, exit 2, nothing started or written."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.commands.conftest import Command
+
+BAD = [
+    ((), "Missing command"),
+    (("fly",), "No such command 'fly'"),
+    (("sim",), "Missing argument 'SCENARIO'"),
+    (("sim", "none.toml"), "none.toml: no such file"),
+    (("run", "none.toml"), "none.toml: no such file"),
+    (("check", "none.toml"), "none.toml: no such file"),
+    (("sim", "small.toml", "--bogus"), "No such option: --bogus"),
+    (("sim", "small.toml", "--agents", "many"), "'--agents'"),
+    (("sim", "small.toml", "--agents", "0"), "small.toml: fleet.agents: got 0"),
+    (("sim", "small.toml", "--agents", "3"), "small.toml: fleet.start.positions_m: 2 positions"),
+    (("sim", "small.toml", "--seed", "-1"), "small.toml: seed: got -1"),
+    (("sim", "small.toml", "--duration", "nan"), "small.toml: duration_s: nan"),
+    (("sim", "small.toml", "--set", "netem.loss_percent"), "write it as netem.loss_percent=50"),
+    (("sim", "small.toml", "--set", "=50"), "write it as netem.loss_percent=50"),
+    (("sim", "small.toml", "--set", "netem.loss=50"), "netem.loss: unknown key"),
+    (("sim", "small.toml", "--set", "control.controller=a:b"), "control.controller: 'a:b'"),
+    (("sim", "small.toml", "--set", "vehicle.max_speed_mps=9"), "tick_hz = 90 would do"),
+    (("run", "small.toml", "--set", "vehicle.max_speed_mps=2"), "tick_hz = 40 would do"),
+    (("sim", "small.toml", "--seeds", "3"), "write first:end, as 0:20"),
+    (("sim", "small.toml", "--seeds", "5:5"), "write first:end, as 0:20"),
+    (("sim", "small.toml", "--seeds", "0:9999999"), "at most 1000000"),
+    (("sim", "small.toml", "--seeds", "0:2", "--seed", "1"), "not beside --seed"),
+    (("sim", "small.toml", "small.toml"), "small-seed1: would be written twice"),
+    (("sim", "small.toml", "--jobs", "0"), "'--jobs'"),
+    (("run", "small.toml", "--speed", "0"), "'--speed'"),
+    (("run", "small.toml", "--speed", "inf"), "--speed"),
+    (("sim", "small.toml", "--out", "small.toml"), "small.toml: exists"),
+    (("sim", "small.toml", "--out", "small.toml/x"), "cannot be made: not a directory"),
+    (("run", "small.toml", "--out", "."), "exists; a run is never overwritten"),
+    (("sim", "small.toml", "--seeds", "0:2", "--out", "."), "exists"),
+    (("netem", "check", "small.toml", "--plot", "radio.txt"), "'radio.txt'; it ends in .png"),
+    (("verify", "none"), "none: no such"),
+    (("ps", "none"), "none: no fleet.json"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "says"), BAD, ids=[" ".join(each) for each, _ in BAD])
+def test_it_is_one_line_and_exit_2(
+    small: Path, qswarm: Command, arguments: tuple[str, ...], says: str
+) -> None:
+    told = qswarm(*arguments)
+    assert told.status == 2
+    assert told.out == ""
+    assert says in told.err
+    assert told.err.count("\n") == 1
+    assert list(small.parent.iterdir()) == [small]
+
+
+def test_a_run_is_never_overwritten(small: Path, qswarm: Command) -> None:
+    assert qswarm("sim", small, "--no-recording", "--out", "once").status == 0
+    before = {file: file.read_bytes() for file in Path("once").iterdir() if file.is_file()}
+    assert qswarm("sim", small, "--seed", "5", "--out", "once").status == 2
+    assert {file: file.read_bytes() for file in before} == before
+
+
+def test_the_process_itself_exits_2_with_one_line(small: Path) -> None:
+    program = "from worldsim.commands.app import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", program, "check", "none.toml"],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={"PYTHONPATH": str(Path(__file__).parents[2])},
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", "none.toml: no such file\n")

@@ -1,0 +1,74 @@
+"""view: what it opens, in which words it refuses, and that it serves loopback alone."""
+
+import re
+import signal
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from tests.commands.conftest import Command
+from tests.processes.harness import QSWARM, Started, eventually
+from worldsim.recording.viewer import recordings
+
+
+@pytest.fixture
+def flown(small: Path, qswarm: Command) -> Path:
+    """Two recorded runs in one folder."""
+    told = qswarm(
+        "sim", small, "--seeds", "1:3", "--duration", "0.5", "--jobs", "1", "--out", "two"
+    )
+    assert told.status == 1
+    return small.parent / "two"
+
+
+def test_a_run_a_recording_and_a_folder_of_runs_are_found(flown: Path) -> None:
+    both = [flown / "small-seed1" / "run.rrd", flown / "small-seed2" / "run.rrd"]
+    assert recordings([flown]) == both
+    assert recordings([flown / "small-seed2", both[0]]) == both[::-1]
+
+
+@pytest.mark.parametrize("web", [[], ["--web"]])
+def test_nothing_to_view_is_one_line_and_exit_2(
+    small: Path, qswarm: Command, web: list[str]
+) -> None:
+    small.with_name("bare").mkdir()
+    for run, says in (("none", "none: no such run"), ("bare", "bare: no recording in it")):
+        told = qswarm("view", run, *web)
+        assert (told.status, told.out, told.err.count("\n")) == (2, "", 1)
+        assert told.err.startswith(says)
+
+
+def test_without_a_display_the_browser_is_named(
+    flown: Path, qswarm: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for display in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(display, raising=False)
+    told = qswarm("view", flown)
+    assert (told.status, told.out) == (2, "")
+    assert "--web" in told.err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_browser_is_served_on_loopback_until_it_is_ended(
+    flown: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    configuration = flown.parent / "configuration"
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(configuration))
+    started = Started([*QSWARM, "view", "two", "--web"], flown.parent / "said", flown.parent)
+    started.says("Ctrl-C ends it")
+    address = re.search(r"http://127\.0\.0\.1:\d+/", started.text)
+    assert address is not None
+    eventually(lambda: answers(address[0]), 20.0, lambda: started.text)
+    started.process.send_signal(number)
+    assert started.status(within_s=10.0) == 0
+    eventually(lambda: not answers(address[0]), 10.0)
+    assert not configuration.exists()
+
+
+def answers(address: str) -> bool:
+    try:
+        with urllib.request.urlopen(address, timeout=1.0) as page:
+            return b"rerun" in page.read().lower()
+    except OSError:
+        return False

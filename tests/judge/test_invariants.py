@@ -1,0 +1,119 @@
+"""The judge of allocation: times by the formulas, and each planted breach is seen."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.recording.flights import straight_flight, wedge
+from worldsim.judge.connectivity import Reach, rounds_to_all
+from worldsim.judge.tick import Tick
+from worldsim.judge.verdict import Judge
+
+AGENTS = 9
+DURATION_S = 30.0
+
+
+def flight(agents: int = AGENTS) -> list[Tick]:
+    return list(straight_flight(wedge(agents, DURATION_S)))
+
+
+def judged(ticks: list[Tick], *events: dict[str, Any]) -> dict[str, tuple[int, int]]:
+    judge = Judge(wedge(AGENTS, DURATION_S))
+    waiting = list(events)
+    for tick in ticks:
+        while waiting and waiting[0]["t_s"] <= tick.time_s:
+            judge.note(waiting.pop(0))
+        judge.see(tick)
+    return {name: (row["ticks"], row["violations"]) for name, row in judge.invariants().items()}
+
+
+def claimed(ticks: list[Tick], agent: int, place: tuple[int, int], from_s: float) -> list[Tick]:
+    """Return ticks in which an agent claims another place from a time on."""
+    changed = []
+    for tick in ticks:
+        places = tick.place.copy()
+        if tick.time_s >= from_s:
+            places[agent] = place
+        changed.append(replace(tick, place=places))
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("loss_percent", "horizon_s"), [(0.0, 9.0), (20.0, 23.0), (50.0, 46.0), (80.0, 132.0)]
+)
+def test_how_long_it_takes_until_a_team_must_have_settled(
+    loss_percent: float, horizon_s: float
+) -> None:
+    reach = Reach(wedge(AGENTS))
+    reach.note({"kind": "netem", "conditions": {"loss_percent": loss_percent}})
+    settled_s = reach.detection_s(2) + 2.0 * reach.everybody_s(AGENTS, 2)
+    assert settled_s == pytest.approx(horizon_s, abs=0.6)
+
+
+def test_nothing_reaches_everybody_where_all_is_lost() -> None:
+    assert rounds_to_all(9, 2, 1.0) == np.inf
+    assert rounds_to_all(9, 0, 1.0) == 0
+
+
+def test_components_follow_range_and_partition() -> None:
+    (tick, *_) = flight(4)
+    line = replace(tick, position=np.array([[k, 0, 0] for k in (0, 1, 2, 9)], dtype=np.float32))
+    reach = Reach(wedge(4))
+    assert reach.components(line).members() == [[0, 1, 2, 3]]
+    reach.note({"kind": "netem", "conditions": {"range_m": 1.5}})
+    assert reach.components(line).members() == [[0, 1, 2], [3]]
+    assert reach.components(line).hops == 2
+    reach.note({"kind": "partition", "groups": [[1]]})
+    assert reach.components(line).members() == [[0], [1], [2], [3]]
+    reach.note({"kind": "heal"})
+    assert reach.components(line).hops == 2
+
+
+def test_a_team_that_flies_straight_to_its_places_breaks_nothing() -> None:
+    found = judged(flight())
+    assert set(found) == {"I1", "I2", "I3", "I4", "I6", "I7", "I8"}
+    assert {name: broken for name, (_, broken) in found.items() if name not in {"I1"}} == {
+        "I2": 0, "I3": 0, "I4": 0, "I6": 0, "I7": 0, "I8": 0,
+    }  # fmt: skip
+    assert found["I4"][0] == found["I6"][0] == 601
+    assert 300 < found["I7"][0] < found["I2"][0] < 601
+
+
+def test_a_vertex_without_an_agent_breaks_i2() -> None:
+    (apex,) = np.flatnonzero((flight()[0].place == (0, 0)).all(axis=1))
+    found = judged(claimed(flight(), apex, (0, 3), 20.0))
+    assert found["I2"][1] == 201
+
+
+def test_a_queue_with_two_too_many_breaks_i3() -> None:
+    ticks = flight()
+    others = np.flatnonzero(ticks[0].place[:, 0] == 3)[:2]
+    for rank, agent in enumerate(others):
+        ticks = claimed(ticks, agent, (0, 3 + rank), 20.0)
+    assert judged(ticks)["I3"][1] == 201
+
+
+def test_two_in_one_place_may_be_for_a_while_only() -> None:
+    ticks = flight()
+    there = tuple(ticks[0].place[5].tolist())
+    assert judged(claimed(ticks, 4, there, 29.1))["I4"][1] == 0
+    assert judged(claimed(ticks, 4, there, 20.0))["I4"][1] > 150
+
+
+def test_a_place_changed_in_a_quiet_team_breaks_i7_and_after_a_fault_does_not() -> None:
+    ticks = flight()
+    swapped = claimed(
+        claimed(ticks, 4, tuple(ticks[0].place[5]), 25.0), 5, tuple(ticks[0].place[4]), 25.0
+    )
+    assert judged(swapped)["I7"][1] == 1
+    assert judged(swapped, {"t_s": 24.0, "kind": "heal", "agent": None})["I7"][1] == 0
+
+
+def test_a_fourth_change_of_role_without_a_fault_breaks_i6() -> None:
+    flips = [{"t_s": 10.0 + k, "kind": "role", "agent": 3} for k in range(4)]
+    assert judged(flight(), *flips[:3])["I6"][1] == 0
+    assert judged(flight(), *flips)["I6"][1] == 1
+    fault = {"t_s": 12.5, "kind": "heal", "agent": None}
+    assert judged(flight(), *flips[:3], fault, flips[3])["I6"][1] == 0

@@ -1,0 +1,90 @@
+"""What a recording shows of tiers, roles and queues, beside what is judged."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rerun.chunk import Chunk, RrdReader
+
+from agent.comms.hierarchy import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
+from tests.recording.flights import record, straight_flight, wedge
+from worldsim.judge.tick import Standings, Tick
+from worldsim.recording.hierarchy_columns import parent_lines
+from worldsim.recording.recorder import RunRecorder
+
+AGENTS = 5
+PARENT = (-1, 0, 1, 1, -1)
+TIER = (0, 1, 2, 2, -1)
+ROLE = (VERTEX, SUB_VERTEX, MEMBER, MEMBER, DISTRESS)
+
+
+def standings(role: tuple[int, ...] = ROLE) -> Standings:
+    ages = np.full(AGENTS, 0.3, dtype=np.float32)
+    tier, parent = np.array(TIER, dtype=np.int16), np.array(PARENT, dtype=np.int32)
+    return Standings(tier, parent, np.array(role, dtype=np.int8), ages)
+
+
+def ticks() -> list[Tick]:
+    """Two seconds; after one, the agent in distress is a member."""
+    found = (*ROLE[:-1], MEMBER)
+    return [
+        replace(tick, standings=standings(ROLE if tick.time_s < 1.0 else found))
+        for tick in straight_flight(wedge(AGENTS, duration_s=2.0))
+    ]
+
+
+@pytest.fixture(scope="module")
+def chunks(tmp_path_factory: pytest.TempPathFactory) -> list[Chunk]:
+    path: Path = tmp_path_factory.mktemp("standings") / "run.rrd"
+    scenario = wedge(AGENTS, duration_s=2.0)
+    record(RunRecorder(path, scenario, "standings", mode="virtual"), scenario, ticks())
+    return list(RrdReader(path).stream())
+
+
+def rows(chunks: list[Chunk], entity: str, component: str) -> list[list[object]]:
+    batches = [
+        chunk.to_record_batch()
+        for chunk in chunks
+        if chunk.entity_path == entity and not chunk.is_static
+    ]
+    having = [batch.column(component) for batch in batches if component in batch.schema.names]
+    return [row for column in having for row in column.to_pylist()]
+
+
+def test_figures_are_taken_four_times_a_second(chunks: list[Chunk]) -> None:
+    for entity, first in (
+        ("/metrics/tier", [0.0, 1.0, 2.0, 2.0, -1.0]),
+        ("/metrics/record_age", pytest.approx([0.3] * AGENTS)),
+        ("/metrics/neighbours", [4.0] * AGENTS),
+    ):
+        told = rows(chunks, entity, "Scalars:scalars")
+        assert len(told) == 2 * 4 + 1
+        assert told[0] == first
+
+
+def test_each_queue_has_a_residual_of_its_own(chunks: list[Chunk]) -> None:
+    told = rows(chunks, "/metrics/queue_residual", "Scalars:scalars")
+    assert {len(row) for row in told} == {4}
+    assert len(told) == 2 * 4 + 1
+
+
+def test_a_line_leads_from_each_agent_to_its_parent(chunks: list[Chunk]) -> None:
+    told = rows(chunks, "/world/hierarchy", "LineStrips3D:strips")
+    assert {len(row) for row in told} == {3}
+    tick = ticks()[0]
+    ends, tiers = parent_lines(tick, standings())
+    assert tiers.tolist() == [1, 2, 2]
+    np.testing.assert_array_equal(ends[0], tick.position[[1, 0]])
+
+
+def test_roles_are_told_when_they_change_beside_the_vehicle_and_in_a_lane(
+    chunks: list[Chunk],
+) -> None:
+    labels = rows(chunks, "/world/vehicles", "Boxes3D:labels")
+    assert [row for row in labels if row] == [
+        ["a0 vertex", "a1 sub-vertex 1", "a2", "a3", "a4 distress"],
+        ["a0 vertex", "a1 sub-vertex 1", "a2", "a3", "a4"],
+    ]
+    assert rows(chunks, "/roles/a4", "StateChange:state") == [["distress"], ["member"]]
+    assert rows(chunks, "/roles/a0", "StateChange:state") == [["vertex"]]

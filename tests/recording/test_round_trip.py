@@ -1,0 +1,111 @@
+"""What is read back is what was judged."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.recording.flights import record, straight_flight, told, wedge
+from worldsim.judge.tick import Tick
+from worldsim.judge.verdict import Judge
+from worldsim.recording.readback import read_run
+from worldsim.recording.recorder import RunRecorder
+
+AGENTS = 5
+SPOOFED = 40_000
+
+
+@st.composite
+def wild_ticks(draw: st.DrawFn) -> list[Tick]:
+    """Ticks of anything: vehicles that are not there, no places, no targets, false neighbours."""
+    generator = np.random.default_rng(draw(st.integers(0, 2**32)))
+    count = draw(st.integers(1, 50))
+    return [_wild_tick(generator, index) for index in range(count)]
+
+
+def _wild_tick(generator: np.random.Generator, index: int) -> Tick:
+    def row(*shape: int) -> np.ndarray:
+        return generator.normal(0.0, 2.0, (AGENTS, *shape)).astype(np.float32)
+
+    def absent() -> np.ndarray:
+        return generator.random(AGENTS) < 0.2
+
+    position, target, force, turn = row(3), row(3), np.abs(row()), 60.0 * row()
+    for some in (position, target, force, turn):
+        some[absent()] = np.nan
+    links = generator.integers(0, AGENTS, (generator.integers(0, 8), 2))
+    return Tick(
+        index=index,
+        time_s=index / 20.0,
+        position=position,
+        attitude=row(3),
+        target=target,
+        place=generator.integers(-1, 4, (AGENTS, 2)).astype(np.int16),
+        force=force,
+        turn_deg=turn,
+        alive=generator.random(AGENTS) < 0.8,
+        links=np.vstack([links, [[0, SPOOFED]]]).astype(np.int32),
+        mission=generator.integers(0, 2**40, AGENTS),
+        packets={"sent": int(generator.integers(0, 2**40))},
+    )
+
+
+@settings(max_examples=12, deadline=None)
+@given(ticks=wild_ticks())
+def test_the_judge_meets_the_same_numbers_in_the_recording(ticks: list[Tick]) -> None:
+    scenario = wedge(AGENTS)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "run.rrd"
+        judged = record(RunRecorder(path, scenario, "wild", mode="virtual"), scenario, ticks)
+        readback = read_run(path)
+    again = Judge(readback.scenario)
+    for before, after in zip(ticks, readback.ticks, strict=True):
+        _assert_equal(before, after)
+        again.see(after)
+    assert told(again) == told(judged)
+
+
+def _assert_equal(before: Tick, after: Tick) -> None:
+    assert (after.index, after.time_s) == (before.index, before.time_s)
+    for rows in ("position", "attitude", "target", "place", "force", "turn_deg", "alive"):
+        kept, given_ = getattr(after, rows), getattr(before, rows)
+        assert kept.dtype == given_.dtype
+        np.testing.assert_array_equal(kept, given_)
+    real = before.links[before.links[:, 1] < AGENTS]
+    np.testing.assert_array_equal(after.links, np.unique(real, axis=0).reshape(-1, 2))
+    assert after.packets == before.packets
+
+
+def test_scenario_and_events_come_back(tmp_path: Path) -> None:
+    scenario = wedge(9, duration_s=1.0)
+    recorder = RunRecorder(tmp_path / "run.rrd", scenario, "events", mode="virtual")
+    events = [
+        {"t_s": 0.0125, "kind": "slot", "agent": 3, "place": [1, 2], "before": None},
+        {"t_s": 0.5, "kind": "kill", "agent": 4},
+        {"t_s": 0.75, "kind": "heal", "agent": None},
+    ]
+    for event in events:
+        recorder.event(event)
+    record(recorder, scenario, list(straight_flight(scenario)))
+    readback = read_run(tmp_path / "run.rrd")
+    assert readback.events == events
+    assert readback.scenario == scenario
+
+
+def test_ticks_come_back_at_a_rate_that_is_no_round_number_of_nanoseconds(tmp_path: Path) -> None:
+    scenario = wedge(4, duration_s=1.0)
+    ticks = [
+        Tick(
+            **{**{name: getattr(tick, name) for name in tick.__slots__}, "time_s": tick.index / 30}
+        )
+        for tick in straight_flight(scenario)
+    ]
+    thirty = type(scenario)(
+        fleet=type(scenario.fleet)(agents=4, tick_hz=30.0), formation=scenario.formation
+    )
+    record(RunRecorder(tmp_path / "run.rrd", thirty, "thirty", mode="virtual"), thirty, ticks)
+    assert [tick.time_s for tick in read_run(tmp_path / "run.rrd").ticks] == [
+        tick.time_s for tick in ticks
+    ]

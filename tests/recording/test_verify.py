@@ -1,0 +1,134 @@
+"""The verdict from the recording alone, and what it says about a summary that is not true."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.recording.flights import record, straight_flight, wedge
+from worldsim.judge.verdict import Judge
+from worldsim.recording.recorder import RunRecorder
+from worldsim.recording.verify import Difference, verify
+
+
+@pytest.fixture
+def judge(tmp_path: Path) -> Judge:
+    """A recorded run in ``tmp_path`` that converged, without a summary."""
+    scenario = wedge(4)
+    recorder = RunRecorder(tmp_path / "run.rrd", scenario, "verified", mode="virtual")
+    return record(recorder, scenario, list(straight_flight(scenario)))
+
+
+def summary_of(judge: Judge) -> dict[str, Any]:
+    return {
+        "outcome": "pass",
+        "expectations": [
+            {"name": row.name, "wanted": row.wanted, "got": row.got, "held": row.held}
+            for row in judge.expectations()
+        ],
+        "min_separation_m": judge.min_separation_m,
+        "turns_over_limit_fraction": judge.turns_over_limit_fraction,
+        "invariants": judge.invariants(),
+        "phases": [
+            {
+                "formation": phase.formation.name,
+                "from_s": phase.from_s,
+                "converged": phase.converge_s is not None,
+                "converge_s": phase.converge_s,
+                "residual_m": phase.residual_m,
+            }
+            for phase in judge.phases
+        ],
+    }
+
+
+def test_without_a_summary_the_recording_is_still_judged(tmp_path: Path, judge: Judge) -> None:
+    verification = verify(tmp_path)
+    assert not verification.summary
+    assert verification.expectations == tuple(judge.expectations())
+    assert verification.min_separation_m == judge.min_separation_m
+    assert verification.phases[0].converge_s == judge.phases[0].converge_s
+    assert verification.whole
+
+
+def test_a_true_summary_does_not_differ(tmp_path: Path, judge: Judge) -> None:
+    (tmp_path / "summary.json").write_text(json.dumps(summary_of(judge)))
+    verification = verify(tmp_path)
+    assert verification.summary
+    assert verification.differences == ()
+
+
+@pytest.mark.parametrize(
+    ("key", "tampered"),
+    [("min_separation_m", 0.9), ("turns_over_limit_fraction", 0.0), ("invariants", {})],
+)
+def test_a_tampered_summary_is_found_out(
+    tmp_path: Path, judge: Judge, key: str, tampered: object
+) -> None:
+    (tmp_path / "summary.json").write_text(json.dumps({**summary_of(judge), key: tampered}))
+    verification = verify(tmp_path)
+    assert {difference.key.split(".")[0] for difference in verification.differences} == {key}
+    assert verification.exit_status == 1
+
+
+def test_a_figure_in_a_list_is_found_out(tmp_path: Path, judge: Judge) -> None:
+    summary = summary_of(judge)
+    residual_m = summary["phases"][0]["residual_m"]
+    summary["phases"][0]["residual_m"] = residual_m + 1e-15
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    assert verify(tmp_path).differences == (
+        Difference("phases.0.residual_m", residual_m + 1e-15, residual_m),
+    )
+
+
+@pytest.mark.parametrize("text", ["[]", "null", "{}"])
+def test_a_summary_without_figures_differs_in_all(tmp_path: Path, judge: Judge, text: str) -> None:
+    (tmp_path / "summary.json").write_text(text)
+    keys = {difference.key for difference in verify(tmp_path).differences}
+    assert {"min_separation_m", "phases.0.converged", "expectations.0.held"} <= keys
+    assert judge.ticks
+
+
+def test_held_is_exit_0_and_a_missed_expectation_1(tmp_path: Path) -> None:
+    calm = wedge(1, duration_s=6.0)
+    short = wedge(1, duration_s=0.5)
+    for name, scenario in (("calm", calm), ("short", short)):
+        (tmp_path / name).mkdir()
+        recorder = RunRecorder(tmp_path / name / "run.rrd", scenario, name, mode="virtual")
+        record(recorder, scenario, list(straight_flight(scenario)))
+    assert verify(tmp_path / "calm").exit_status == 0
+    assert verify(tmp_path / "short").exit_status == 1
+
+
+def test_packets_that_went_missing_are_found_in_the_recording(tmp_path: Path) -> None:
+    scenario = wedge(4)
+    *ticks, last = straight_flight(scenario)
+    last.packets["in_flight"] -= 1
+    recorder = RunRecorder(tmp_path / "run.rrd", scenario, "leaky", mode="virtual")
+    record(recorder, scenario, [*ticks, last])
+    verification = verify(tmp_path)
+    assert verification.invariants["I8"] == {"ticks": len(ticks) + 1, "violations": 1}
+    assert verification.exit_status == 1
+
+
+def test_counters_that_come_late_are_looked_at_from_then_on(tmp_path: Path) -> None:
+    scenario = wedge(4)
+    ticks = list(straight_flight(scenario))
+    for tick in ticks[:3]:
+        tick.packets.clear()
+    recorder = RunRecorder(tmp_path / "run.rrd", scenario, "late", mode="lockstep")
+    judge = record(recorder, scenario, ticks)
+    (tmp_path / "summary.json").write_text(json.dumps(summary_of(judge)))
+    verification = verify(tmp_path)
+    assert verification.invariants["I8"] == {"ticks": len(ticks) - 3, "violations": 0}
+    assert verification.differences == ()
+
+
+def test_nothing_to_judge_is_exit_2(tmp_path: Path) -> None:
+    (tmp_path / "text.rrd").write_text("hello")
+    for run in (tmp_path / "nowhere", tmp_path, tmp_path / "text.rrd"):
+        verification = verify(run)
+        assert verification.exit_status == 2
+        assert verification.problem is not None
+        assert "\n" not in verification.problem

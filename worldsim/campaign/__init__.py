@@ -1,0 +1,1 @@
+"""Many runs at once: seeds, spread over worker processes."""

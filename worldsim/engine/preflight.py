@@ -1,0 +1,67 @@
+"""What a scenario must pass before anything is started, besides its own checks.
+
+A start with room for everybody, a controller that can be had, vehicles that the safety filter can
+hold under the clock in question.
+"""
+
+from pathlib import Path
+
+from agent.controller import ControllerError
+from agent.controller import load as load_controller
+from worldsim.scenario.events import UPON_PROCESSES
+from worldsim.scenario.rules import Finding, too_fast
+from worldsim.scenario.tables import Scenario
+from worldsim.scenario.toml import ScenarioError
+from worldsim.truth.obstacles import Obstacles
+from worldsim.truth.start_positions import StartError, starts_of
+
+VIRTUAL_COMMAND_TICKS = 1
+PROCESS_COMMAND_TICKS = 2
+"""For how many ticks a command lives under each clock: H of docs/method.md."""
+
+
+def admit(scenario: Scenario, file: str | Path, command_ticks: int, by_hand: bool = False) -> None:
+    """Raise ScenarioError if a scenario cannot be flown where a command lives that long.
+
+    by_hand: whether every process is started by hand, so that none can be stopped by a timeline.
+    """
+    broken = (
+        too_fast(scenario, command_ticks)
+        or (_launcher(scenario) if by_hand else None)
+        or _controller(scenario)
+        or _room(scenario)
+    )
+    if broken is not None:
+        raise ScenarioError(file, *broken)
+
+
+def _launcher(scenario: Scenario) -> Finding | None:
+    """Say which event needs somebody who starts and ends processes."""
+    for index, event in enumerate(scenario.event):
+        if event.kind in UPON_PROCESSES:
+            return Finding(
+                f"event[{index}].{event.kind}",
+                "needs the launcher (qswarm run): who is started by hand is ended by hand",
+            )
+    return None
+
+
+def _controller(scenario: Scenario) -> Finding | None:
+    name = scenario.control.controller
+    try:
+        load_controller(name)
+    except ControllerError as error:
+        return Finding("control.controller", str(error))
+    except Exception as error:  # the user's module may raise anything while it is imported
+        return Finding(
+            "control.controller", f"{name!r} cannot be imported: {type(error).__name__}: {error}"
+        )
+    return None
+
+
+def _room(scenario: Scenario) -> Finding | None:
+    try:
+        starts_of(scenario, Obstacles(scenario.obstacle))
+    except StartError as error:
+        return Finding("fleet.start", str(error))
+    return None

@@ -1,0 +1,151 @@
+"""The virtual clock: the whole fleet in one process, as fast as the host allows.
+
+The same agents, medium and world as in processes, driven by the same slot loop. Every message
+still crosses its codec; payloads that several agents hear are decoded once.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from time import perf_counter, process_time
+
+from agent.codec import decode_beacon, decode_command, decode_gossip, decode_observation, encode
+from agent.core import Agent, Decoders
+from netem.medium import Medium
+from netem.messages import Verdicts
+from netem.wire.frame import (
+    BATCH_RING,
+    Batch,
+    Outgoing,
+    Transmission,
+    pack,
+    unpack_batch,
+    unpack_transmission,
+)
+from worldsim.engine.meaning import Deed
+from worldsim.engine.membership import Start, Stop
+from worldsim.engine.step import Event, Opened, Recorder, SlotLoop, world_of
+from worldsim.scenario.tables import Scenario
+from worldsim.scenario.timeline import Change, Flapping, Heal, Jamming, Partition
+
+COMMAND_TICKS = 1
+"""A command is valid for one tick: in virtual time none is ever late."""
+PROGRESS_EVERY_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """A finished run in virtual time."""
+
+    loop: SlotLoop
+    verdicts: Verdicts
+    rejected: int
+    wall_s: float
+    cpu_s: float
+
+
+class VirtualFleet:
+    """A fleet, its radio and its world, stepped slot by slot."""
+
+    def __init__(self, scenario: Scenario, recorder: Recorder | None = None) -> None:
+        decoders = Decoders(lru_cache(4096)(decode_beacon), lru_cache(4096)(decode_gossip))
+        self._scenario = scenario
+        self._medium = Medium(scenario.medium_setup())
+        self._decoders = decoders
+        self._agents = {agent: self._started(agent, 0) for agent in range(scenario.fleet.agents)}
+        self._inboxes = [deque[bytes](maxlen=BATCH_RING) for _ in range(scenario.rows)]
+        self.loop = SlotLoop(
+            scenario, world_of(scenario, COMMAND_TICKS), recorder, self._medium.packets
+        )
+
+    @property
+    def rejected(self) -> int:
+        """Messages that agents refused to believe."""
+        return sum(self.loop.refusals.by_cause().values())
+
+    @property
+    def verdicts(self) -> Verdicts:
+        """The medium's counters."""
+        return self._medium.verdicts(self.loop.world.slot)
+
+    def slot(self) -> None:
+        """Run one slot: what is due before it, truth, batches, steps, verdicts, flight."""
+        for deed in self.loop.due():
+            self.do(deed)
+            self.loop.take(deed)
+        opened = self.loop.open()
+        self._medium.place(opened.positions)
+        for agent, observation in opened.observations:
+            self._step(agent, encode(observation), opened)
+        self._deliver(opened.slot + 1)
+        self.loop.close(self._medium.digest())
+
+    def do(self, deed: Deed) -> None:
+        """Carry out what happens between slots."""
+        match deed:
+            case Stop(agents=agents):
+                for agent in agents:
+                    del self._agents[agent]
+                    self._inboxes[agent].clear()
+            case Start(incarnations=incarnations):
+                for agent, incarnation in incarnations.items():
+                    self._agents[agent] = self._started(agent, incarnation)
+            case Change() | Partition() | Heal() | Jamming() | Flapping():
+                self._medium.obey(deed.order)
+
+    def _started(self, agent: int, incarnation: int) -> Agent:
+        setup = self._scenario.agent_setup(agent, incarnation, COMMAND_TICKS)
+        return Agent(setup, self._decoders)
+
+    def _step(self, agent: int, observed: bytes, opened: Opened) -> None:
+        core = self._agents[agent]
+        observation = decode_observation(observed)
+        inbox = self._inboxes[agent]
+        while inbox:
+            for frame in unpack_batch(inbox.popleft()).frames:
+                core.receive(frame.source, frame.channel, frame.payload, observation.time_s)
+        outbox = core.step(observation)
+        outgoing = tuple([Outgoing(channel, payload) for channel, payload in outbox.frames])
+        sent = pack(Transmission(opened.slot, outbox.command.incarnation, outgoing))
+        self._medium.transmit(agent, opened.time_s, unpack_transmission(sent))
+        command = encode(outbox.command)
+        self.loop.obey(agent, decode_command(command), command)
+
+    def _deliver(self, slot: int) -> None:
+        """Hand what is due by a slot to the group that steps in it."""
+        clock = self.loop.world.clock
+        alive, time_s = self.loop.team.alive.tolist(), clock.time_s(slot)
+        for agent in range(slot % clock.slots_per_tick, len(alive), clock.slots_per_tick):
+            if alive[agent]:
+                batch = Batch(slot, self._medium.collect(agent, time_s))
+                self._inboxes[agent].append(pack(batch))
+
+
+def fly(
+    scenario: Scenario,
+    recorder: Recorder | None = None,
+    on_event: Callable[[Event], None] | None = None,
+    on_progress: Callable[[SlotLoop], None] | None = None,
+    unwanted: Callable[[], bool] = lambda: False,
+) -> Flight:
+    """Fly a scenario in virtual time to its end, or until unwanted."""
+    fleet = VirtualFleet(scenario, recorder)
+    wall, cpu = perf_counter(), process_time()
+    told, progress_at = 0, wall + PROGRESS_EVERY_S
+    while fleet.loop.world.slot < scenario.slots and not unwanted():
+        fleet.slot()
+        while on_event is not None and told < len(fleet.loop.events):
+            on_event(fleet.loop.events[told])
+            told += 1
+        if on_progress is not None and perf_counter() >= progress_at:
+            progress_at = perf_counter() + PROGRESS_EVERY_S
+            on_progress(fleet.loop)
+    fleet.loop.finish()
+    return Flight(
+        fleet.loop,
+        fleet.verdicts,
+        fleet.rejected,
+        perf_counter() - wall,
+        process_time() - cpu,
+    )

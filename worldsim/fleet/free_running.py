@@ -1,0 +1,199 @@
+"""A fleet of real processes in the air, slot by slot on the wall clock. Nothing waits for anybody.
+
+Each slot: what the timeline and the operator want is done; the truth goes to the medium and
+observations to the agents that step; what they command before the next slot is due moves the
+vehicles.
+"""
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from agent.codec import RejectedError, decode_command, encode
+from netem.messages import Truth, Verdicts
+from netem.wire.bus import Post
+from netem.wire.frame import WireError, pack, unpack
+from worldsim.engine.meaning import Deed
+from worldsim.engine.membership import Begin, Hold, Stop
+from worldsim.engine.preflight import PROCESS_COMMAND_TICKS
+from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
+from worldsim.fleet.control import Control, Reception
+from worldsim.fleet.delivery_latency import ArrivalBook
+from worldsim.fleet.hands import Hands
+from worldsim.fleet.launcher_link import Loss, Outside
+from worldsim.fleet.pacing import Pacer, Punctuality
+from worldsim.fleet.progress import Headway
+from worldsim.fleet.startup import Muster
+from worldsim.judge.tick import Packets
+from worldsim.scenario.tables import Scenario
+
+REPORTS_RING = 4
+LOOK_EVERY_S = 0.25
+FINAL_VERDICTS_WITHIN_S = 1.0
+MAX_VERDICTS_B = 64 * 1024
+
+
+class Flight:
+    """A fleet in the air."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        post: Post,
+        recorder: Recorder,
+        outside: Outside,
+        muster: Muster,
+        speed: float,
+    ) -> None:
+        rows = range(scenario.rows)
+        self.loop = SlotLoop(
+            scenario, world_of(scenario, PROCESS_COMMAND_TICKS), recorder, self._packets
+        )
+        self.verdicts: Verdicts | None = None
+        self.punctuality = Punctuality(len(rows))
+        self.real_time_factor: float | None = None
+        self.failure: str | None = None
+        self._scenario = scenario
+        self._outside = outside
+        self._muster = muster
+        self._hands = Hands(post, muster, outside, scenario.fleet.boot_s / speed)
+        self._reception = Reception(post, Control(scenario, self.loop, outside.launches))
+        self.begun = self._landed = False
+        self._refused: Counter[str] = Counter()
+        self._pacer = Pacer(1.0 / (scenario.slot_hz * speed))
+        self._headway = Headway(scenario.duration_s, self.loop, outside)
+        self._truth, self._over = post.putter("truth"), post.putter("over")
+        self._observers = [post.putter("observation", agent) for agent in rows]
+        self._commands = post.rings("command", rows)
+        self._reports = post.ring("verdicts", size=REPORTS_RING)
+        clock = self.loop.world.clock
+        self._book = ArrivalBook(clock.slots_per_tick, 1.0 / clock.slot_hz)
+        self._arrivals = [post.ring("arrivals", agent) for agent in rows]
+        self._slots_a_report = round(clock.slot_hz)
+
+    @property
+    def late_fraction(self) -> float | None:
+        """Share of late ticks."""
+        return self.punctuality.late_fraction
+
+    @property
+    def delivery(self) -> dict[str, Any] | None:
+        """How late frames came, as far as the agents told."""
+        delivered = self.verdicts.fates.get("delivered", 0) if self.verdicts is not None else 0
+        return self._book.summary(delivered)
+
+    @property
+    def refused(self) -> Mapping[str, int]:
+        """What the world refused so far, by cause; "stale": commands of another time."""
+        causes = {**self._refused, "stale": self.loop.world.discarded}
+        return {cause: count for cause, count in sorted(causes.items()) if count}
+
+    def fly(self, unwanted: Callable[[], bool]) -> bool:
+        """Fly the scenario's slots until the end, or until unwanted; return whether all of them."""
+        self._pacer.start()
+        self.begun = True
+        slots, world = self._scenario.slots, self.loop.world
+        while world.slot < slots and not unwanted():
+            self._slot(unwanted)
+        self.real_time_factor = world.time_s / max(self._pacer.elapsed_s, 1e-9)
+        self.land()
+        self.loop.finish()
+        return world.slot == slots
+
+    def land(self) -> None:
+        """End the run for everybody, once, and take the medium's last counters."""
+        if self._landed:
+            return
+        self._landed = True
+        if self.begun:
+            self._outside.landing()
+        self._over(b"")
+        deadline = time.monotonic() + FINAL_VERDICTS_WITHIN_S
+        while (left_s := deadline - time.monotonic()) > 0.0:
+            report = self._reports.wait(left_s)
+            if report is not None:
+                self._read_report(report)
+            if self.verdicts is not None and self.verdicts.slot >= self.loop.world.slot:
+                break
+        for agent in range(len(self._arrivals)):
+            self._read_arrivals(agent)
+
+    def _slot(self, unwanted: Callable[[], bool]) -> None:
+        slot = self.loop.world.slot
+        self._pacer.begin(slot)
+        self._muster.instruct_agents()
+        for deed in self.loop.due():
+            self._do(deed)
+        self._reception.attend(lambda deed: self._do(deed, by="operator"))
+        self._send(self.loop.open())
+        self._strike_out()
+        while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not unwanted():
+            self._outside.wait(min(left_s, LOOK_EVERY_S))
+            self._strike_out()
+        for agent, said in self._commands.drain():
+            for data in said:
+                self._obey(agent, data)
+        for report in self._reports.drain(REPORTS_RING):
+            self._read_report(report)
+        # Each agent tells once a second, and so often it is asked, each in a slot of its own.
+        for agent in range(slot % self._slots_a_report, len(self._arrivals), self._slots_a_report):
+            self._read_arrivals(agent)
+        self.loop.close(b"")
+        self._headway.tell(self._pacer.elapsed_s, self.late_fraction)
+
+    def _do(self, deed: Deed, **signed: str) -> None:
+        """Carry out what happens between slots, and let it count at once."""
+        late = self._hands.do(deed, self.loop.world.slot, self.loop.team.incarnations)
+        self.loop.take(deed, **signed)
+        if isinstance(deed, Stop | Hold | Begin):
+            self.punctuality.forget(deed.agents)
+        for agent in late:
+            self.loop.event("late", agent, detail="its process is not up by the end of boot_s")
+
+    def _send(self, opened: Opened) -> None:
+        incarnations = tuple(self.loop.team.incarnations)
+        self._truth(pack(Truth(opened.slot, opened.time_s, opened.positions, incarnations)))
+        for agent, observation in opened.observations:
+            self._observers[agent](encode(observation))
+            self.punctuality.ask(agent, opened.slot, self.loop.world.latest[agent])
+
+    def _obey(self, agent: int, data: bytes) -> None:
+        """Take a command; what one who takes no part, or no more, had under way moves nothing."""
+        if not self.loop.team.awake[agent]:
+            return
+        try:
+            command = decode_command(data)
+        except RejectedError as error:
+            self._refused[error.cause] += 1
+            return
+        if command.incarnation == self.loop.team.incarnations[agent]:
+            self.loop.obey(agent, command, data)
+        else:
+            self._refused["incarnation"] += 1
+
+    def _read_report(self, data: bytes) -> None:
+        try:
+            self.verdicts = unpack(data, Verdicts, MAX_VERDICTS_B)
+        except WireError:
+            self._refused["verdicts"] += 1
+
+    def _read_arrivals(self, agent: int) -> None:
+        incarnation, now_s = self.loop.team.incarnations[agent], self.loop.world.time_s
+        for data in self._arrivals[agent].drain(1):
+            try:
+                self._book.take(agent, incarnation, data, now_s)
+            except WireError:
+                self._refused["arrivals"] += 1
+
+    def _strike_out(self) -> None:
+        for loss in self._outside.losses():
+            if self.loop.team.has(loss.agent, loss.incarnation):
+                self.loop.lost(loss.agent, **_known(loss), planned=False)
+
+    def _packets(self) -> Packets:
+        return self.verdicts.packets() if self.verdicts is not None else {}
+
+
+def _known(loss: Loss) -> dict[str, int]:
+    return {key: value for key in ("signal", "status") if (value := getattr(loss, key)) is not None}

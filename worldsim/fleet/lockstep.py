@@ -1,0 +1,189 @@
+"""A fleet of real processes in lockstep: simulated time stands still until everybody has spoken.
+
+Each slot: what is due is done, and has happened; the turn goes to the mediums and an observation to
+each agent that steps; every command and every medium's word come back; the vehicles fly. Whatever
+the host's speed or load, the run is the one of virtual time.
+"""
+
+import time
+from collections.abc import Callable, Mapping
+
+from agent.codec import RejectedError, decode_command, encode
+from netem.delivery_log import Digest, joined
+from netem.messages import Done, Truth, Turn, Verdicts, together, unpack_done
+from netem.wire.barrier import (
+    LOOK_EVERY_S,
+    TURN_RING,
+    LockstepError,
+    UnwantedError,
+    answer,
+    same_slot,
+)
+from netem.wire.bus import Post, Ring
+from netem.wire.frame import WireError, pack
+from netem.wire.keys import medium_name
+from worldsim.engine.meaning import Deed
+from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
+from worldsim.fleet.control import Control, Reception
+from worldsim.fleet.grip import Grip
+from worldsim.fleet.launcher_link import Outside
+from worldsim.fleet.progress import Headway, Standstill
+from worldsim.fleet.startup import Muster
+from worldsim.judge.tick import Packets
+from worldsim.scenario.tables import Scenario
+
+COMMAND_TICKS = 1
+"""As in virtual time: none is ever late."""
+
+
+class Lockstep:
+    """A fleet in the air, everybody waiting for everybody."""
+
+    late_fraction: float | None = None
+    delivery: None = None
+    refused: Mapping[str, int] = {}
+    """Nothing: what the world would refuse ends the run."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        post: Post,
+        recorder: Recorder,
+        outside: Outside,
+        muster: Muster,
+        shards: int,
+    ) -> None:
+        rows = range(scenario.rows)
+        self.loop = SlotLoop(scenario, world_of(scenario, COMMAND_TICKS), recorder, self._packets)
+        self.verdicts: Verdicts | None = None
+        self.real_time_factor: float | None = None
+        self.failure: str | None = None
+        self.begun = self._landed = False
+        self._slots = scenario.slots
+        self._outside = outside
+        self._unwanted: Callable[[], bool] = lambda: False
+        self._grip = Grip(muster, outside, self._watch, self._over_already)
+        self._reception = Reception(post, Control(scenario, self.loop, outside.launches))
+        self._headway = Headway(scenario.duration_s, self.loop, outside)
+        self._digest = Digest()
+        self._truth = post.putter("truth", lockstep=True)
+        self._over = post.putter("over")
+        self._observers = [post.putter("observation", agent, lockstep=True) for agent in rows]
+        self._commands = [post.ring("command", agent, TURN_RING) for agent in rows]
+        self._done = [post.ring("done", shard, TURN_RING) for shard in range(shards)]
+
+    def fly(self, unwanted: Callable[[], bool]) -> bool:
+        """Fly the scenario's slots until the end, or until unwanted; return whether all of them.
+
+        What goes wrong in between ends the run, and is its ``failure``.
+        """
+        self._unwanted = unwanted
+        self.begun = True
+        begun_s = time.perf_counter()
+        try:
+            while self.loop.world.slot < self._slots and not unwanted():
+                self._slot()
+                self._headway.tell(time.perf_counter() - begun_s, None)
+        except UnwantedError:
+            self.failure = self._broken()
+            return False
+        except LockstepError as error:
+            self.failure = f"{error}, {self.loop.world.time_s:.2f} s into the run"
+            return False
+        self.failure = self._broken()
+        flown_s = self.loop.world.time_s
+        self.real_time_factor = flown_s / max(time.perf_counter() - begun_s, 1e-9)
+        self.land()
+        self.loop.finish()
+        return self.loop.world.slot == self._slots
+
+    def land(self) -> None:
+        """End the run for everybody, once."""
+        if not self._landed:
+            self._landed = True
+            if self.begun:
+                self._outside.landing()
+            self._over(b"")
+
+    def _slot(self) -> None:
+        for deed in self.loop.due():
+            self._do(deed)
+        self._reception.attend(lambda deed: self._do(deed, by="operator"))
+        self._watch()
+        opened = self.loop.open()
+        self._open(opened)
+        for agent, _ in opened.observations:
+            self._obey(agent, opened.slot)
+        self.loop.close(self._played(opened.slot))
+
+    def _do(self, deed: Deed, **signed: str) -> None:
+        """Have a deed done, see that it is, and let it count."""
+        self._grip.do(deed, self.loop.team.incarnations)
+        self.loop.take(deed, **signed)
+
+    def _open(self, opened: Opened) -> None:
+        turn = Turn(
+            Truth(opened.slot, opened.time_s, opened.positions),
+            tuple(agent for agent, _ in opened.observations),
+            tuple(self.loop.team.incarnations),
+            self._grip.orders(),
+        )
+        self._truth(pack(turn))
+        for agent, observation in opened.observations:
+            self._observers[agent](encode(observation))
+
+    def _obey(self, agent: int, slot: int) -> None:
+        what = f"agent-{agent}'s command of slot {slot}"
+        data = self._answer(self._commands[agent], what)
+        try:
+            command = decode_command(data)
+        except RejectedError as error:
+            raise LockstepError(f"{what}: {error}") from error
+        same_slot(what, command.slot, slot)
+        if command.incarnation != self.loop.team.incarnations[agent]:
+            raise LockstepError(f"{what} is of its incarnation {command.incarnation}")
+        self.loop.obey(agent, command, data)
+
+    def _played(self, slot: int) -> bytes:
+        """Wait until all mediums have played a slot; return the digest of all fates so far."""
+        parts = [self._part(shard, slot) for shard in range(len(self._done))]
+        self.verdicts = together([part.verdicts for part in parts])
+        self._digest.take(joined(dict(part.pages) for part in parts))
+        return self._digest.value
+
+    def _part(self, shard: int, slot: int) -> Done:
+        what = f"{medium_name(shard)}'s word of slot {slot}"
+        try:
+            done = unpack_done(self._answer(self._done[shard], what))
+        except WireError as error:
+            raise LockstepError(f"{what}: {error}") from error
+        same_slot(what, done.slot, slot)
+        return done
+
+    def _answer(self, ring: Ring, what: str) -> bytes:
+        """Wait for a message; meanwhile see who is lost, and whether the run is still wanted."""
+        standstill = Standstill(what, self._outside)
+
+        def over() -> bool:
+            standstill.lasts(LOOK_EVERY_S)
+            self._watch()
+            return self._over_already()
+
+        return answer(ring, what, over)
+
+    def _over_already(self) -> bool:
+        return self._unwanted()
+
+    def _watch(self) -> None:
+        """Raise LockstepError when somebody ended who takes part, and was not meant to."""
+        for loss in self._outside.losses():
+            if self.loop.team.has(loss.agent, loss.incarnation):
+                raise LockstepError(str(loss))
+
+    def _broken(self) -> str | None:
+        """Return which process of which there is one is gone, if that is why the run ends."""
+        self._outside.losses()
+        return self._outside.broken
+
+    def _packets(self) -> Packets:
+        return self.verdicts.packets() if self.verdicts is not None else {}

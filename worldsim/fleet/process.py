@@ -1,0 +1,147 @@
+"""The world as a process: it assembles a fleet of real processes, flies it, and judges it."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import zenoh
+
+from netem.messages import Verdicts
+from netem.wire.access import AccessError, login_of
+from netem.wire.bus import Post
+from netem.wire.keys import Keys
+from netem.wire.session import SessionError, open_client
+from netem.wire.stop import Stop
+from worldsim.fleet.free_running import Flight
+from worldsim.fleet.launcher_link import Outside
+from worldsim.fleet.lockstep import Lockstep
+from worldsim.fleet.startup import Muster, MusterError, assemble
+from worldsim.results.run_folder import RunDirectory, RunDirectoryError, RunWriteError
+from worldsim.results.sinks import Notebook, notebook
+from worldsim.results.summary import EXIT_STATUS, summarise
+from worldsim.scenario.tables import Scenario
+
+TOO_LATE_FRACTION = 0.01
+
+
+class Terms(NamedTuple):
+    """How a run is flown: its name, how much faster than the wall clock, recorded or not.
+
+    lockstep: in turns, at whatever speed that takes; shards: by how many mediums; users: the file
+    of passwords, where the router wants one.
+    """
+
+    run: str
+    speed: float = 1.0
+    recording: bool = True
+    lockstep: bool = False
+    shards: int = 1
+    users: Path | None = None
+
+    @property
+    def mode(self) -> str:
+        """The clock's name in the summary."""
+        return "lockstep" if self.lockstep else "processes"
+
+
+def run(
+    connect: str,
+    scenario: Scenario,
+    directory: Callable[[], RunDirectory],
+    terms: Terms,
+    outside_of: Callable[[Muster], Outside],
+) -> int:
+    """Conduct a run at a router, and say in one line what stood in its way; return the status.
+
+    ``directory`` is asked for once the router answers: without one, nothing is made.
+    """
+    try:
+        login = login_of(terms.users, "world") if terms.users is not None else None
+        with open_client(connect, patient=terms.lockstep, login=login) as session:
+            return conduct(session, scenario, directory(), terms, outside_of)
+    except (AccessError, SessionError, MusterError, RunDirectoryError) as error:
+        print(f"world: {error}", file=sys.stderr)
+        return 1 if isinstance(error, RunWriteError) else 2
+
+
+def conduct(
+    session: zenoh.Session,
+    scenario: Scenario,
+    directory: RunDirectory,
+    terms: Terms,
+    outside_of: Callable[[Muster], Outside],
+) -> int:
+    """Assemble a fleet, fly it and judge it; return the exit status of the contract.
+
+    Raises MusterError when not everybody comes. Whatever ends the flight, SIGTERM or an error of
+    ours, the recording is finished and a summary written of what there was; a fleet that never
+    took off leaves neither.
+    """
+    stop = Stop()
+    post = Post(session, Keys(terms.run))
+    post.show_life("world")
+    muster = Muster(post, scenario, terms.lockstep, terms.shards)
+    outside = outside_of(muster)
+    notes = notebook(directory, scenario, directory.path.name, terms.mode, terms.recording)
+    flight = _flight(scenario, post, notes, outside, muster, terms)
+    whole = False
+
+    def unwanted() -> bool:
+        return stop.asked or outside.stopped is not None
+
+    try:
+        whole = assemble(muster, terms.speed, unwanted, outside) and flight.fly(unwanted)
+    finally:
+        flight.land()
+        notes.close()
+        ended_by = None if whole else outside.stopped or "interrupted"
+        summary = _summary(scenario, flight, terms.mode, ended_by)
+        if flight.begun:
+            directory.write_summary(summary)
+        else:
+            directory.nothing_flew()
+    told = summary["outcome"] if flight.begun else f"{ended_by} before take-off"
+    print(f"world: {told}{_lateness(flight.verdicts)}", flush=True)
+    return EXIT_STATUS[summary["outcome"]]
+
+
+def _flight(
+    scenario: Scenario,
+    post: Post,
+    notes: Notebook,
+    outside: Outside,
+    muster: Muster,
+    terms: Terms,
+) -> Flight | Lockstep:
+    if terms.lockstep:
+        return Lockstep(scenario, post, notes, outside, muster, terms.shards)
+    return Flight(scenario, post, notes, outside, muster, terms.speed)
+
+
+def _lateness(verdicts: Verdicts | None) -> str:
+    if verdicts is None or verdicts.late_s is None:
+        return ""
+    typical_s, worst_s = verdicts.late_s
+    return f"; netem late by {typical_s * 1e3:.1f} ms (median), {worst_s * 1e3:.1f} ms (worst)"
+
+
+def _summary(
+    scenario: Scenario, flight: Flight | Lockstep, mode: str, ended_by: str | None
+) -> dict[str, Any]:
+    late = flight.late_fraction
+    return summarise(
+        scenario,
+        flight.loop,
+        mode=mode,
+        verdicts=flight.verdicts,
+        refused=flight.refused,
+        delivery=flight.delivery,
+        late_tick_fraction=late,
+        real_time_factor=flight.real_time_factor,
+        duration_s=flight.loop.world.time_s,
+        interrupted=ended_by is not None,
+        ended_by=ended_by or "",
+        host_too_slow=late is not None and late >= TOO_LATE_FRACTION,
+        failure=flight.failure,
+    )

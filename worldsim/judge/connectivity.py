@@ -1,0 +1,143 @@
+"""Who can reach whom by radio, over how many hops, and how long news may take to all of them.
+
+From the truth: positions, the conditions in force and what parts, jams or flaps. Two are linked
+where both hear the other. A round is one turn of the multihop channel.
+"""
+
+from functools import cache
+from math import comb, inf
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from netem.barriers import Barriers
+from netem.link import mean_loss, stretch
+from netem.messages import Conditions, Flap, Jam
+from netem.random_draws import WIDEST
+from netem.schedule import Schedule
+from netem.wire.frame import MULTIHOP
+from worldsim.judge.tick import Tick
+from worldsim.scenario.tables import Scenario
+
+MAX_ROUNDS = 2000
+
+
+class Components(NamedTuple):
+    """label (N,): the component of each living agent, -1 for the others; hops: the diameter D."""
+
+    label: NDArray[np.int64]
+    hops: int
+
+    def members(self) -> list[list[int]]:
+        """Return the rows of each component."""
+        found: list[list[int]] = [[] for _ in range(int(self.label.max(initial=-1)) + 1)]
+        for row, label in enumerate(self.label.tolist()):
+            if label >= 0:
+                found[label].append(row)
+        return found
+
+
+class Reach:
+    """The radio as the judge knows it."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._round_s = 1.0 / scenario.comms.multihop_hz if scenario.comms.multihop_hz else inf
+        self._barriers = Barriers()
+        self._together = np.ones((scenario.rows, scenario.rows), dtype=np.bool_)
+        self._change(scenario.netem)
+
+    def note(self, event: dict[str, Any]) -> None:
+        """Take an event that may change the radio."""
+        if event["kind"] == "netem":
+            self._change(msgspec.convert(event["conditions"], Conditions))
+        elif event["kind"] in {"partition", "heal"}:
+            self._part(event)
+        elif event["kind"] == "jam":
+            self._barriers.jam(event["number"], msgspec.convert(event["jam"], Jam | None))
+        elif event["kind"] == "flap":
+            self._barriers.flap(event["number"], msgspec.convert(event["flap"], Flap | None))
+
+    def components(self, tick: Tick) -> Components:
+        """Return the connected components of the living at a tick."""
+        linked = self._linked(tick)
+        label = np.full(len(tick.alive), -1)
+        hops = count = 0
+        for row in np.flatnonzero(tick.alive).tolist():
+            distance = _hops_from(row, linked)
+            hops = max(hops, int(distance.max()))
+            if label[row] < 0:
+                label[distance >= 0] = count
+                count += 1
+        return Components(label, hops)
+
+    def everybody_s(self, agents: int, hops: int) -> float:
+        """Return B [s]: how long a record takes to everybody, but for one case in a million.
+
+        Infinite while links flap: nobody can say.
+        """
+        if self._barriers.flapping:
+            return inf
+        rounds = rounds_to_all(agents, hops, self.loss) * self._stretch
+        return rounds * self._round_s + hops * self._delay_s
+
+    def detection_s(self, hops: int) -> float:
+        """Return T_d [s]: how long until one who is gone is known to be gone."""
+        rounds = (2 * hops + 10) / (1.0 - self.loss) if self.loss < 1.0 else inf
+        return rounds * self._round_s + hops * self._delay_s
+
+    def _change(self, conditions: Conditions) -> None:
+        model = Schedule(msgspec.structs.replace(conditions, link=())).model(MULTIHOP, 0, 0)
+        self.loss = mean_loss(model)
+        self._stretch = max(1.0, stretch(model))
+        self._range_m = model.range_m
+        widest = 1.0 if model.distribution == "uniform" else WIDEST
+        self._delay_s = (model.delay_ms + widest * model.jitter_ms) / 1000.0
+
+    def _part(self, event: dict[str, Any]) -> None:
+        if event["kind"] == "heal":
+            self._barriers.heal()
+        else:
+            told = (event["groups"], event.get("parted", "clean"), tuple(event.get("bridge", ())))
+            self._barriers.partition(*told)
+        rows = range(len(self._together))
+        hears = np.array([[not self._barriers.parts(a, b) for a in rows] for b in rows])
+        self._together = hears & hears.T
+
+    def _linked(self, tick: Tick) -> NDArray[np.bool_]:
+        position = tick.position.astype(np.float64)
+        away = position[:, None] - position[None]
+        near = np.sqrt(np.sum(away * away, axis=2)) <= self._range_m
+        near &= self._together
+        if self._barriers.raised:
+            free = [not self._barriers.jammed((x, y, z)) for x, y, z in position.tolist()]
+            near &= np.outer(free, free)
+        linked: NDArray[np.bool_] = near & tick.alive[:, None] & tick.alive[None]
+        return linked
+
+
+@cache
+def rounds_to_all(agents: int, hops: int, loss: float) -> float:
+    """Return the least t with N^2 P(Bin(t, 1 - p) < D) <= 1e-6, infinite beyond reason."""
+    if hops == 0:
+        return 0
+    if loss >= 1.0:
+        return inf
+    for rounds in range(hops, MAX_ROUNDS):
+        late = sum(comb(rounds, k) * (1.0 - loss) ** k * loss ** (rounds - k) for k in range(hops))
+        if agents * agents * late <= 1e-6:
+            return rounds
+    return inf
+
+
+def _hops_from(row: int, linked: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return for each how many hops it is away from one; -1 for who cannot be reached."""
+    distance = np.full(len(linked), -1)
+    frontier = np.zeros(len(linked), dtype=np.bool_)
+    frontier[row], hops = True, 0
+    while frontier.any():
+        distance[frontier] = hops
+        frontier = linked[frontier].any(axis=0) & (distance < 0)
+        hops += 1
+    return distance

@@ -1,0 +1,306 @@
+"""What must hold between the events of a timeline: each meets the fleet that those before it left.
+
+A walk through the events in order of their times. Who will be there can be foretold but for
+selectors that are resolved when they happen: of these, the number counts.
+"""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from agent.codec import encode_formation
+from agent.qstructure.formation import Formation, FormationError, FormationSpec
+from netem.messages import Conditions
+from worldsim.scenario.events import ACTIONS, UNDONE, EventTable
+from worldsim.scenario.radio_faults import flap_faults, partition_faults
+from worldsim.scenario.rules import TARGET_FLOOR_M, Finding, tilts_where_asked
+from worldsim.scenario.start import BoxStart, ListStart
+from worldsim.scenario.tables import MAX_AGENTS, Scenario
+from worldsim.scenario.target_frame import FrameTable, broken_key, changed
+from worldsim.scenario.toml import ScenarioError
+
+MAX_ORDER_B = 3000
+"""What a Mission may hold of a formation [bytes]."""
+COME_BACK = frozenset({"restart", "resume"})
+"""Who comes back holds no place by which to be found."""
+NOBODY = -1
+"""By whom a partition is whose event is not known."""
+_SELECTOR = re.compile(r"all|random:[1-9]\d{0,3}|(vertex|queue):(.+)", re.DOTALL)
+
+
+class Whose(NamedTuple):
+    """Whose keys a formation's are: the file, and what its keys begin with."""
+
+    file: Path
+    prefix: str
+
+
+class Step(NamedTuple):
+    """The ``number``-th event, counted from 0, at its time or at the time when it is undone."""
+
+    at_s: float
+    number: int
+    event: EventTable
+    undo: bool
+
+
+def steps(scenario: Scenario) -> list[Step]:
+    """Return the events in the order in which they happen, and are undone.
+
+    At one time what ends comes before what begins.
+    """
+    begun = [Step(event.at_s, i, event, False) for i, event in enumerate(scenario.event)]
+    ended = [
+        Step(event.at_s + event.for_s, i, event, True)
+        for i, event in enumerate(scenario.event)
+        if event.for_s is not None
+    ]
+    return sorted(begun + ended, key=lambda step: (step.at_s, not step.undo, step.number))
+
+
+def check_course(scenario: Scenario, file: Path, whose: dict[int, Whose]) -> None:
+    """Raise ScenarioError for the first event that cannot be; ``whose``: of formations in files."""
+    for index, event in enumerate(scenario.event):
+        broken = _one_action(event) or _in_time(scenario, event)
+        if broken is not None:
+            raise _error(file, index, broken)
+    if scenario.rows > MAX_AGENTS:
+        raise ScenarioError(file, "event", f"{scenario.rows} agents in all; at most {MAX_AGENTS}")
+    course = _Course(scenario)
+    for step in steps(scenario):
+        try:
+            broken = next(course.findings(step), None)
+        except FormationError as error:
+            own = whose.get(step.number, Whose(file, f"event[{step.number}].formation."))
+            raise ScenarioError(own.file, own.prefix + error.key, error.detail) from error
+        if broken is not None:
+            raise _error(file, step.number, broken)
+        course.take(step)
+
+
+class Present(NamedTuple):
+    """The fleet that an event meets which nobody foresaw.
+
+    known: how many ids are given; living: who steps; room: for how many more there are rows.
+    """
+
+    formation: FormationSpec
+    frame: FrameTable
+    parted: bool
+    known: int
+    living: frozenset[int]
+    room: int
+
+
+def broken_now(scenario: Scenario, event: EventTable, present: Present) -> Finding | None:
+    """Return what is wrong with an event that happens now, or None."""
+    broken = _one_action(event)
+    if broken is not None:
+        return broken
+    if event.joiners > present.room:
+        return Finding("join", f"{event.joiners}; fleet.spare leaves room for {present.room}")
+    course = _Course(scenario, present)
+    try:
+        return next(course.findings(Step(event.at_s, 0, event, False)), None)
+    except FormationError as error:
+        return Finding(f"formation.{error.key}", error.detail)
+
+
+def _error(file: Path, index: int, broken: Finding) -> ScenarioError:
+    key = f"event[{index}].{broken.key}" if broken.key else f"event[{index}]"
+    return ScenarioError(file, key, broken.detail)
+
+
+def _one_action(event: EventTable) -> Finding | None:
+    if not event.actions:
+        return Finding("", f"no action; one of {', '.join(ACTIONS)}")
+    first, *others = event.actions
+    if others:
+        return Finding(others[0], f"not beside {first}; one action an event")
+    if event.heal is False:
+        return Finding("heal", "true; a partition that holds needs no event")
+    if event.netem == Conditions():
+        return Finding("netem", "no key to set")
+    if event.for_s is not None and first not in UNDONE:
+        return Finding("for_s", f"{first} is not undone; for_s goes with {', '.join(UNDONE)}")
+    return None
+
+
+def _in_time(scenario: Scenario, event: EventTable) -> Finding | None:
+    if event.at_s < scenario.duration_s:
+        return None
+    return Finding("at_s", f"{event.at_s:g}; before the end, duration_s = {scenario.duration_s:g}")
+
+
+class _Course:
+    """The fleet as it will be: who is there, in which formation, parted or not."""
+
+    def __init__(self, scenario: Scenario, present: Present | None = None) -> None:
+        agents = scenario.fleet.agents
+        now = present or Present(
+            scenario.formation, scenario.frame, False, agents, frozenset(range(agents)), 0
+        )
+        self._scenario = scenario
+        self._spec = now.formation
+        self._frame = now.frame
+        self._formation = self._made(now.formation)
+        self._known = now.known
+        self._living = set(now.living)
+        self._fewer = 0
+        self._parted_by = NOBODY if now.parted else None
+
+    def findings(self, step: Step) -> Iterator[Finding]:
+        """Return what is wrong with a step. Raises FormationError."""
+        event = step.event
+        if step.undo:
+            return
+        yield from self._selectors(event)
+        yield from self._barriers(event)
+        yield from self._links(event)
+        yield from self._join(event)
+        yield from self._frame_change(event)
+        if event.formation is not None:
+            yield from self._new_formation(event.formation)
+
+    def take(self, step: Step) -> None:
+        """Let a sound step happen."""
+        event = step.event
+        if event.kind == "partition":
+            gone = None if self._parted_by == step.number else self._parted_by
+            self._parted_by = gone if step.undo else step.number
+        elif event.kind == "heal":
+            self._parted_by = None
+        elif event.selectors:
+            self._change_team(event, back=step.undo or event.kind in COME_BACK)
+        elif event.frame is not None:
+            self._frame = changed(self._frame, event.frame, event.at_s)
+        elif event.formation is not None:
+            self._spec, self._formation = event.formation, self._made(event.formation)
+        self._living.update(range(self._known, self._known + event.joiners))
+        self._known += event.joiners
+
+    @property
+    def _team(self) -> int:
+        return max(0, len(self._living) - self._fewer)
+
+    def _change_team(self, event: EventTable, back: bool) -> None:
+        for selector in event.selectors:
+            if selector == "all":
+                self._living, self._fewer = set(range(self._known)) if back else set(), 0
+            elif isinstance(selector, int):
+                (self._living.add if back else self._living.discard)(selector)
+            else:
+                some = self._some(selector)
+                self._fewer = max(0, self._fewer + (-some if back else some))
+
+    def _some(self, selector: str) -> int:
+        """Return how many a selector means, in a formation as it should be."""
+        word, _, name = selector.partition(":")
+        if word == "random":
+            return int(name)
+        if word == "vertex":
+            return 1
+        index = [queue.name for queue in self._spec.queue].index(name)
+        places = self._formation.layout(self._team).places
+        return sum(index in self._formation.queues_of(place) for place in places)
+
+    def _selectors(self, event: EventTable) -> Iterator[Finding]:
+        sensor = event.sensor
+        where = "sensor.agents" if sensor is not None else event.kind
+        for index, selector in enumerate(sensor.agents if sensor is not None else event.selectors):
+            detail = self._selector(selector, event.kind)
+            if detail is not None:
+                yield Finding(f"{where}[{index}]", detail)
+
+    def _selector(self, selector: int | str, kind: str) -> str | None:
+        """Say what is wrong with a selector."""
+        if isinstance(selector, int):
+            known = range(self._known)
+            return None if selector in known else f"no agent {selector}; 0 to {known[-1]} by then"
+        word, _, name = selector.partition(":")
+        placeless = kind in COME_BACK
+        if not _SELECTOR.fullmatch(selector) or (placeless and name and word != "random"):
+            places = "" if placeless else " 'vertex:V1', 'queue:Q1',"
+            return f"got the text {selector!r}; allowed: an id,{places} 'random:2' or 'all'"
+        names = {"vertex": list(self._spec.vertices), "queue": [q.name for q in self._spec.queue]}
+        if word in names and name not in names[word]:
+            return f"no {word} {name!r} in {self._spec.name!r}; there are {', '.join(names[word])}"
+        return None
+
+    def _barriers(self, event: EventTable) -> Iterator[Finding]:
+        if event.heal and self._parted_by is None:
+            yield Finding("heal", "no partition to heal at that time")
+        agents = self._scenario.rows
+        if event.partition is not None:
+            yield from (Finding(*each) for each in partition_faults(event.partition, agents))
+        if event.flap is not None:
+            yield from (Finding(*each) for each in flap_faults(event.flap, agents))
+
+    def _links(self, event: EventTable) -> Iterator[Finding]:
+        last = self._scenario.rows - 1
+        for index, link in enumerate(event.netem.link if event.netem is not None else ()):
+            for name, agent in (("from", link.source), ("to", link.to)):
+                if agent > last:
+                    yield Finding(f"netem.link[{index}].{name}", f"no agent {agent}; 0 to {last}")
+            if link.source == link.to:
+                yield Finding(f"netem.link[{index}].to", "a link to itself")
+
+    def _join(self, event: EventTable) -> Iterator[Finding]:
+        if not event.joiners:
+            return
+        start, least_m = event.start, self._scenario.control.separation_m
+        if start is None and isinstance(self._scenario.fleet.start, ListStart):
+            yield Finding("join.start", "is missing; fleet.start lists no places for more agents")
+        if isinstance(start, ListStart):
+            yield from _listed(start, event.joiners)
+        if isinstance(start, BoxStart) and start.spacing_m < least_m:
+            detail = f"{start.spacing_m:g}; at least control.separation_m = {least_m:g}"
+            yield Finding("join.start.spacing_m", detail)
+        try:
+            self._formation.check(self._team + event.joiners, least_m + TARGET_FLOOR_M)
+        except FormationError as error:
+            yield Finding("join", f"{self._formation.name!r} has no room for them: {error.detail}")
+
+    def _frame_change(self, event: EventTable) -> Iterator[Finding]:
+        change = event.frame
+        if change is None:
+            return
+        if not change.given:
+            yield Finding("frame", "empty; yaw_deg, waypoints_m or both")
+        for key in ("speed_mps", "start_s", "pauses_s"):
+            if key in change.given and change.waypoints_m is None:
+                yield Finding(f"frame.{key}", "not without waypoints_m: a new path, from there on")
+        if change.start_s is not None and change.start_s < event.at_s:
+            detail = f"{change.start_s:g}; the event's at_s = {event.at_s:g} or later"
+            yield Finding("frame.start_s", detail)
+        broken = broken_key(changed(self._frame, change, event.at_s))
+        if broken is not None:
+            yield Finding(f"frame.{broken[0]}", broken[1])
+        size_b = len(encode_formation(self._spec))
+        if size_b > MAX_ORDER_B:
+            yield Finding("frame", f"the formation has {size_b} B; a mission at most {MAX_ORDER_B}")
+
+    def _new_formation(self, spec: FormationSpec) -> Iterator[Finding]:
+        team, vertices = self._team, len(spec.vertices)
+        if team < vertices:
+            yield Finding("formation", f"{team} agents by then, for {vertices} vertices")
+            return
+        formation = self._made(spec)
+        formation.check(team, self._scenario.control.separation_m + TARGET_FLOOR_M)
+        size_b = len(encode_formation(spec))
+        if size_b > MAX_ORDER_B:
+            yield Finding("formation", f"{size_b} B as a mission; at most {MAX_ORDER_B} B")
+        tilted = tilts_where_asked(self._scenario, formation, team)
+        if tilted is not None:
+            yield Finding("formation", f"{tilted.key}: {tilted.detail}")
+
+    def _made(self, spec: FormationSpec) -> Formation:
+        return Formation(spec, self._scenario.control.spacing_m)
+
+
+def _listed(start: ListStart, joiners: int) -> Iterator[Finding]:
+    given = (("positions_m", start.positions_m), ("yaws_deg", start.yaws_deg))
+    for name, values in given:
+        if values is not None and len(values) != joiners:
+            yield Finding(f"join.start.{name}", f"{len(values)} for {joiners} that join")
