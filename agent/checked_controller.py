@@ -20,7 +20,7 @@ class FaultyControllerError(RuntimeError):
     """A controller that failed at its work; the text names it, its agent and what happened."""
 
 
-class Pilot:
+class CheckedController:
     """One agent's controller. Raises ControllerError if it cannot be had.
 
     Whatever the controller raises, here or in ``decide``, is raised as FaultyControllerError.
@@ -70,7 +70,7 @@ def plain(intent: Intent) -> Intent:
 def _converted(intent: Intent) -> Intent:
     if intent.force < 0.0:
         raise ValueError(f"the Intent's force is {intent.force:g}; it is a magnitude, at least 0")
-    pitch, roll = _numbers("tilt", intent.tilt, 2, MAX_ANY)
+    pitch, presence = _numbers("tilt", intent.tilt, 2, MAX_ANY)
     return replace(
         intent,
         wanted=_vector("wanted", intent.wanted, MAX_ANY),
@@ -79,7 +79,7 @@ def _converted(intent: Intent) -> Intent:
         force=_numbers("force", (intent.force,), 1, MAX_FORCE)[0],
         heading_for=_vector("heading_for", intent.heading_for, MAX_M),
         target=None if intent.target is None else _vector("target", intent.target, MAX_M),
-        tilt=(pitch, roll),
+        tilt=(pitch, presence),
     )
 
 

@@ -11,17 +11,17 @@ from typing import NamedTuple
 
 import msgspec
 
-from agent.checked_controller import Pilot
+from agent.checked_controller import CheckedController
 from agent.codec import RejectedError, decode_beacon, decode_gossip
 from agent.comms.broadcast import LOCAL, Broadcast, OwnState
 from agent.comms.gossip import Table
 from agent.comms.hierarchy import ALONE, Hierarchy
 from agent.comms.mission import Missions
 from agent.comms.neighbours import Neighbours
-from agent.comms.unidentified_vehicles import SAME_BODY_M, SilentBodies, TellsOf
+from agent.comms.unidentified_vehicles import SAME_BODY_M, TellsOf, UnidentifiedVehicles
 from agent.config import AgentSetup
 from agent.controller import Intent, Peer, Senses
-from agent.guidance.safety_filter import Told
+from agent.guidance.safety_filter import TelemetryRow
 from agent.guidance.safety_monitor import STAND, Guard
 from agent.messages import (
     CAUSES,
@@ -35,7 +35,7 @@ from agent.messages import (
     Telemetry,
     Vector,
 )
-from agent.sensing.obstacle_perception import Eyes
+from agent.sensing.obstacle_perception import ObstaclePerception
 
 MAX_COST_MM = 2**31 - 1
 TIDY_S = 0.2
@@ -74,17 +74,17 @@ class Agent:
         self._slack_s = 2.0 * tick_s
         self._implausible2 = (IMPLAUSIBLE * setup.fleet_max_speed_mps) ** 2
         self._command_slots = setup.command_ticks * setup.slots_per_tick
-        self._controller = Pilot(setup)
+        self._controller = CheckedController(setup)
         self._neighbours = Neighbours(setup.id, comms.local_hz, self._slack_s)
         self._table = Table(setup.id, comms.multihop_hz)
         round_s = 1.0 / comms.multihop_hz if comms.multihop_hz > 0.0 else inf
         self._broadcast = Broadcast(setup.id, setup.incarnation, 1.0 / comms.local_hz, round_s)
         self._guard = Guard(setup)
-        self._eyes = Eyes(setup)
+        self._obstacle_perception = ObstaclePerception(setup)
         self._missions = Missions(setup.id, setup.formation, setup.control.spacing_m, setup.frame)
         self._hierarchy = Hierarchy(setup.id)
         self._standing = ALONE
-        self._bodies = SilentBodies(setup.fleet_max_speed_mps)
+        self._bodies = UnidentifiedVehicles(setup.fleet_max_speed_mps)
         self._silent: tuple[Vector, ...] = ()
         self._blocked: frozenset[Place] = frozenset()
         self._intent: Intent | None = None
@@ -110,7 +110,7 @@ class Agent:
         senses = self._senses(observation)
         intent = self._intent = self._controller.decide(senses)
         velocity = self._guard.safe(intent.velocity, senses, lambda: self._told(senses))
-        if not self._eyes.trust.note(observation):
+        if not self._obstacle_perception.trust.note(observation):
             velocity = STAND
         command = self._command(observation.slot, senses, intent, velocity)
         own = self._own_state(senses, velocity, intent)
@@ -186,10 +186,10 @@ class Agent:
 
     def _obstacles(self, observation: Observation) -> tuple[Vector, ...]:
         """Return what is known of obstacles near by; neighbours' bodies are none."""
-        if not self._eyes.scanning:
+        if not self._obstacle_perception.scanning:
             return observation.obstacles
         heard = [beacon.position for beacon in self._neighbours.beacons()]
-        return self._eyes.near(observation, heard)
+        return self._obstacle_perception.near(observation, heard)
 
     def _tidy(self, observation: Observation) -> None:
         """Look after what need not be looked at every tick: who is gone, and one's standing."""
@@ -203,7 +203,7 @@ class Agent:
         self._silent = self._bodies.look(
             now_s, here, sensed, beacons, team, departed, self._teller(1 + len(team))
         )
-        self._eyes.trust.compare(observation, beacons)
+        self._obstacle_perception.trust.compare(observation, beacons)
         self._lagging = self._neighbours.behind(self._missions.flown.key)
         self._blocked = self._table.blocked(self._missions.flown.key)
         vertex = self._intent is not None and self._intent.vertex
@@ -245,11 +245,11 @@ class Agent:
             )
         ]
 
-    def _told(self, senses: Senses) -> list[Told]:
+    def _told(self, senses: Senses) -> list[TelemetryRow]:
         """Return what neighbours last told of themselves, not carried forward."""
         x, y, z = senses.position
         return [
-            Told(
+            TelemetryRow(
                 (b.position[0] - x, b.position[1] - y, b.position[2] - z),
                 max(0.0, senses.now_s - b.stamp_s),
                 b.speed_cap,

@@ -12,14 +12,14 @@ import msgspec
 
 from agent.config import AgentSetup
 from agent.controller import ControllerError
-from agent.free_running import Cockpit, Partner
+from agent.free_running import FreeRunningAgent
+from agent.lockstep import LockstepAgent
 from netem.wire.access import AccessError, login_of
 from netem.wire.barrier import LockstepError, UnwantedError
-from netem.wire.bus import Post, RefusedError, Ring
+from netem.wire.bus import Bus, RefusedError, Ring
 from netem.wire.keys import Keys, agent_name
 from netem.wire.session import SessionError, open_client
-from netem.wire.shutdown import Ending
-from netem.wire.stop import Stop
+from netem.wire.shutdown import Ending, Stop
 
 WAIT_S = 0.2
 SILENCE_S = 30.0
@@ -68,19 +68,19 @@ def fly(
     login = login_of(users, agent_name(agent)) if users is not None else None
     with open_client(connect, patient=patient, login=login) as session:
         stop = Stop()
-        post = Post(session, keys)
-        setup = _setup(post, agent, keys.run, stop)
+        bus = Bus(session, keys)
+        setup = _setup(bus, agent, keys.run, stop)
         if setup is not None:
-            _fly(post, setup, keys.run, stop)
+            _fly(bus, setup, keys.run, stop)
     return 0
 
 
-def _setup(post: Post, agent: int, run: str, stop: Stop) -> AgentSetup | None:
+def _setup(bus: Bus, agent: int, run: str, stop: Stop) -> AgentSetup | None:
     """Ask the world for this agent's setup until it answers; None when asked to stop."""
     deadline = time.monotonic() + SETUP_WITHIN_S
     say_once = _once(f"agent-{agent} waits for the world of run {run!r}")
     while not stop.asked:
-        answer = post.ask("setup", agent, b"", timeout_s=2.0)
+        answer = bus.ask("setup", agent, b"", timeout_s=2.0)
         if answer is not None:
             return _checked(answer)
         if time.monotonic() > deadline:
@@ -99,30 +99,32 @@ def _checked(answer: bytes) -> AgentSetup:
         raise GoneError(f"the world sent a setup that cannot be read: {error}") from error
 
 
-def _fly(post: Post, setup: AgentSetup, run: str, stop: Stop) -> None:
-    observations, ending = post.ring("observation", setup.id), Ending(post, stop)
-    cockpit = Partner(post, setup, ending) if setup.lockstep else Cockpit(post, setup)
-    _wait_for_ears(post, ending)
-    post.show_life(f"agent-{setup.id}")
+def _fly(bus: Bus, setup: AgentSetup, run: str, stop: Stop) -> None:
+    observations, ending = bus.ring("observation", setup.id), Ending(bus, stop)
+    shell = LockstepAgent(bus, setup, ending) if setup.lockstep else FreeRunningAgent(bus, setup)
+    _wait_for_ears(bus, ending)
+    bus.show_life(f"agent-{setup.id}")
     print(f"agent-{setup.id} flies in run {run!r}", flush=True)
     try:
-        _steer(cockpit, observations, run, ending)
-        cockpit.report()
+        _steer(shell, observations, run, ending)
+        shell.report()
     except UnwantedError:
         print(f"agent-{setup.id}: the run is over, within a slot", flush=True)
     print(f"agent-{setup.id} is done", flush=True)
 
 
-def _wait_for_ears(post: Post, ending: Ending) -> None:
+def _wait_for_ears(bus: Bus, ending: Ending) -> None:
     """In lockstep, wait until somebody listens to what this agent says."""
     deadline = time.monotonic() + SETUP_WITHIN_S
-    while not post.heard and not ending():
+    while not bus.heard and not ending():
         if time.monotonic() > deadline:
             raise GoneError(f"nobody listens within {SETUP_WITHIN_S:g} s")
         time.sleep(LISTEN_EVERY_S)
 
 
-def _steer(cockpit: Cockpit | Partner, observations: Ring, run: str, ending: Ending) -> None:
+def _steer(
+    shell: FreeRunningAgent | LockstepAgent, observations: Ring, run: str, ending: Ending
+) -> None:
     """Step on each observation until the run is over.
 
     Silence is counted in waits, not on a clock: a process that was stopped for a minute has not
@@ -133,7 +135,7 @@ def _steer(cockpit: Cockpit | Partner, observations: Ring, run: str, ending: End
         data = observations.wait(WAIT_S)
         if data is not None:
             silent_s = 0.0
-            cockpit.see(data)
+            shell.see(data)
             continue
         silent_s += WAIT_S
         if silent_s > SILENCE_S:

@@ -38,7 +38,7 @@ class Digest:
         return self._hash.digest()
 
 
-class Journal:
+class DeliveryLog:
     """``pages``: what was noted for each agent since the last slot's end; whoever notes adds."""
 
     def __init__(self, agents: int) -> None:

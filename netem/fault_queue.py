@@ -8,7 +8,7 @@ from netem.messages import MAX_ORDERS_B, Orders, RadioOrder
 from netem.wire.frame import WireError
 
 
-class OrderBook:
+class FaultQueue:
     """Orders that have come, in the order in which they came."""
 
     def __init__(self) -> None:

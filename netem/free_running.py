@@ -10,10 +10,10 @@ from statistics import median
 
 import msgspec
 
-from netem.fault_queue import OrderBook
+from netem.fault_queue import FaultQueue
 from netem.medium import Medium
-from netem.messages import MAX_TRUTH_B, MediumSetup, Truth, Verdicts
-from netem.wire.bus import Post
+from netem.messages import MAX_TRUTH_B, MediumCounters, MediumSetup, Truth
+from netem.wire.bus import Bus
 from netem.wire.frame import (
     MAX_EARLY_US,
     Delivery,
@@ -103,20 +103,20 @@ class Intake:
         return None
 
 
-class Radio:
+class FreeRunningMedium:
     """The medium between the agents of one run, slot by slot."""
 
-    def __init__(self, post: Post, setup: MediumSetup) -> None:
+    def __init__(self, bus: Bus, setup: MediumSetup) -> None:
         self._setup = setup
         self._medium = Medium(setup)
         self._intake = Intake(setup)
         self._lateness = Lateness(setup.speed)
         agents = range(setup.agents)
-        self._senders = post.rings("tx", agents)
-        self._receivers = [post.putter("rx", agent) for agent in agents]
-        self._orders = post.ring("orders", size=ORDERS_RING)
-        self._book = OrderBook()
-        self._report = post.putter("verdicts")
+        self._senders = bus.rings("tx", agents)
+        self._receivers = [bus.putter("rx", agent) for agent in agents]
+        self._orders = bus.ring("orders", size=ORDERS_RING)
+        self._book = FaultQueue()
+        self._report = bus.putter("verdicts")
         self._report_every = max(1, round(setup.slot_hz))
         self._slot = 0
 
@@ -129,12 +129,12 @@ class Radio:
 
     def report(self) -> None:
         """Tell the world the counters as they stand after the last slot played."""
-        verdicts: Verdicts = msgspec.structs.replace(
-            self._medium.verdicts(self._slot),
+        medium_counters: MediumCounters = msgspec.structs.replace(
+            self._medium.counters(self._slot),
             rejected=dict(self._intake.rejected),
             late_s=self._lateness.summary(),
         )
-        self._report(pack(verdicts))
+        self._report(pack(medium_counters))
 
     def _truth(self, data: bytes) -> Truth | None:
         try:

@@ -11,8 +11,10 @@ from math import inf, log10
 import msgspec
 
 from netem.messages import GilbertElliott, PathLoss
-from netem.random_draws import SHAPES, Numbers, below, correlated
-from netem.rate_queue import Air
+from netem.random_draws import SHAPES, SHARING, Numbers, below, correlated, draw, draw_shared, pair
+from netem.range_index import Near
+from netem.rate_queue import RateQueue
+from netem.wire.frame import Frame
 
 DEFAULT_LIMIT = 1000
 """tc-netem's own [frames]."""
@@ -55,7 +57,7 @@ class Memory:
     def __init__(self) -> None:
         self.bad = False
         self.score: float | None = None
-        self.air = Air()
+        self.air = RateQueue()
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +91,7 @@ class LinkModel:
     rate_kbit: float = inf
     rate_overhead_b: int = 0
     limit: int = DEFAULT_LIMIT
-    own_air: bool = False
+    own_rate: bool = False
 
     draws: bool = field(init=False)
     plain: bool = field(init=False)
@@ -102,9 +104,9 @@ class LinkModel:
         shaped = self.delay_correlation_percent > 0.0 or self.distribution != "uniform"
         jittery = self.jitter_ms > 0.0
         bursts, soft = self.gemodel is not None, self.path_loss is not None
-        plain = not (rare or bursts or soft or self.own_air or (jittery and shaped))
+        plain = not (rare or bursts or soft or self.own_rate or (jittery and shaped))
         draws = jittery or self.loss_percent > 0.0 or not plain
-        remembers = bursts or self.own_air or (jittery and self.delay_correlation_percent > 0.0)
+        remembers = bursts or self.own_rate or (jittery and self.delay_correlation_percent > 0.0)
         object.__setattr__(self, "draws", draws)
         object.__setattr__(self, "plain", plain)
         object.__setattr__(self, "clean", Verdict(Cause.DELIVERED, self.delay_ms / 1000.0))
@@ -217,3 +219,71 @@ def edge_m(edge: PathLoss | None) -> float:
     room_db = edge.budget_db + EDGE_SIGMAS * edge.shadowing_db - edge.reference_loss_db
     decades = min(12.0, room_db / (10.0 * edge.exponent))
     return edge.reference_distance_m * 10.0**decades if room_db > 0.0 else 0.0
+
+
+class Sending(msgspec.Struct, frozen=True, gc=False):
+    """A frame on its way: its key, when it was sent, how long its sender's queue took [s]."""
+
+    frame: Frame
+    key: tuple[int, int, int, int]
+    sent_s: float
+    waited_s: float
+
+
+class Links:
+    """Verdicts link by link; ``seed``: 32 bytes."""
+
+    def __init__(self, seed: bytes) -> None:
+        self._seed = seed
+        self._memories: dict[tuple[int, int, int], Memory] = {}
+
+    def plain(self, link: LinkModel, sending: Sending, near: Near) -> list[Verdict]:
+        """Decide on links that are no more than late and lossy, all alike, in order of near."""
+        if not link.draws:
+            return [
+                _later(verdict(link, distance_m, None), sending.waited_s) for _, distance_m in near
+            ]
+        source, incarnation, channel, count = sending.key
+        fates: list[Verdict] = []
+        shared, group = b"", -1
+        for receiver, distance_m in near:
+            if receiver // SHARING != group:
+                group = receiver // SHARING
+                shared = draw_shared(self._seed, source, incarnation, group, channel, count)
+            fates.append(verdict(link, distance_m, pair(shared, receiver)))
+        waited_s = sending.waited_s
+        return [_later(fate, waited_s) for fate in fates] if waited_s else fates
+
+    def rough(
+        self, link: LinkModel, sending: Sending, receiver: int, distance_m: float
+    ) -> list[Verdict]:
+        """Decide on any link: for the frame, and for its copy where it is duplicated."""
+        source, incarnation, channel, count = sending.key
+        memory = FRESH
+        if link.remembers:
+            memory = self._memories.setdefault((source, receiver, channel), Memory())
+        fates: list[Verdict] = []
+        copies = 1
+        while len(fates) < copies:
+            purpose = 1 + len(fates)
+            draws = draw(self._seed, source, incarnation, receiver, channel, count, purpose)
+            copies = 2 if twice(link, draws) or fates else 1
+            fate = verdict(link, distance_m, draws, memory)
+            fates.append(_through(link, memory, sending, fate))
+        return fates
+
+
+def _through(link: LinkModel, memory: Memory, sending: Sending, fate: Verdict) -> Verdict:
+    """Let a frame that gets across wait as long as it must."""
+    if fate.cause:
+        return fate
+    if not link.own_rate:
+        return _later(fate, sending.waited_s)
+    size_b = len(sending.frame.payload) + link.rate_overhead_b
+    waited_s = memory.air.enter(sending.sent_s, size_b, link.rate_kbit, link.limit)
+    return LOST_TO_QUEUE if waited_s is None else _later(fate, waited_s)
+
+
+def _later(fate: Verdict, waited_s: float) -> Verdict:
+    """Return what happens to a frame that waits first [s]."""
+    return Verdict(fate.cause, waited_s + fate.delay_s, fate.turned) if not fate.cause else fate

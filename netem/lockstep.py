@@ -7,7 +7,7 @@ from typing import NamedTuple
 from netem.medium import Medium
 from netem.messages import Done, MediumSetup, Turn, unpack_turn
 from netem.wire.barrier import TURN_RING, LockstepError, answer, same_slot
-from netem.wire.bus import Post
+from netem.wire.bus import Bus
 from netem.wire.frame import (
     BATCH_RING,
     Batch,
@@ -26,7 +26,7 @@ class Waiting(NamedTuple):
     batches: deque[bytes]
 
 
-class Turns:
+class LockstepMedium:
     """Plays the slots of one run as the world opens them, for some of the receivers or for all.
 
     Batches go out when their slot is opened, for by then it is known who steps in it: to somebody
@@ -34,7 +34,7 @@ class Turns:
     """
 
     def __init__(
-        self, post: Post, setup: MediumSetup, shard: int, unwanted: Callable[[], bool]
+        self, bus: Bus, setup: MediumSetup, shard: int, unwanted: Callable[[], bool]
     ) -> None:
         agents = range(setup.agents)
         self._setup = setup
@@ -43,9 +43,9 @@ class Turns:
         self._medium = Medium(setup, setup.receivers)
         self._own = frozenset(agents if setup.receivers is None else setup.receivers)
         self._waiting = {agent: Waiting(0, deque(maxlen=BATCH_RING)) for agent in agents}
-        self._senders = [post.ring("tx", agent, TURN_RING) for agent in agents]
-        self._receivers = [post.putter("rx", agent, lockstep=True) for agent in agents]
-        self._done = post.putter("done", shard, lockstep=True)
+        self._senders = [bus.ring("tx", agent, TURN_RING) for agent in agents]
+        self._receivers = [bus.putter("rx", agent, lockstep=True) for agent in agents]
+        self._done = bus.putter("done", shard, lockstep=True)
 
     def hear(self, truths: list[bytes]) -> None:
         """Play the slots that the world opened.
@@ -70,7 +70,7 @@ class Turns:
         self._collect(turn)
         pages = tuple(self._medium.pages().items())
         self._slot += 1
-        self._done(pack(Done(turn.truth.slot, pages, self._medium.verdicts(self._slot))))
+        self._done(pack(Done(turn.truth.slot, pages, self._medium.counters(self._slot))))
 
     def _turn(self, opened: bytes) -> Turn:
         try:

@@ -14,24 +14,31 @@ from math import inf
 import msgspec
 
 from netem.barriers import Barriers
-from netem.delivery_log import FATE, HEAD, Journal
-from netem.link import LOST_TO_PARTITION, LOST_TO_QUEUE, Cause, LinkModel, Verdict
-from netem.links import Links, Sending
+from netem.delivery_log import FATE, HEAD, DeliveryLog
+from netem.link import (
+    LOST_TO_PARTITION,
+    LOST_TO_QUEUE,
+    Cause,
+    LinkModel,
+    Links,
+    Sending,
+    Verdict,
+)
 from netem.messages import (
     Changed,
     Conditions,
     Flapped,
     Healed,
     Jammed,
+    MediumCounters,
     MediumSetup,
     Parted,
     Position,
     RadioOrder,
-    Verdicts,
     packets_of,
 )
-from netem.range_index import Near, Neighbourhood
-from netem.rate_queue import Air
+from netem.range_index import Near, RangeIndex
+from netem.rate_queue import RateQueue
 from netem.schedule import Schedule
 from netem.wire.frame import (
     BATCH_HEAD_B,
@@ -69,13 +76,13 @@ class Medium:
         self._links = Links(sha256(b"qswarm medium %d" % setup.seed).digest())
         self._schedule = Schedule(setup.conditions)
         self._barriers = Barriers()
-        self._near = Neighbourhood(setup.agents, own)
+        self._near = RangeIndex(setup.agents, own)
         self._others = [len(own) - (agent in self._own) for agent in range(setup.agents)]
         self._queues: list[list[_InFlight]] = [[] for _ in range(setup.agents)]
         self._counts: dict[tuple[int, int, int], int] = {}
-        self._airs: dict[tuple[int, int], Air] = {}
+        self._rate_queues: dict[tuple[int, int], RateQueue] = {}
         self._fates = [0] * len(Cause)
-        self._journal = Journal(setup.agents)
+        self._delivery_log = DeliveryLog(setup.agents)
         self._spoken_b = [0] * (len(CHANNELS) * setup.agents)
         self.sent = self.addressed = self.in_flight = self.duplicated = self.corrupted = 0
 
@@ -149,11 +156,11 @@ class Medium:
 
     def digest(self) -> bytes:
         """Return a hash over every verdict so far; asked at the end of each slot, it is one."""
-        return self._journal.digest()
+        return self._delivery_log.digest()
 
     def pages(self) -> Mapping[int, bytes]:
         """Return, at the end of a slot, what a shard noted in it; see ``journal.joined``."""
-        return self._journal.torn_out()
+        return self._delivery_log.torn_out()
 
     def packets(self) -> dict[str, int]:
         """Return the counters of packets under their names in summary.json."""
@@ -162,9 +169,9 @@ class Medium:
             self.sent, self.addressed, fates, self.duplicated, self.corrupted, self.in_flight
         )
 
-    def verdicts(self, slot: int) -> Verdicts:
+    def counters(self, slot: int) -> MediumCounters:
         """Return the counters as they stand."""
-        return Verdicts(
+        return MediumCounters(
             slot,
             self.sent,
             self.addressed,
@@ -201,13 +208,13 @@ class Medium:
     def _queued(self, sending: Sending, sender: LinkModel) -> float | None:
         """Return how long the sender's channel takes [s]; None, and noted, where it is full."""
         source, _, channel, _ = sending.key
-        air = self._airs.setdefault((source, channel), Air())
+        air = self._rate_queues.setdefault((source, channel), RateQueue())
         size_b = len(sending.frame.payload) + sender.rate_overhead_b
         waited_s = air.enter(sending.sent_s, size_b, sender.rate_kbit, sender.limit)
         if waited_s is None:
             self._fates[Cause.DROPPED_QUEUE] += self._others[source]
             if source in self._own:
-                self._journal.pages[source] += HEAD(*sending.key) + FATE(
+                self._delivery_log.pages[source] += HEAD(*sending.key) + FATE(
                     0, LOST_TO_QUEUE.cause, 0.0, -1.0
                 )
         return waited_s
@@ -217,7 +224,7 @@ class Medium:
         frame, key, sent_s = sending.frame, sending.key, sending.sent_s
         noted = HEAD(*key) + FATE(0, DELIVERED, delay_s, -1.0)
         entry = (sent_s + delay_s, *key, 0, frame)
-        queues, pages = self._queues, self._journal.pages
+        queues, pages = self._queues, self._delivery_log.pages
         for receiver, _ in near:
             queues[receiver].append(entry)
             pages[receiver] += noted
@@ -226,7 +233,7 @@ class Medium:
     def _cross_plain(self, sending: Sending, near: Near, link: LinkModel) -> None:
         """Judge a frame on links that are all alike, and no more than late and lossy."""
         frame, key, sent_s = sending.frame, sending.key, sending.sent_s
-        head, queues, pages = HEAD(*key), self._queues, self._journal.pages
+        head, queues, pages = HEAD(*key), self._queues, self._delivery_log.pages
         lost = self._fates
         across = 0
         for (receiver, _), fate in zip(near, self._links.plain(link, sending, near), strict=True):
@@ -266,7 +273,7 @@ class Medium:
     ) -> None:
         """Enter a verdict in the books, and a frame that gets across in its receiver's queue."""
         delay_s, turned = fate.delay_s, fate.turned
-        self._journal.pages[receiver] += head + FATE(copy, fate.cause, delay_s, turned)
+        self._delivery_log.pages[receiver] += head + FATE(copy, fate.cause, delay_s, turned)
         if fate.cause:
             self._fates[fate.cause] += 1
             return

@@ -190,7 +190,9 @@ class Truth(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unkno
     incarnations: tuple[Count, ...] = ()
 
 
-class Verdicts(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
+class MediumCounters(
+    msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True
+):
     """What the medium reports: how many frames met which fate so far, and a digest of all fates.
 
     addressed: frames sent, times the other agents, and each duplicate once more; it equals the sum
@@ -255,7 +257,7 @@ class Done(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknow
 
     slot: Count
     pages: tuple[tuple[AgentId, bytes], ...]
-    verdicts: Verdicts
+    medium_counters: MediumCounters
 
 
 _turn = msgspec.msgpack.Decoder(Turn).decode
@@ -272,7 +274,7 @@ def unpack_done(data: bytes) -> Done:
     return unpack_typed(data, _done, MAX_DONE_B)
 
 
-def together(parts: Sequence[Verdicts]) -> Verdicts:
+def together(parts: Sequence[MediumCounters]) -> MediumCounters:
     """Return what one medium would have counted where several share the receivers out."""
     first = parts[0]
     if len(parts) == 1:

@@ -10,16 +10,15 @@ import msgspec
 import zenoh
 from zenoh.handlers import RingChannel
 
-from netem.free_running import Radio
-from netem.lockstep import Turns
+from netem.free_running import FreeRunningMedium
+from netem.lockstep import LockstepMedium
 from netem.messages import MAX_CONDITIONS_B, MediumSetup
 from netem.wire.access import AccessError, Guard
 from netem.wire.barrier import LockstepError, UnwantedError
-from netem.wire.bus import Post, Ring, Waiting, drained, receive
+from netem.wire.bus import Bus, Ring, Waiting, drained, receive
 from netem.wire.keys import Keys, medium_name
 from netem.wire.session import SessionError, open_client, open_router
-from netem.wire.shutdown import Ending
-from netem.wire.stop import Stop
+from netem.wire.shutdown import Ending, Stop
 
 WAIT_S = 0.2
 SILENCE_S = 30.0
@@ -30,7 +29,7 @@ class SilenceError(RuntimeError):
     """The world has said nothing for so long that it must be gone."""
 
 
-class Desk:
+class SetupServer:
     """Gives the medium to the run that asks first, and refuses every other.
 
     shard: which of several mediums it is; 0 is the router's own.
@@ -99,11 +98,11 @@ def serve(endpoint: str, shard: int = 0, patient: bool = False, guard: Guard | N
         stop = Stop()
         at = "is connected to" if shard else "listens at"
         print(f"{medium_name(shard)} {at} {endpoint}, for one run", flush=True)
-        desk = Desk(session, shard)
-        while desk.run is None and not stop.asked:
-            desk.wait(WAIT_S)
-        if desk.run is not None and desk.setup is not None:
-            _serve_run(Post(session, Keys(desk.run)), desk, desk.setup, stop)
+        server = SetupServer(session, shard)
+        while server.run is None and not stop.asked:
+            server.wait(WAIT_S)
+        if server.run is not None and server.setup is not None:
+            _serve_run(Bus(session, Keys(server.run)), server, server.setup, stop)
     return 0
 
 
@@ -114,14 +113,20 @@ def _opened(endpoint: str, shard: int, patient: bool, guard: Guard | None) -> ze
     return open_client(endpoint, patient=patient, login=login)
 
 
-def _serve_run(post: Post, desk: Desk, setup: MediumSetup, stop: Stop) -> None:
-    name = medium_name(desk.shard)
-    print(f"{name} serves run {desk.run!r} of {setup.agents} agents, seed {setup.seed}", flush=True)
-    truths, ending = post.ring("truth", size=TRUTH_RING), Ending(post, stop)
-    radio = Turns(post, setup, desk.shard, ending) if setup.lockstep else Radio(post, setup)
-    post.show_life(name)
+def _serve_run(bus: Bus, server: SetupServer, setup: MediumSetup, stop: Stop) -> None:
+    name = medium_name(server.shard)
+    print(
+        f"{name} serves run {server.run!r} of {setup.agents} agents, seed {setup.seed}", flush=True
+    )
+    truths, ending = bus.ring("truth", size=TRUTH_RING), Ending(bus, stop)
+    radio = (
+        LockstepMedium(bus, setup, server.shard, ending)
+        if setup.lockstep
+        else FreeRunningMedium(bus, setup)
+    )
+    bus.show_life(name)
     try:
-        _play(radio, truths, desk, ending)
+        _play(radio, truths, server, ending)
     except UnwantedError:
         print(f"{name}: the run is over, within a slot", flush=True)
     else:
@@ -129,15 +134,19 @@ def _serve_run(post: Post, desk: Desk, setup: MediumSetup, stop: Stop) -> None:
         print(f"{name}: the run is over", flush=True)
 
 
-def _play(radio: Turns | Radio, truths: Ring, desk: Desk, ending: Ending) -> None:
+def _play(
+    radio: LockstepMedium | FreeRunningMedium, truths: Ring, server: SetupServer, ending: Ending
+) -> None:
     """Play slots until the run is over; what came before its end is played still."""
     silent_s = 0.0
     ended = False
     while not ended:
-        desk.attend()
+        server.attend()
         ended = ending()
         first = truths.wait(WAIT_S) if not ended else None
         radio.hear(([first] if first is not None else []) + truths.drain(TRUTH_RING))
         silent_s = 0.0 if first is not None else silent_s + WAIT_S
         if silent_s > SILENCE_S:
-            raise SilenceError(f"the world of run {desk.run!r} has been silent for {SILENCE_S:g} s")
+            raise SilenceError(
+                f"the world of run {server.run!r} has been silent for {SILENCE_S:g} s"
+            )

@@ -16,7 +16,7 @@ LARGE = 40
 Near = list[tuple[int, float]]
 
 
-class Neighbourhood:
+class RangeIndex:
     """The radios at their places; ``receivers``: those who may hear, in order."""
 
     def __init__(self, radios: int, receivers: tuple[int, ...]) -> None:

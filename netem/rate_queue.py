@@ -4,7 +4,7 @@ from collections import deque
 from math import inf
 
 
-class Air:
+class RateQueue:
     """What one sender's channel still has to send: when each frame will be out [s], its size [B].
 
     Oldest first. A link with a rate of its own has one too, for the frames that get that far.

@@ -14,7 +14,7 @@ from netem.messages import Conditions, DirectedLink, LinkKeys
 from netem.wire.frame import CHANNELS
 
 _Keys = TypeVar("_Keys", bound=LinkKeys)
-AIR_KEYS = ("rate_kbit", "rate_overhead_b", "limit")
+RATE_KEYS = ("rate_kbit", "rate_overhead_b", "limit")
 """Keys that belong to a sender's channel; a link with one of its own has its own queue."""
 
 
@@ -78,6 +78,8 @@ def _given(table: LinkKeys) -> dict[str, Any]:
 
 
 def _merged(*tables: LinkKeys | Conditions | DirectedLink) -> LinkModel:
-    own_air = any(getattr(tables[2], key) is not None for key in AIR_KEYS) if tables[2:] else False
+    own_rate = (
+        any(getattr(tables[2], key) is not None for key in RATE_KEYS) if tables[2:] else False
+    )
     given = dict(chain.from_iterable(_given(table).items() for table in tables))
-    return LinkModel(**given, own_air=own_air)
+    return LinkModel(**given, own_rate=own_rate)

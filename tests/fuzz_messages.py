@@ -27,7 +27,7 @@ from agent.codec import (
 )
 from agent.core import Agent
 from agent.messages import Observation
-from netem.fault_queue import OrderBook
+from netem.fault_queue import FaultQueue
 from netem.messages import Done, Truth, Turn, unpack_done, unpack_turn
 from netem.wire.frame import (
     Batch,
@@ -138,7 +138,7 @@ def _targets(
     tally = Tally(0.0125)
     tally.note(heard, tuple(range(len(heard))), 0)
     turn = Turn(Truth(3, 0.0375, positions), (3, 7), (0,) * len(positions))
-    done = Done(3, ((1, b"page"),), fleet.verdicts)
+    done = Done(3, ((1, b"page"),), fleet.medium_counters)
     return [
         Target("observation", decode_observation, [encode(each) for _, each in observations]),
         Target("command", decode_command, [encode(outbox.command) for outbox in outboxes]),
@@ -151,7 +151,7 @@ def _targets(
         Target("inbox", unpack_inbox, [pack(Inbox(3, (batch,)))]),
         Target("turn", unpack_turn, [pack(turn)]),
         Target("done", unpack_done, [pack(done)]),
-        Target("orders", lambda data: OrderBook().take(data), [ORDERS]),
+        Target("orders", lambda data: FaultQueue().take(data), [ORDERS]),
         Target("request", _request, [REQUEST]),
     ]
 

@@ -9,7 +9,7 @@ from netem.wire.keys import Keys
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, admit
 from worldsim.fleet.launcher_link import ByHand
 from worldsim.fleet.process import Terms, run
-from worldsim.fleet.process_table import Roster
+from worldsim.fleet.process_table import ProcessTable
 from worldsim.results.run_folder import RunDirectory
 from worldsim.scenario.file import load
 from worldsim.scenario.tables import Scenario
@@ -65,16 +65,16 @@ def main(arguments: list[str] | None = None) -> int:
         scenario,
         lambda: _directory(options, scenario),
         Terms(options.run or scenario.name, options.speed, not options.no_recording),
-        lambda muster: ByHand(muster.gone),
+        lambda startup: ByHand(startup.gone),
     )
 
 
 def _directory(options: argparse.Namespace, scenario: Scenario) -> RunDirectory:
     """Make the run's folder, with the endpoint in it. Raises RunDirectoryError."""
     directory = RunDirectory.create(options.out, scenario)
-    roster = Roster(directory.path, options.run or scenario.name, options.connect)
-    roster.add("world", os.getpid())
-    roster.write()
+    table = ProcessTable(directory.path, options.run or scenario.name, options.connect)
+    table.add("world", os.getpid())
+    table.write()
     return directory
 
 

@@ -54,7 +54,7 @@ class Departed(NamedTuple):
     stamp_s: float
 
 
-class SilentBodies:
+class UnidentifiedVehicles:
     """The silent bodies that one agent knows of. max_speed: the fastest vehicle's limit [m/s]."""
 
     def __init__(self, max_speed: float) -> None:

@@ -40,10 +40,14 @@ def _default_lines() -> list[list[Vector]]:
     rolls = [2.0 * pi * k / LINES + ROLL for k in range(LINES)]
     return [
         [
-            (ahead + k * along, (aside + k * out) * cos(roll), (aside + k * out) * sin(roll))
+            (
+                ahead + k * along,
+                (aside + k * out) * cos(presence),
+                (aside + k * out) * sin(presence),
+            )
             for k in range(AGENTS)
         ]
-        for roll in rolls
+        for presence in rolls
     ]
 
 

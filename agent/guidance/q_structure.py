@@ -60,7 +60,7 @@ class QStructure:
         if mine is not None and dist(q, q_toq) < AT_SLOT_M and velocity == wanted:
             attitude = mine.slot.attitude
             yaw = self._heading(yaw, attitude.yaw, velocity, frame)
-            tilt = (attitude.pitch or 0.0, attitude.roll or 0.0)
+            tilt = (attitude.pitch or 0.0, attitude.presence or 0.0)
         return Intent(
             wanted,
             velocity,

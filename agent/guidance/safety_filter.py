@@ -101,7 +101,7 @@ class RangingFilter:
         return found
 
 
-class Told(NamedTuple):
+class TelemetryRow(NamedTuple):
     """What a neighbour last told: relative position [m], its age [s], the speed it promised."""
 
     relative: Vector
@@ -121,7 +121,7 @@ class PromiseFilter:
         self._horizon_s = horizon_s
         self._promises: deque[tuple[float, float]] = deque()
 
-    def promise(self, now_s: float, told: Sequence[Told]) -> float:
+    def promise(self, now_s: float, told: Sequence[TelemetryRow]) -> float:
         """Return the speed to promise now [m/s], and remember it."""
         gap = min(
             (hypot(*each.relative) - self._d_ob - self._max_speed * each.age_s for each in told),
@@ -138,7 +138,7 @@ class PromiseFilter:
         """The least speed promised in the last 3 s [m/s]."""
         return min((cap for _, cap in self._promises), default=LEAST_CAP_MPS)
 
-    def bounds(self, told: Sequence[Told]) -> list[Bound]:
+    def bounds(self, told: Sequence[TelemetryRow]) -> list[Bound]:
         """Return the limits from what was told; zero where a neighbour may be too near already."""
         found = []
         for relative, age_s, promised in told:

@@ -19,7 +19,7 @@ from agent.guidance.safety_filter import (
     Bound,
     PromiseFilter,
     RangingFilter,
-    Told,
+    TelemetryRow,
     approach_of,
     limited,
     shortened,
@@ -70,7 +70,9 @@ class Guard:
         self._promises = PromiseFilter(*filtered)
         self.speed_cap = limits.max_speed_mps
 
-    def safe(self, wanted: Vector, senses: Senses, told: Callable[[], list[Told]]) -> Vector:
+    def safe(
+        self, wanted: Vector, senses: Senses, told: Callable[[], list[TelemetryRow]]
+    ) -> Vector:
         """Return the velocity that is safe to fly [m/s]; told: what neighbours last told."""
         bounds = self._cleared(senses) if senses.obstacles else []
         if self._ranging is not None:

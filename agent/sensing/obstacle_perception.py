@@ -4,10 +4,10 @@ from agent.config import AgentSetup, Sensors
 from agent.messages import Observation, Vector
 from agent.sensing.point_map import PointMap
 from agent.sensing.ray_pattern import KINDS, pattern_of
-from agent.sensing.sensor_health import PROXIMITY, Trust
+from agent.sensing.sensor_health import PROXIMITY, SensorHealth
 
 
-class Eyes:
+class ObstaclePerception:
     """Turns scans into points near by; without sensors that scan, the proximity sensor's."""
 
     def __init__(self, setup: AgentSetup) -> None:
@@ -15,7 +15,7 @@ class Eyes:
         patterns = [pattern_of(kind, setup.sensor, setup.tick_hz) for kind in kinds]
         self._map = PointMap(patterns) if patterns else None
         ranging = "proximity" in setup.vehicle.sensors
-        self.trust = Trust(
+        self.trust = SensorHealth(
             patterns, ranging, _noisy(setup.sensor), setup.tick_hz, setup.fleet_max_speed_mps
         )
 

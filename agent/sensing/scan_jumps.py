@@ -16,7 +16,7 @@ SCANS = 3
 """So many leaps in a row make a sensor wrong, so many quiet scans right again."""
 
 
-class Leaps:
+class ScanJumps:
     """Watches the scans of one sensor; ``wrong``: whether it tells anything."""
 
     def __init__(self) -> None:

@@ -10,7 +10,7 @@ from math import dist, hypot
 
 from agent.messages import Beacon, Observation, Vector
 from agent.sensing.ray_pattern import Pattern
-from agent.sensing.scan_jumps import Leaps
+from agent.sensing.scan_jumps import ScanJumps
 
 MOVED_M = 0.03
 """By so much a vehicle moves before a reading must have changed."""
@@ -26,7 +26,7 @@ LOOKS = 3
 believed again: that they have flown on proves nothing."""
 
 
-class Trust:
+class SensorHealth:
     """Watches one agent's sensors; max_speed: of any vehicle [m/s].
 
     noisy: sensors of which no two readings are the same. Without noise, those who fly side by side
@@ -45,7 +45,7 @@ class Trust:
         self._noisy = noisy
         self._due_s = {p.kind: LOST_SCANS * p.every / tick_hz for p in patterns}
         self._scanned_s: dict[int, float] = {}
-        self._leaps = {p.kind: Leaps() for p in patterns}
+        self._leaps = {p.kind: ScanJumps() for p in patterns}
         self._ranging = ranging
         self._max_speed = max_speed
         self._reading: tuple[object, ...] = ()

@@ -129,7 +129,7 @@ class Rings:
             yield sender, found
 
 
-class Roll:
+class Presence:
     """Who shows a sign of life in a run, by name (``world``, ``netem``, ``agent-3``).
 
     A hint, no more: when the router is gone, everybody seems to be.
@@ -154,7 +154,7 @@ class Roll:
         return gone
 
 
-class Post:
+class Bus:
     """One process's way to send and receive in one run."""
 
     def __init__(self, session: zenoh.Session, keys: Keys) -> None:
@@ -191,9 +191,9 @@ class Post:
         """Return the rings of what each of some agents says on a topic."""
         return Rings([self.ring(topic, agent, Rings.SIZE) for agent in agents])
 
-    def roll(self) -> Roll:
+    def presence(self) -> Presence:
         """Return the roll of those who are alive."""
-        return Roll(self._session, self._keys)
+        return Presence(self._session, self._keys)
 
     def show_life(self, name: str) -> None:
         """Show a sign of life under a name, until the session closes."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from agent.checked_controller import FaultyControllerError, Pilot, plain
+from agent.checked_controller import CheckedController, FaultyControllerError, plain
 from agent.comms.mission import Missions
 from agent.config import AgentSetup
 from agent.controller import ControllerError, Heard, Intent, Senses, load
@@ -49,9 +49,9 @@ def setup_of(controller: str) -> AgentSetup:
 
 @pytest.fixture
 def puppet(monkeypatch: pytest.MonkeyPatch) -> Any:
-    def saying(words: Any) -> Pilot:
+    def saying(words: Any) -> CheckedController:
         monkeypatch.setattr(Puppet, "says", words)
-        return Pilot(setup_of(f"{__name__}:Puppet"))
+        return CheckedController(setup_of(f"{__name__}:Puppet"))
 
     return saying
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from agent.codec import encode
-from agent.free_running import Cockpit
+from agent.free_running import FreeRunningAgent
 from agent.messages import Observation
 from netem.wire.frame import Batch, Delivery, Frame, pack
 from netem.wire.latency import BINS_A_SLOT, unpack_arrivals
@@ -38,51 +38,51 @@ class FakePost:
 
 
 @pytest.fixture
-def post():
+def bus():
     return FakePost()
 
 
 @pytest.fixture
-def cockpit(post):
-    return Cockpit(post, load(WEDGE, {}).agent_setup(0, 2, 2))
+def shell(bus):
+    return FreeRunningAgent(bus, load(WEDGE, {}).agent_setup(0, 2, 2))
 
 
 def seen(slot):
     return encode(Observation(slot, slot / 80.0, STILL, STILL, 0.0, (), (), (), ()))
 
 
-def told(cockpit, post):
-    cockpit.report()
-    return unpack_arrivals(post.said["arrivals"][-1])
+def told(shell, bus):
+    shell.report()
+    return unpack_arrivals(bus.said["arrivals"][-1])
 
 
-def test_frames_are_counted_from_when_they_were_due_to_when_they_are_used(cockpit, post):
-    post.heard.append(pack(Delivery(4, (JUNK, JUNK), (0, 25_000))))
-    cockpit.see(seen(8))
-    counts = told(cockpit, post).counts[0]
+def test_frames_are_counted_from_when_they_were_due_to_when_they_are_used(shell, bus):
+    bus.heard.append(pack(Delivery(4, (JUNK, JUNK), (0, 25_000))))
+    shell.see(seen(8))
+    counts = told(shell, bus).counts[0]
     assert [at for at, count in enumerate(counts) if count] == [4 * BINS_A_SLOT, 6 * BINS_A_SLOT]
-    assert told(cockpit, post).incarnation == 2
+    assert told(shell, bus).incarnation == 2
 
 
-def test_what_is_of_a_later_slot_waits_for_its_observation(cockpit, post):
-    post.heard += [pack(Delivery(slot, (JUNK,), (0,))) for slot in (4, 8)]
-    cockpit.see(seen(4))
-    assert sum(told(cockpit, post).counts[0]) == 1
-    cockpit.see(seen(8))
-    counts = told(cockpit, post).counts[0]
+def test_what_is_of_a_later_slot_waits_for_its_observation(shell, bus):
+    bus.heard += [pack(Delivery(slot, (JUNK,), (0,))) for slot in (4, 8)]
+    shell.see(seen(4))
+    assert sum(told(shell, bus).counts[0]) == 1
+    shell.see(seen(8))
+    counts = told(shell, bus).counts[0]
     assert counts[0] == sum(counts) == 2
 
 
-def test_it_tells_about_once_a_second(cockpit, post):
+def test_it_tells_about_once_a_second(shell, bus):
     for tick in range(201):
-        cockpit.see(seen(4 * tick))
-    assert len(post.said["command"]) == len(post.said["tx"]) == 201
-    assert len(post.said["arrivals"]) == 10
+        shell.see(seen(4 * tick))
+    assert len(bus.said["command"]) == len(bus.said["tx"]) == 201
+    assert len(bus.said["arrivals"]) == 10
 
 
-def test_what_is_no_delivery_is_counted_and_hurts_nothing(cockpit, post):
-    post.heard += [b"junk", pack(Batch(4, (JUNK,))), pack(Delivery(4, (JUNK,), ()))]
-    cockpit.see(seen(4))
-    cockpit.see(b"junk")
-    assert cockpit._controls.core.rejected == {"batch": 3, "observation": 1}
-    assert len(post.said["command"]) == 1
+def test_what_is_no_delivery_is_counted_and_hurts_nothing(shell, bus):
+    bus.heard += [b"junk", pack(Batch(4, (JUNK,))), pack(Delivery(4, (JUNK,), ()))]
+    shell.see(seen(4))
+    shell.see(b"junk")
+    assert shell._controls.core.rejected == {"batch": 3, "observation": 1}
+    assert len(bus.said["command"]) == 1

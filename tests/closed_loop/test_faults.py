@@ -116,7 +116,7 @@ def test_the_apex_leaves_and_has_a_successor(seed: int, radio: dict[str, str]) -
     assert violated(flight) == []
     assert np.isnan(flight.loop.world.fleet.position[gone]).all()
     # Without delay nothing is on its way to one who has just been handed its batch.
-    assert flight.verdicts.fates["dropped_medium"] > 0 or not radio
+    assert flight.medium_counters.fates["dropped_medium"] > 0 or not radio
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -162,15 +162,15 @@ def test_a_partition_cuts_and_a_heal_joins(loss: str) -> None:
     events = ["at_s = 15, for_s = 20, partition = [[0, 1, 2, 3]]"]
     flight = flown(1, 60, *events, **{"netem.loss_percent": loss})
     assert kinds(flight, "partition", "heal") == [(15.0, "partition", None), (35.0, "heal", None)]
-    assert flight.verdicts.fates["dropped_partition"] > 5000
+    assert flight.medium_counters.fates["dropped_partition"] > 5000
     heard = {agent: flight.loop.world.latest[agent].telemetry.heard for agent in range(9)}  # type: ignore[union-attr]
     assert any(other >= 4 for agent in range(4) for other in heard[agent])
 
 
 def test_conditions_change_for_a_while() -> None:
     flight = flown(1, 20, "at_s = 5, for_s = 5, netem = { loss_percent = 100 }")
-    lost = flight.verdicts.fates["dropped_loss"]
-    sent_a_second = flight.verdicts.addressed / 20.0
+    lost = flight.medium_counters.fates["dropped_loss"]
+    sent_a_second = flight.medium_counters.addressed / 20.0
     assert 0.9 * 5.0 * sent_a_second < lost < 1.1 * 5.0 * sent_a_second
     assert len(kinds(flight, "netem")) == 2
 

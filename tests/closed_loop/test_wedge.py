@@ -33,8 +33,10 @@ def test_clean_radio(seed):
     checked = judge.invariants()["I1"]
     assert checked["ticks"] == 401
     assert checked["violations"] == 0
-    verdicts = flight.verdicts
-    assert verdicts.addressed == sum(verdicts.fates.values()) + verdicts.in_flight
+    medium_counters = flight.medium_counters
+    assert (
+        medium_counters.addressed == sum(medium_counters.fates.values()) + medium_counters.in_flight
+    )
 
 
 @pytest.mark.parametrize("seed", range(20))

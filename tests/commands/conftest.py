@@ -22,7 +22,7 @@ queue = [{ name = "Q", vertices = ["V1"], shape = { kind = "ray", direction = [-
 """
 
 
-class Told(NamedTuple):
+class TelemetryRow(NamedTuple):
     """What a command left behind: its exit status and what it said."""
 
     status: int
@@ -30,7 +30,7 @@ class Told(NamedTuple):
     err: str
 
 
-Command = Callable[..., Told]
+Command = Callable[..., TelemetryRow]
 
 
 @pytest.fixture
@@ -44,8 +44,8 @@ def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def qswarm(capsys: pytest.CaptureFixture[str]) -> Command:
-    def run(*arguments: str | os.PathLike[str]) -> Told:
+    def run(*arguments: str | os.PathLike[str]) -> TelemetryRow:
         status = command([os.fspath(argument) for argument in arguments])
-        return Told(status, *capsys.readouterr())
+        return TelemetryRow(status, *capsys.readouterr())
 
     return run

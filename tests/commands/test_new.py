@@ -21,7 +21,7 @@ def outcome(scenario: Scenario) -> str:
         scenario,
         flight.loop,
         mode="virtual",
-        verdicts=flight.verdicts,
+        medium_counters=flight.medium_counters,
         late_tick_fraction=0.0,
         real_time_factor=1.0,
         duration_s=flight.loop.world.time_s,

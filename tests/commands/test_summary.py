@@ -28,7 +28,7 @@ def flight(small: Path) -> Flight:
 def summary(small: Path, flight: Flight, **others: Any) -> dict[str, Any]:
     figures = {
         "mode": "virtual",
-        "verdicts": flight.verdicts,
+        "medium_counters": flight.medium_counters,
         "late_tick_fraction": 0.0,
         "real_time_factor": 1.0,
         "duration_s": 5.0,
@@ -60,7 +60,7 @@ def test_every_fate_that_the_radio_knows_is_counted() -> None:
 def test_packets_balance(small: Path, flight: Flight) -> None:
     packets = summary(small, flight)["packets"]
     assert packets["dropped_loss"] > 0
-    assert packets["sent"] == flight.verdicts.sent > 0
+    assert packets["sent"] == flight.medium_counters.sent > 0
     assert packets["addressed"] == packets["sent"] * 1
     assert packets["addressed"] == packets["in_flight"] + sum(packets[fate] for fate in FATES)
 
@@ -72,28 +72,30 @@ def test_i8_is_evaluated_at_every_tick(small: Path, flight: Flight) -> None:
 
 def test_a_packet_that_is_nowhere_violates_i8(small: Path) -> None:
     fleet = VirtualFleet(load(small, {"netem.delay_ms": "20"}))
-    while not fleet.verdicts.in_flight:
+    while not fleet.medium_counters.in_flight:
         fleet.slot()
     fleet._medium.in_flight -= 1
     ticks = fleet.loop.judge.ticks
     for _ in range(12):
         fleet.slot()
     assert fleet.loop.judge.invariants()["I8"]["violations"] == fleet.loop.judge.ticks - ticks
-    told = summary(small, Flight(fleet.loop, fleet.verdicts, 0, 1.0, 1.0))
+    told = summary(small, Flight(fleet.loop, fleet.medium_counters, 0, 1.0, 1.0))
     assert (told["outcome"], told["reason"]) == ("fail", "violated: I8")
 
 
 def test_how_late_the_radio_was_is_told_in_ms(small: Path, flight: Flight) -> None:
     assert summary(small, flight)["delivery_late_ms"] is None
     assert summary(small, flight)["delivery"] is None
-    late = msgspec.structs.replace(flight.verdicts, late_s=(0.0005, 0.25))
-    told = summary(small, flight, verdicts=late)
+    late = msgspec.structs.replace(flight.medium_counters, late_s=(0.0005, 0.25))
+    told = summary(small, flight, medium_counters=late)
     assert told["delivery_late_ms"] == {"median": 0.5, "worst": 250.0}
 
 
 def test_what_was_not_measured_is_null_and_no_pass(small: Path, flight: Flight) -> None:
     flight.loop.judge.packet_ticks = 0
-    told = summary(small, flight, verdicts=None, real_time_factor=float("nan"), mode="processes")
+    told = summary(
+        small, flight, medium_counters=None, real_time_factor=float("nan"), mode="processes"
+    )
     assert set(told["packets"].values()) == {None}
     assert told["real_time_factor"] is None
     assert told["trace_sha256"] is None
@@ -108,7 +110,7 @@ def test_what_was_not_measured_is_null_and_no_pass(small: Path, flight: Flight) 
             {"host_too_slow": True, "late_tick_fraction": 0.017},
             "the host was too slow: 1.7 % of ticks were late",
         ),
-        ({"interrupted": True, "verdicts": None}, "interrupted after 5.0 s"),
+        ({"interrupted": True, "medium_counters": None}, "interrupted after 5.0 s"),
     ],
 )
 def test_a_doubtful_run_is_never_a_pass(

@@ -35,7 +35,7 @@ def test_a_partition_has_its_kind() -> None:
 
 
 def dropped(*events: str, radio: str = "") -> int:
-    return fly(scenario(*events, radio=radio)).verdicts.fates["dropped_partition"]
+    return fly(scenario(*events, radio=radio)).medium_counters.fates["dropped_partition"]
 
 
 def test_what_is_jammed_or_down_is_counted_as_partition_and_told() -> None:
@@ -46,14 +46,14 @@ def test_what_is_jammed_or_down_is_counted_as_partition_and_told() -> None:
         None,
     ]
     beacons = 2 * 20 * 4 * 3
-    assert beacons <= flight.verdicts.fates["dropped_partition"] <= 1.2 * beacons
+    assert beacons <= flight.medium_counters.fates["dropped_partition"] <= 1.2 * beacons
     down = dropped("at_s = 1\nfor_s = 2\nflap = { period_s = 1 }")
     assert 0.4 * beacons <= down <= 0.7 * beacons
 
 
 def test_a_turned_bit_is_rejected_and_counted_and_the_team_converges() -> None:
     flight = fly(scenario(radio="corrupt_percent = 30\nduplicate_percent = 10"))
-    told = flight.verdicts
+    told = flight.medium_counters
     assert told.corrupted > 0.25 * told.fates["delivered"]
     assert told.corrupted <= flight.rejected <= told.corrupted + told.duplicated
     assert flight.loop.judge.phases[-1].converge_s is not None

@@ -52,7 +52,7 @@ def test_a_change_of_the_radio_holds_and_is_undone() -> None:
     assert told.conditions["loss_percent"] == 50.0
     operated.fly(2.0)
     assert "loss_percent" not in operated.ask().conditions
-    assert operated.fleet.verdicts.fates["dropped_loss"] > 0
+    assert operated.fleet.medium_counters.fates["dropped_loss"] > 0
 
 
 def test_what_stands_between_radios_is_told_while_it_does() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from worldsim.fleet.process_table import Roster
+from worldsim.fleet.process_table import ProcessTable
 
 
 @pytest.fixture
@@ -21,20 +21,20 @@ def stopped() -> Iterator[int]:
 
 
 def test_who_is_stopped_is_told_but_who_is_paused_is_not(stopped: int, tmp_path: Path) -> None:
-    roster = Roster(tmp_path, "mine", "tcp/127.0.0.1:7447")
-    roster.add("netem", os.getpid())
-    assert roster.stopped() == ""
-    roster.add("agent-2", stopped)
-    assert roster.stopped() == "; stopped: agent-2"
-    roster.note("pause", [(2, 0)])
-    assert roster.stopped() == ""
-    roster.note("resume", [(2, 0)])
-    assert roster.stopped() == "; stopped: agent-2"
+    table = ProcessTable(tmp_path, "mine", "tcp/127.0.0.1:7447")
+    table.add("netem", os.getpid())
+    assert table.stopped() == ""
+    table.add("agent-2", stopped)
+    assert table.stopped() == "; stopped: agent-2"
+    table.note("pause", [(2, 0)])
+    assert table.stopped() == ""
+    table.note("resume", [(2, 0)])
+    assert table.stopped() == "; stopped: agent-2"
 
 
 def test_who_is_gone_is_not_stopped(tmp_path: Path) -> None:
     with subprocess.Popen(["true"]) as process:
         process.wait(5.0)
-    roster = Roster(tmp_path, "mine", "tcp/127.0.0.1:7447")
-    roster.add("agent-0", process.pid)
-    assert roster.stopped() == ""
+    table = ProcessTable(tmp_path, "mine", "tcp/127.0.0.1:7447")
+    table.add("agent-0", process.pid)
+    assert table.stopped() == ""

@@ -8,7 +8,7 @@ import pytest
 from agent.comms.unidentified_vehicles import SILENCE_S
 from agent.messages import Place
 from tests.recording.flights import straight_flight, wedge
-from worldsim.judge.hovering_vehicles import Bodies
+from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.verdict import Judge
 
 SCENARIO = wedge(9)
@@ -18,7 +18,7 @@ APEX = Place(0, 0)
 
 def blocked(velocity, seconds):
     """What is taken from the first eight as the ninth passes the apex, after so many seconds."""
-    bodies, phase = Bodies(1.0), Judge(SCENARIO).phases[0]
+    bodies, phase = HoveringVehicles(1.0), Judge(SCENARIO).phases[0]
     taken = frozenset()
     for tick in straight_flight(SCENARIO):
         if tick.time_s > seconds:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.recording.flights import straight_flight, wedge
-from worldsim.judge.connectivity import Reach, rounds_to_all
+from worldsim.judge.connectivity import Connectivity, rounds_to_all
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge
 
@@ -46,7 +46,7 @@ def claimed(ticks: list[Tick], agent: int, place: tuple[int, int], from_s: float
 def test_how_long_it_takes_until_a_team_must_have_settled(
     loss_percent: float, horizon_s: float
 ) -> None:
-    reach = Reach(wedge(AGENTS))
+    reach = Connectivity(wedge(AGENTS))
     reach.note({"kind": "netem", "conditions": {"loss_percent": loss_percent}})
     settled_s = reach.detection_s(2) + 2.0 * reach.everybody_s(AGENTS, 2)
     assert settled_s == pytest.approx(horizon_s, abs=0.6)
@@ -60,7 +60,7 @@ def test_nothing_reaches_everybody_where_all_is_lost() -> None:
 def test_components_follow_range_and_partition() -> None:
     (tick, *_) = flight(4)
     line = replace(tick, position=np.array([[k, 0, 0] for k in (0, 1, 2, 9)], dtype=np.float32))
-    reach = Reach(wedge(4))
+    reach = Connectivity(wedge(4))
     assert reach.components(line).members() == [[0, 1, 2, 3]]
     reach.note({"kind": "netem", "conditions": {"range_m": 1.5}})
     assert reach.components(line).members() == [[0, 1, 2], [3]]

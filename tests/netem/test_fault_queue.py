@@ -3,7 +3,7 @@
 import msgspec
 import pytest
 
-from netem.fault_queue import OrderBook
+from netem.fault_queue import FaultQueue
 from netem.medium import Medium
 from netem.messages import Changed, Conditions, Healed, MediumSetup, Orders, Parted
 from netem.wire.frame import Outgoing, Transmission, WireError
@@ -12,7 +12,7 @@ CHANGED, PARTED, HEALED = Changed(Conditions(loss_percent=100.0)), Parted(((0,),
 
 
 def test_orders_wait_for_their_slot_and_come_once_in_turn() -> None:
-    book = OrderBook()
+    book = FaultQueue()
     for slot, order in ((8, CHANGED), (8, PARTED), (12, HEALED)):
         book.take(msgspec.json.encode(Orders(slot, (order,))))
     assert book.due(7) == []
@@ -27,7 +27,7 @@ def test_orders_wait_for_their_slot_and_come_once_in_turn() -> None:
 )
 def test_what_is_no_order_is_refused(data: bytes) -> None:
     with pytest.raises(WireError, match="malformed"):
-        OrderBook().take(data)
+        FaultQueue().take(data)
 
 
 def test_the_medium_obeys() -> None:
@@ -37,10 +37,10 @@ def test_the_medium_obeys() -> None:
     def fate(slot: int, *orders: Changed | Parted | Healed) -> str:
         for order in orders:
             medium.obey(order)
-        before = medium.verdicts(slot).fates
+        before = medium.counters(slot).fates
         medium.transmit(0, 0.0, Transmission(slot, 0, (Outgoing(0, b"x"),)))
         medium.collect(1, 1.0)
-        after = medium.verdicts(slot).fates
+        after = medium.counters(slot).fates
         return next(name for name in after if after[name] > before[name])
 
     assert fate(0) == "delivered"

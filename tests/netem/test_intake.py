@@ -27,10 +27,10 @@ def intake():
 @settings(derandomize=True, deadline=None, max_examples=300)
 @given(st.lists(st.tuples(st.integers(0, 2), st.binary(max_size=60)), max_size=20))
 def test_junk_is_refused_and_counted(junk):
-    desk = intake()
-    taken = [desk.take(sender, data, 40) for sender, data in junk]
-    assert sum(each is None for each in taken) == desk.rejected.total()
-    assert set(desk.rejected) <= CAUSES
+    server = intake()
+    taken = [server.take(sender, data, 40) for sender, data in junk]
+    assert sum(each is None for each in taken) == server.rejected.total()
+    assert set(server.rejected) <= CAUSES
 
 
 def test_mutated_transmissions_are_refused_or_keep_every_limit():
@@ -40,9 +40,9 @@ def test_mutated_transmissions_are_refused_or_keep_every_limit():
         data = bytearray(pack(Transmission(slot, 0, said)))
         for _ in range(random.randrange(3)):
             data[random.randrange(len(data))] = random.randrange(256)
-        desk = intake()
-        taken = desk.take(slot % 3, bytes(data), slot)
-        refused.update(desk.rejected)
+        server = intake()
+        taken = server.take(slot % 3, bytes(data), slot)
+        refused.update(server.rejected)
         if taken is not None:
             assert slot - 4 <= taken.slot <= slot
             assert all(each.channel in (0, 1) for each in taken.frames)
@@ -52,43 +52,43 @@ def test_mutated_transmissions_are_refused_or_keep_every_limit():
 
 
 def test_who_is_quicker_than_the_truth_waits_for_it():
-    desk, early = intake(), Transmission(42, 0, ())
-    assert desk.take(0, pack(early), 40) is None
-    assert desk.due(0, 41) is None
-    assert desk.due(0, 42) == early
-    assert desk.due(0, 43) is None
-    assert desk.take(0, pack(early), 43) is None
-    assert desk.rejected == {"repeated": 1}
+    server, early = intake(), Transmission(42, 0, ())
+    assert server.take(0, pack(early), 40) is None
+    assert server.due(0, 41) is None
+    assert server.due(0, 42) == early
+    assert server.due(0, 43) is None
+    assert server.take(0, pack(early), 43) is None
+    assert server.rejected == {"repeated": 1}
 
 
 def test_nobody_is_a_tick_ahead_and_one_message_waits_at_most():
-    desk = intake()
-    assert desk.take(0, pack(Transmission(45, 0, ())), 40) is None
-    assert desk.rejected == {"ahead": 1}
+    server = intake()
+    assert server.take(0, pack(Transmission(45, 0, ())), 40) is None
+    assert server.rejected == {"ahead": 1}
     for slot in (41, 44):
-        assert desk.take(1, pack(Transmission(slot, 0, ())), 40) is None
-    assert desk.rejected == {"ahead": 2}
-    assert desk.due(1, 44) == Transmission(41, 0, ())
+        assert server.take(1, pack(Transmission(slot, 0, ())), 40) is None
+    assert server.rejected == {"ahead": 2}
+    assert server.due(1, 44) == Transmission(41, 0, ())
 
 
 def test_only_an_agents_present_process_is_heard():
-    desk = intake()
-    desk.incarnations = (0, 3, 0)
+    server = intake()
+    server.incarnations = (0, 3, 0)
     for other in (2, 4, 2**52):
-        assert desk.take(1, pack(Transmission(40, other, ())), 40) is None
-    assert desk.rejected == {"incarnation": 3}
-    assert desk.take(1, pack(Transmission(40, 3, ())), 40) is not None
+        assert server.take(1, pack(Transmission(40, other, ())), 40) is None
+    assert server.rejected == {"incarnation": 3}
+    assert server.take(1, pack(Transmission(40, 3, ())), 40) is not None
 
 
 def test_what_is_too_much_is_refused_before_it_is_read():
-    desk = intake()
-    assert desk.take(0, bytes(MAX_TRANSMISSION_B + 1), 40) is None
-    assert desk.rejected == {"oversize": 1}
+    server = intake()
+    assert server.take(0, bytes(MAX_TRANSMISSION_B + 1), 40) is None
+    assert server.rejected == {"oversize": 1}
     many = Transmission(40, 0, (Outgoing(0, b""),) * (MAX_OUTGOING + 1))
     large = Transmission(40, 0, (Outgoing(0, bytes(MAX_PAYLOAD_B + 1)),))
     for message in (many, large):
-        assert desk.take(0, pack(message), 40) is None
-    assert desk.rejected == {"oversize": 1, "malformed": 2}
-    desk.incarnations = (2**53 - 1,) * 3
+        assert server.take(0, pack(message), 40) is None
+    assert server.rejected == {"oversize": 1, "malformed": 2}
+    server.incarnations = (2**53 - 1,) * 3
     greatest = Transmission(40, 2**53 - 1, (Outgoing(1, bytes(MAX_PAYLOAD_B)),) * MAX_OUTGOING)
-    assert desk.take(0, pack(greatest), 40) == greatest
+    assert server.take(0, pack(greatest), 40) == greatest

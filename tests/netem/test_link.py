@@ -67,8 +67,8 @@ def test_delay_is_uniform(frames):
 
 def test_delay_of_what_survives_is_uniform_too(frames):
     link = LinkModel(delay_ms=100.0, jitter_ms=40.0, loss_percent=50.0)
-    verdicts = [verdict(link, 1.0, each) for each in frames]
-    delays = [each.delay_s for each in verdicts if each.cause is Cause.DELIVERED]
+    medium_counters = [verdict(link, 1.0, each) for each in frames]
+    delays = [each.delay_s for each in medium_counters if each.cause is Cause.DELIVERED]
     assert kolmogorov_smirnov(delays, uniform(0.060, 0.140)) < 1.95 / sqrt(len(delays))
 
 

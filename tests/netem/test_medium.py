@@ -42,9 +42,11 @@ def said(*payloads, channel=LOCAL, incarnation=0, slot=0):
 
 
 def books_balance(radio):
-    verdicts = radio.verdicts(0)
-    assert verdicts.addressed == sum(verdicts.fates.values()) + verdicts.in_flight
-    assert min(*verdicts.fates.values(), verdicts.in_flight) >= 0
+    medium_counters = radio.counters(0)
+    assert (
+        medium_counters.addressed == sum(medium_counters.fates.values()) + medium_counters.in_flight
+    )
+    assert min(*medium_counters.fates.values(), medium_counters.in_flight) >= 0
 
 
 def test_bytes_are_counted_by_who_sent_them_and_on_which_channel():
@@ -52,7 +54,7 @@ def test_bytes_are_counted_by_who_sent_them_and_on_which_channel():
     radio.transmit(1, 0.0, said(b"four", b"seven b"))
     radio.transmit(1, 0.5, said(b"far", channel=MULTIHOP, incarnation=1))
     radio.transmit(3, 0.5, said(b"near"))
-    assert radio.verdicts(0).spoken_b == (0, 0, 11, 3, 0, 0, 4, 0, 0, 0)
+    assert radio.counters(0).spoken_b == (0, 0, 11, 3, 0, 0, 4, 0, 0, 0)
 
 
 agents = st.integers(0, AGENTS - 1)
@@ -90,14 +92,14 @@ def test_every_frame_has_one_fate_or_is_in_flight(sequence, seed):
         came += len(radio.collect(receiver, 1e9))
     books_balance(radio)
     assert radio.in_flight == 0
-    assert radio.verdicts(0).fates["delivered"] == came
+    assert radio.counters(0).fates["delivered"] == came
 
 
 def test_the_departed_take_what_was_in_flight_to_them_along():
     radio = medium(Conditions(delay_ms=100.0))
     radio.transmit(0, 0.0, said(b"a", b"b"))
     radio.discard(1)
-    fates = radio.verdicts(0).fates
+    fates = radio.counters(0).fates
     assert fates["dropped_medium"] == 2
     assert radio.in_flight == 2 * (AGENTS - 2)
     assert radio.collect(1, 1e9) == ()
@@ -231,7 +233,7 @@ def test_half_of_100_000_packets_get_through():
         radio.transmit(0, slot * SLOT_S, said(*[b"x"] * 50))
         came += len(radio.collect(1, slot * SLOT_S))
     assert abs(came / 100_000 - 0.5) < BOUND
-    assert radio.verdicts(0).fates["dropped_loss"] == 100_000 - came
+    assert radio.counters(0).fates["dropped_loss"] == 100_000 - came
 
 
 def test_two_receivers_of_the_same_frames_lose_others():
@@ -249,7 +251,7 @@ def test_range_is_a_hard_disc_round_the_true_position():
     radio = medium(Conditions(range_m=3.0), agents=4, positions=where)
     radio.transmit(0, 0.0, said(b"x"))
     assert [len(radio.collect(who, 1.0)) for who in range(4)] == [0, 1, 0, 0]
-    assert radio.verdicts(0).fates["dropped_range"] == 2
+    assert radio.counters(0).fates["dropped_range"] == 2
 
 
 def test_it_is_the_position_at_the_moment_of_sending_that_counts():
@@ -268,7 +270,7 @@ def test_who_is_not_in_the_world_neither_hears_nor_is_heard():
     radio.transmit(1, 0.0, said(b"y"))
     heard = [[f.payload for f in radio.collect(who, 1.0)] for who in range(3)]
     assert heard == [[], [], [b"x"]]
-    assert radio.verdicts(0).fates["dropped_range"] == 3
+    assert radio.counters(0).fates["dropped_range"] == 3
 
 
 def test_before_anybody_is_placed_nobody_hears():

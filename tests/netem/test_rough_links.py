@@ -9,8 +9,8 @@ from netem.link import Cause, LinkModel, Memory, Verdict, edge_m, received, verd
 from netem.medium import Medium
 from netem.messages import Conditions, DirectedLink, GilbertElliott, MediumSetup, PathLoss
 from netem.random_draws import SHAPES, WIDEST, correlated
-from netem.range_index import LARGE, Neighbourhood
-from netem.rate_queue import Air
+from netem.range_index import LARGE, RangeIndex
+from netem.rate_queue import RateQueue
 from netem.wire.frame import LOCAL, MULTIHOP, Outgoing, Transmission
 
 EDGE = PathLoss(3.0, 40.0, 70.0)
@@ -51,10 +51,10 @@ def test_a_rate_is_the_senders_and_each_channel_has_its_own():
 def test_what_finds_the_queue_full_is_dropped_for_all():
     made = radio(rate_kbit=10.0, limit=2)
     say(made, 0.0, *[bytes(125)] * 5)
-    assert made.verdicts(0).fates["dropped_queue"] == 3 * 2
+    assert made.counters(0).fates["dropped_queue"] == 3 * 2
     assert len(made.collect(1, 1.0)) == 2
     say(made, 0.15, *[bytes(125)] * 5)
-    assert made.verdicts(0).fates["dropped_queue"] == 3 * 2 + 4 * 2
+    assert made.counters(0).fates["dropped_queue"] == 3 * 2 + 4 * 2
 
 
 def test_a_link_with_a_rate_of_its_own_has_a_queue_of_its_own():
@@ -62,11 +62,11 @@ def test_a_link_with_a_rate_of_its_own_has_a_queue_of_its_own():
     say(made, 0.0, bytes(125), bytes(125))
     assert len(made.collect(2, 0.0)) == 2
     assert [len(made.collect(1, now_s)) for now_s in (0.0999, 0.1001, 9.0)] == [0, 1, 0]
-    assert made.verdicts(0).fates["dropped_queue"] == 1
+    assert made.counters(0).fates["dropped_queue"] == 1
 
 
 def test_a_backlog_goes_out_at_the_rate_that_holds_by_then():
-    air = Air()
+    air = RateQueue()
     for _ in range(10):
         air.enter(0.0, 1000, rate_kbit=1.0, limit=100)  # 8 s each
     assert air.enter(1.0, 1000, rate_kbit=800.0, limit=100) == pytest.approx(11 * 0.01)
@@ -74,13 +74,13 @@ def test_a_backlog_goes_out_at_the_rate_that_holds_by_then():
 
 
 def test_a_rate_next_to_nothing_is_got_over():
-    air = Air()
+    air = RateQueue()
     assert air.enter(0.0, 1000, rate_kbit=5e-324, limit=2) == inf
     assert air.enter(1.0, 1000, rate_kbit=800.0, limit=2) == pytest.approx(0.02)
 
 
 def test_an_idle_queue_starts_anew():
-    air = Air()
+    air = RateQueue()
     assert air.enter(1.0, 125, 10.0, 9) == pytest.approx(0.1)
     assert air.enter(1.05, 125, 10.0, 9) == pytest.approx(0.15)
     assert air.enter(7.0, 125, 10.0, 9) == pytest.approx(0.1)
@@ -90,7 +90,7 @@ def test_a_duplicate_is_one_more_and_comes_like_the_first():
     made = radio(duplicate_percent=100.0, delay_ms=10.0)
     say(made, 0.0, b"a", b"b")
     assert [frame.payload for frame in made.collect(1, 1.0)] == [b"a", b"a", b"b", b"b"]
-    told = made.verdicts(0)
+    told = made.counters(0)
     assert (told.sent, told.addressed, told.duplicated) == (2, 8, 4)
 
 
@@ -107,7 +107,7 @@ def test_a_corrupted_frame_has_one_bit_turned_and_is_delivered():
     assert len(bits) > 300
     say(made, 600.0, b"")
     assert made.collect(1, 600.0)[0].payload == b""
-    assert made.verdicts(0).corrupted == 2 * 500
+    assert made.counters(0).corrupted == 2 * 500
 
 
 def test_what_is_reordered_skips_the_delay():
@@ -182,7 +182,7 @@ def test_walking_and_arrays_find_the_same_neighbours(seed):
     places = [tuple(random.uniform(-3.0, 3.0) for _ in range(3)) for _ in range(radios)]
     places[random.randrange(radios)] = None
     few, many = tuple(range(LARGE - 1)), tuple(range(radios))
-    by_hand, by_array = Neighbourhood(radios, few), Neighbourhood(radios, many)
+    by_hand, by_array = RangeIndex(radios, few), RangeIndex(radios, many)
     for made in (by_hand, by_array):
         made.place(tuple(places))
     for source in range(radios):

@@ -47,8 +47,8 @@ def conditions(both, local, multihop, link=()):
 def test_a_links_own_table_wins_over_its_channels_and_that_over_both(both, local, multihop, own):
     schedule = Schedule(conditions(both, local, multihop, (DirectedLink(source=2, to=5, **own),)))
     for channel, table in ((LOCAL, local), (MULTIHOP, multihop)):
-        own_air = any(key in own for key in AIR)
-        assert schedule.model(channel, 2, 5) == LinkModel(**(both | table | own), own_air=own_air)
+        own_rate = any(key in own for key in AIR)
+        assert schedule.model(channel, 2, 5) == LinkModel(**(both | table | own), own_rate=own_rate)
         assert schedule.model(channel, 5, 2) == LinkModel(**(both | table))
         assert schedule.model(channel, 0, 1) == LinkModel(**(both | table))
 
@@ -96,7 +96,7 @@ def test_a_change_meets_later_frames_and_not_those_in_flight():
     made.change(Conditions(loss_percent=100.0))
     say(made, 0.05)
     assert [len(made.collect(who, 1.0)) for who in (1, 2)] == [1, 1]
-    assert made.verdicts(0).fates["dropped_loss"] == 2
+    assert made.counters(0).fates["dropped_loss"] == 2
 
 
 def test_a_partition_cuts_later_frames_and_a_heal_ends_it():
@@ -107,7 +107,7 @@ def test_a_partition_cuts_later_frames_and_a_heal_ends_it():
     made.obey(Healed())
     say(made, 0.06)
     assert [len(made.collect(who, 1.0)) for who in (1, 2)] == [3, 2]
-    fates = made.verdicts(0).fates
+    fates = made.counters(0).fates
     assert (fates["dropped_partition"], fates["delivered"]) == (1, 5)
 
 
@@ -117,6 +117,6 @@ def test_what_is_in_flight_to_a_radio_that_goes_is_dropped_by_the_medium():
     made.place(((0.0, 0.0, 0.0), None, (0.0, 0.0, 0.0)))
     say(made, 0.05)
     assert [len(made.collect(who, 1.0)) for who in (1, 2)] == [0, 2]
-    told = made.verdicts(0)
+    told = made.counters(0)
     assert (told.fates["dropped_medium"], told.fates["dropped_range"]) == (1, 1)
     assert told.addressed == sum(told.fates.values()) + told.in_flight

@@ -94,8 +94,8 @@ def test_shards_have_the_verdicts_the_frames_and_the_digest_of_one_medium(owners
                 assert shard.collect(who, now_s) == whole.collect(who, now_s)
         digest.take(joined(shard.pages() for shard in shards))
         assert digest.value == whole.digest()
-    told = whole.verdicts(0)
-    parts = [shard.verdicts(0) for shard in shards]
+    told = whole.counters(0)
+    parts = [shard.counters(0) for shard in shards]
     assert all((part.sent, part.spoken_b) == (told.sent, told.spoken_b) for part in parts)
     for name in ("addressed", "in_flight", "duplicated", "corrupted"):
         assert sum(getattr(part, name) for part in parts) == getattr(told, name)
@@ -116,7 +116,7 @@ def test_verdicts_do_not_depend_on_the_order_in_which_agents_speak(seed, shuffle
             ]
         )
     assert heard[0] == heard[1]
-    one, other = plain.verdicts(0), mixed.verdicts(0)
+    one, other = plain.counters(0), mixed.counters(0)
     assert (one.fates, one.in_flight, one.duplicated) == (
         other.fates,
         other.in_flight,
@@ -130,7 +130,7 @@ def test_under_all_conditions_every_frame_has_one_fate_or_is_in_flight(seed):
     medium, came, books = Medium(setup()), 0, []
     for now_s in played([medium], seed, slots=100):
         came += sum(len(medium.collect(who, now_s)) for who in range(AGENTS))
-        told = medium.verdicts(0)
+        told = medium.counters(0)
         books.append(told)
         assert told.addressed == sum(told.fates.values()) + told.in_flight
         assert told.addressed == told.sent * (AGENTS - 1) + told.duplicated

@@ -16,7 +16,7 @@ import zenoh
 from agent.codec import decode_observation, encode
 from agent.messages import Command, Telemetry
 from netem.wire.access import login_of
-from netem.wire.bus import Post, Put
+from netem.wire.bus import Bus, Put
 from netem.wire.frame import Frame, Outgoing, Transmission, pack
 from netem.wire.keys import Keys
 from netem.wire.latency import Tally
@@ -53,16 +53,16 @@ def flood(run: Path, agent: int, seconds: float, forged: bool) -> dict[str, int]
     """Flood, and return how many messages were put on each topic."""
     fleet, login = fleet_of(run), login_of(run / USERS, f"agent-{agent}")
     with open_client(fleet.endpoint, login=login) as session:
-        post, random = Post(session, Keys(fleet.run)), Random(1)
-        puts = [(post.putter(topic, agent), cycle(_mixed(topic, random))) for topic in SAYS]
-        seen = post.ring("observation", agent)
+        bus, random = Bus(session, Keys(fleet.run)), Random(1)
+        puts = [(bus.putter(topic, agent), cycle(_mixed(topic, random))) for topic in SAYS]
+        seen = bus.ring("observation", agent)
         begun, sent, pause = time.monotonic(), 0, threading.Event()
         while (now_s := time.monotonic() - begun) < seconds:
             for put, messages in puts:
                 _burst(put, messages, int(now_s * RATE_HZ) - sent)
             sent = int(now_s * RATE_HZ)
             if forged:
-                _forge(post, agent, seen.drain(1))
+                _forge(bus, agent, seen.drain(1))
             pause.wait(BURST_S)
     return dict.fromkeys(SAYS, sent)
 
@@ -83,11 +83,11 @@ def _burst(put: Put, messages: "cycle[bytes]", count: int) -> None:
         put(next(messages))
 
 
-def _forge(post: Post, agent: int, observed: list[bytes]) -> None:
+def _forge(bus: Bus, agent: int, observed: list[bytes]) -> None:
     for data in observed:
         slot = decode_observation(data).slot
         for topic, make in SAYS.items():
-            post.putter(topic, agent)(make(slot))
+            bus.putter(topic, agent)(make(slot))
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ import pytest
 import zenoh
 
 from netem.wire.access import MOST_B, AccessError, Guard, login_of, write_users
-from netem.wire.bus import Post, Ring, receive
+from netem.wire.bus import Bus, Ring, receive
 from netem.wire.keys import Keys
 from netem.wire.session import SessionError, open_client, open_router
 from tests.processes.harness import QSWARM, Started, eventually
@@ -57,7 +57,7 @@ def test_without_a_password_nobody_comes_in(
 def test_an_agent_hears_its_own_radio_and_nothing_else(
     session_of: Callable[[str], zenoh.Session],
 ) -> None:
-    world, spy = Post(session_of("world"), KEYS), session_of("agent-0")
+    world, spy = Bus(session_of("world"), KEYS), session_of("agent-0")
     own = Ring(spy, KEYS.of("rx", 0), 4)
     others = [Ring(spy, key, 64) for key in (KEYS.of("rx", 1), KEYS.every("rx"), "qswarm/**")]
     puts = [world.putter(topic, agent, lockstep=True) for topic in ("rx",) for agent in (0, 1)]
@@ -86,7 +86,7 @@ def puts_reach(ring: Ring, put: Callable[[bytes], None]) -> bool:
 def test_an_agent_says_nothing_in_anybody_elses_name(
     session_of: Callable[[str], zenoh.Session],
 ) -> None:
-    listener, agent = session_of("world"), Post(session_of("agent-0"), KEYS)
+    listener, agent = session_of("world"), Bus(session_of("agent-0"), KEYS)
     own = Ring(listener, KEYS.of("command", 0), 64)
     topics = [(topic, 1) for topic in ("command", "tx", "arrivals", "rx", "observation")]
     # Nor does it tell itself what only the world and the radio do.
@@ -106,7 +106,7 @@ def test_what_is_too_long_goes_no_further_than_the_router(
     session_of: Callable[[str], zenoh.Session], topic: str
 ) -> None:
     heard = Ring(session_of("world"), KEYS.of(topic, 0), 64)
-    put = Post(session_of("agent-0"), KEYS).putter(topic, 0)
+    put = Bus(session_of("agent-0"), KEYS).putter(topic, 0)
     eventually(lambda: puts_reach(heard, put), 5.0)
     longest = bytes(MOST_B[topic])
     put(longest + b"x")
@@ -122,16 +122,16 @@ def test_what_an_agent_says_is_heard_and_not_by_itself(
 ) -> None:
     agent = session_of("agent-0")
     heard, echo = Ring(session_of("world"), KEYS.of(topic, 0), 64), Ring(agent, "qswarm/**", 64)
-    put = Post(session_of("agent-0"), KEYS).putter(topic, 0)
+    put = Bus(session_of("agent-0"), KEYS).putter(topic, 0)
     eventually(lambda: puts_reach(heard, put), 5.0)
     assert echo.drain(64) == []
 
 
 def test_an_operator_asks_and_does_no_more(session_of: Callable[[str], zenoh.Session]) -> None:
     world, operator = session_of("world"), session_of("operator")
-    questions = Post(world, KEYS).questions("control")
+    questions = Bus(world, KEYS).questions("control")
     over = Ring(world, KEYS.of("over"), 4)
-    asking = Post(operator, KEYS)
+    asking = Bus(operator, KEYS)
     asking.putter("over")(b"forged")
 
     def answered() -> bool:

@@ -33,10 +33,10 @@ SOMEBODY_NEVER_COMES = """
 from worldsim.commands.app import main
 from worldsim.fleet import launcher, process
 
-def wait(muster, speed, unwanted, outside):
-    outside.missing(["agent-3"])
+def wait(startup, speed, unwanted, launcher_link):
+    launcher_link.missing(["agent-3"])
     while not unwanted():
-        outside.wait(0.02)
+        launcher_link.wait(0.02)
     return False
 
 launcher.PATIENCE_S = 0.1

@@ -87,7 +87,7 @@ def test_a_clean_run_is_that_of_virtual_time_and_passes(
     assert summary["trace_sha256"] == flight.loop.trace.sha256
     assert summary["late_tick_fraction"] is None
     assert summary["real_time_factor"] > 0.0
-    assert summary["packets"]["delivered"] == flight.verdicts.fates["delivered"]
+    assert summary["packets"]["delivered"] == flight.medium_counters.fates["delivered"]
     from worldsim.recording.verify import verify  # noqa: PLC0415 - a second that other tests save
 
     verification = verify(run)
@@ -103,8 +103,8 @@ def test_whatever_befalls_a_fleet_befalls_it_as_in_virtual_time(
     summary, flight = summary_of(run), fly(load(Path(rough(6.0))))
     assert summary["duration_s"] == 6.0, summary["reason"]
     assert summary["trace_sha256"] == flight.loop.trace.sha256
-    told = {name: summary["packets"][name] for name in flight.verdicts.packets()}
-    assert told == flight.verdicts.packets()
+    told = {name: summary["packets"][name] for name in flight.medium_counters.packets()}
+    assert told == flight.medium_counters.packets()
     assert {each.partition("-")[2] for each in pids(run) if each.startswith("netem-")} == {
         str(shard) for shard in range(1, shards)
     }

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from netem.messages import Conditions, MediumSetup
-from netem.wire.bus import Post, RefusedError
+from netem.wire.bus import Bus, RefusedError
 from netem.wire.keys import Keys
 from netem.wire.session import SessionError, open_client, open_router
 from tests.processes.harness import Started
@@ -47,7 +47,7 @@ def test_netem_serves_the_run_that_asks_first_and_refuses_a_second(
     netem.says("netem listens at")
     question = msgspec.json.encode(MediumSetup(1, 2, 4, 80.0, Conditions()))
     with open_client(endpoint) as session:
-        first, second = Post(session, Keys("first")), Post(session, Keys("second"))
+        first, second = Bus(session, Keys("first")), Bus(session, Keys("second"))
         assert first.ask("medium", None, question, timeout_s=5.0) == b""
         with pytest.raises(RefusedError, match="serves run 'first' already"):
             second.ask("medium", None, question, timeout_s=5.0)
@@ -60,7 +60,7 @@ def test_netem_refuses_conditions_that_make_no_sense(start: Start, endpoint: str
     netem = start(*PYTHON, "netem", "--listen", endpoint)
     netem.says("netem listens at")
     with open_client(endpoint) as session, pytest.raises(RefusedError, match="conditions: "):
-        Post(session, Keys("odd")).ask("medium", None, b'{"seed": -1}', timeout_s=5.0)
+        Bus(session, Keys("odd")).ask("medium", None, b'{"seed": -1}', timeout_s=5.0)
 
 
 def test_a_fleet_started_by_a_shell_loop_passes(

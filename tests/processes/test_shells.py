@@ -10,11 +10,12 @@ from netem.free_running import Intake, Lateness
 from netem.messages import Conditions, MediumSetup
 from netem.wire.bus import RefusedError
 from netem.wire.frame import MAX_TRANSMISSION_B, Outgoing, Transmission, pack
-from worldsim.fleet.ipc import Lines
+from worldsim.fleet import startup
+from worldsim.fleet.ipc import MessageSocket
 from worldsim.fleet.launcher_link import ByHand, Conducted, Loss
 from worldsim.fleet.pacing import Pacer, Punctuality
-from worldsim.fleet.process_table import Roster, processes
-from worldsim.fleet.startup import MusterError, assemble, shortened
+from worldsim.fleet.process_table import ProcessTable, processes
+from worldsim.fleet.startup import StartupError, assemble, shortened
 from worldsim.results.run_folder import RunDirectoryError
 
 
@@ -114,7 +115,7 @@ def test_batches_that_leave_before_they_are_due_are_not_late() -> None:
 
 
 def test_lines_cross_whole_and_in_order_until_an_end_closes() -> None:
-    near, far = Lines.pair()
+    near, far = MessageSocket.pair()
     assert far.receive() == []
     near.send(spawn=1)
     near.offer(progress={"time_s": 0.5})
@@ -128,7 +129,7 @@ def test_lines_cross_whole_and_in_order_until_an_end_closes() -> None:
 
 
 def test_an_offer_to_an_end_that_does_not_read_does_not_wait() -> None:
-    near, far = Lines.pair()
+    near, far = MessageSocket.pair()
     for count in range(20_000):
         near.offer(count=count)
     assert 0 < len(far.receive()) < 20_000
@@ -137,9 +138,9 @@ def test_an_offer_to_an_end_that_does_not_read_does_not_wait() -> None:
 
 
 def test_a_roster_tells_the_living_from_those_whose_pid_came_back(tmp_path: Path) -> None:
-    roster = Roster(tmp_path, "mine", "tcp/127.0.0.1:7447")
-    roster.add("self", os.getpid())
-    roster.write()
+    table = ProcessTable(tmp_path, "mine", "tcp/127.0.0.1:7447")
+    table.add("self", os.getpid())
+    table.write()
     assert processes(tmp_path) == [("self", os.getpid(), True)]
     file = tmp_path / "fleet.json"
     file.write_text(file.read_text().replace('"started": ', '"started": 1'))
@@ -160,8 +161,8 @@ def test_long_lists_of_names_are_shortened() -> None:
     assert shortened(names) == [*names[:5], "4 more"]
 
 
-class SparseMuster:
-    """A muster to which some never come, or whose medium refuses."""
+class SparseStartup:
+    """A start-up to which some never come, or whose medium refuses."""
 
     def __init__(self, missing: list[str], refusal: str | None = None) -> None:
         self._missing = missing
@@ -179,30 +180,30 @@ class SparseMuster:
         return self._missing
 
 
-def test_a_muster_ends_when_all_are_there_or_nobody_wants_it() -> None:
-    outside = ByHand(list)
-    assert assemble(SparseMuster([]), 1.0, lambda: False, outside)
-    assert not assemble(SparseMuster(["agent-1"]), 1.0, lambda: True, outside)
+def test_a_start_up_ends_when_all_are_there_or_nobody_wants_it() -> None:
+    launcher = ByHand(list)
+    assert assemble(SparseStartup([]), 1.0, lambda: False, launcher)
+    assert not assemble(SparseStartup(["agent-1"]), 1.0, lambda: True, launcher)
 
 
-def test_a_muster_says_who_did_not_come(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(startup, "MUSTER_WITHIN_S", 0.05)
-    with pytest.raises(MusterError, match=r"not there within 0\.05 s: agent-1"):
-        assemble(SparseMuster(["agent-1"]), 1.0, lambda: False, ByHand(list))
+def test_a_start_up_says_who_did_not_come(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(startup, "STARTUP_WITHIN_S", 0.05)
+    with pytest.raises(StartupError, match=r"not there within 0\.05 s: agent-1"):
+        assemble(SparseStartup(["agent-1"]), 1.0, lambda: False, ByHand(list))
 
 
-def test_a_muster_says_why_the_medium_refuses() -> None:
-    with pytest.raises(MusterError, match="netem refuses: serves another"):
-        assemble(SparseMuster([], "serves another"), 1.0, lambda: False, ByHand(list))
+def test_a_start_up_says_why_the_medium_refuses() -> None:
+    with pytest.raises(StartupError, match="netem refuses: serves another"):
+        assemble(SparseStartup([], "serves another"), 1.0, lambda: False, ByHand(list))
 
 
 def test_by_hand_the_death_of_the_medium_is_nobody_elses() -> None:
     news = [["agent-2"], ["agent-0", "netem", "agent-1"]]
-    outside = ByHand(lambda: news.pop(0))
-    assert outside.losses() == [Loss(2)]
-    assert outside.stopped is None
-    assert outside.losses() == []
-    assert outside.stopped == "netem is gone"
+    launcher = ByHand(lambda: news.pop(0))
+    assert launcher.losses() == [Loss(2)]
+    assert launcher.stopped is None
+    assert launcher.losses() == []
+    assert launcher.stopped == "netem is gone"
 
 
 def test_by_hand_no_process_is_touched() -> None:
@@ -211,18 +212,18 @@ def test_by_hand_no_process_is_touched() -> None:
 
 
 def test_under_a_launcher_losses_come_by_lines_and_its_end_is_the_end() -> None:
-    near, far = Lines.pair()
-    outside = Conducted(far)
+    near, far = MessageSocket.pair()
+    launcher = Conducted(far)
     near.send(done="kill", whom=[[3, 1]])
     near.send(lost=[3, 1, 9, None])
-    outside.wait(5.0)
-    assert outside.losses() == [Loss(3, incarnation=1, signal=9)]
-    outside.act("pause", [(2, 0)])
-    outside.act("resume", [])
+    launcher.wait(5.0)
+    assert launcher.losses() == [Loss(3, incarnation=1, signal=9)]
+    launcher.act("pause", [(2, 0)])
+    launcher.act("resume", [])
     assert near.receive() == [{"do": "pause", "whom": [[2, 0]], "after_s": 0.0}]
-    assert outside.stopped is None
+    assert launcher.stopped is None
     near.close()
-    outside.wait(5.0)
-    assert outside.losses() == []
-    assert outside.stopped == "the launcher is gone"
+    launcher.wait(5.0)
+    assert launcher.losses() == []
+    assert launcher.stopped == "the launcher is gone"
     far.close()

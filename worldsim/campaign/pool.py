@@ -17,11 +17,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from netem.wire.stop import Stop
+from netem.wire.shutdown import Stop
 from worldsim.engine.step import SlotLoop
 from worldsim.engine.virtual import fly
 from worldsim.results.run_folder import RunDirectory
-from worldsim.results.sinks import notebook
+from worldsim.results.sinks import open_sinks
 from worldsim.results.summary import summarise
 from worldsim.scenario.tables import Scenario
 
@@ -47,7 +47,7 @@ def simulate(
     """
     scenario = job.scenario
     directory = RunDirectory.create(job.folder, scenario)
-    notes = notebook(directory, scenario, directory.path.name, "virtual", job.recording)
+    notes = open_sinks(directory, scenario, directory.path.name, "virtual", job.recording)
     try:
         flight = fly(scenario, notes, on_progress=on_progress, unwanted=lambda: stop.asked)
     finally:
@@ -57,7 +57,7 @@ def simulate(
         scenario,
         flight.loop,
         mode="virtual",
-        verdicts=flight.verdicts,
+        medium_counters=flight.medium_counters,
         late_tick_fraction=0.0,
         real_time_factor=flown_s / flight.wall_s,
         duration_s=flown_s,

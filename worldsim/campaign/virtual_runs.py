@@ -3,9 +3,8 @@
 from collections import Counter
 from pathlib import Path
 
-from netem.wire.stop import Stop
+from netem.wire.shutdown import Stop, stoppable
 from worldsim.campaign.pool import Job, Summary, over_all, simulate, sweep
-from worldsim.fleet.interruption import stoppable
 from worldsim.results.run_folder import RunDirectoryError, make_folder, write_json
 from worldsim.results.summary import EXIT_STATUS, INTERRUPTED
 from worldsim.results.verdict_text import ProgressLine, table, verdict

@@ -1,18 +1,20 @@
-"""What the radio carried for each agent: whom it heard directly, and how much it said.
+"""Counters of a run for each agent: direct links, bytes sent, messages rejected by cause.
 
-The paper's N_c,i (Sec. 3.4): the links that an agent needs need not grow with its team.
+Direct links are the paper's N_c,i (Sec. 3.4): they need not grow with the team.
 """
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from netem.messages import Verdicts
+from agent.messages import CAUSES, Command
+from netem.messages import MediumCounters
 from netem.wire.frame import CHANNELS
 
 
-class Company:
+class RadioUse:
     """Counts for each row of a fleet; tick_hz: ticks in a second."""
 
     def __init__(self, rows: int, tick_hz: float) -> None:
@@ -40,20 +42,40 @@ class Company:
             "most": [most if steps else None for steps, _, most in stepped],
         }
 
-    def bytes_per_s(self, verdicts: Verdicts | None) -> dict[str, list[float | None]] | None:
+    def bytes_per_s(
+        self, medium_counters: MediumCounters | None
+    ) -> dict[str, list[float | None]] | None:
         """Return for each channel what each agent sent in a second of its taking part [bytes/s].
 
         Payloads alone; None where the radio told of nothing.
         """
-        if verdicts is None or not verdicts.spoken_b:
+        if medium_counters is None or not medium_counters.spoken_b:
             return None
         seconds = (self._awake_ticks / self._tick_hz).tolist()
         return {
             name: [
                 spoken / flown_s if flown_s else None
                 for spoken, flown_s in zip(
-                    verdicts.spoken_b[channel :: len(CHANNELS)], seconds, strict=True
+                    medium_counters.spoken_b[channel :: len(CHANNELS)], seconds, strict=True
                 )
             ]
             for channel, name in enumerate(CHANNELS)
         }
+
+
+class RejectionCounters:
+    """Counts by cause, as commands tell them; those of processes that are gone stay counted."""
+
+    def __init__(self) -> None:
+        self._told: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
+
+    def note(self, agent: int, command: Command) -> None:
+        """Take what an agent tells of itself."""
+        self._told[agent, command.incarnation] = command.telemetry.rejected
+
+    def by_cause(self) -> dict[str, int]:
+        """Return how many were refused for which cause, causes in alphabetical order."""
+        total: Counter[str] = Counter()
+        for told in self._told.values():
+            total.update({CAUSES[index]: count for index, count in told})
+        return dict(sorted(total.items()))

@@ -12,10 +12,20 @@ from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation, FormationSpec
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.tables import Scenario
-from worldsim.scenario.timeline import Failing, Holding, Joining, Revival, Strike
+from worldsim.scenario.timeline import (
+    Action,
+    Failing,
+    Holding,
+    Joining,
+    Order,
+    Revival,
+    Strike,
+    UponRadio,
+)
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.start_positions import StartError, room_of, starts
 from worldsim.truth.vehicle import Floats
+from worldsim.truth.world import World
 
 RANDOM_KEY = 0xFA17
 
@@ -277,3 +287,31 @@ def _placed(
         return [agent for agent, place in claims if place == formation.vertex_places[name]]
     index = [queue.name for queue in formation.queues].index(name)
     return [agent for agent, place in claims if index in formation.queues_of(place)]
+
+
+Deed = Stop | Hold | Fail | Start | Begin | UponRadio | Order
+"""What a clock carries out between slots."""
+Places = list[tuple[int, int] | None]
+
+
+def deed_of(
+    action: Action, team: Team, world: World, places: Places, formation: FormationSpec
+) -> Deed:
+    """Find out whom an action means now; places: what each last claimed, in a formation."""
+    match action:
+        case Strike():
+            return team.struck(action, places, formation)
+        case Holding():
+            return team.held(action, places, formation)
+        case Failing():
+            return team.failed(action, places, formation)
+        case Revival() | Joining():
+            return _come(action, team, world)
+    return action
+
+
+def _come(action: Revival | Joining, team: Team, world: World) -> Start:
+    position, time_s = world.fleet.position, world.time_s
+    if isinstance(action, Revival):
+        return team.revived(action, position, time_s)
+    return team.joined(action, position, time_s)

@@ -13,12 +13,10 @@ import msgspec
 import numpy as np
 
 from agent.messages import Command, Observation, Vector
-from worldsim.engine.counters import Company
-from worldsim.engine.meaning import Deed, deed_of
-from worldsim.engine.membership import Begin, Fail, Hold, Start, Stop, Team
+from worldsim.engine.counters import RadioUse, RejectionCounters
+from worldsim.engine.membership import Begin, Deed, Fail, Hold, Start, Stop, Team, deed_of
 from worldsim.engine.missions import Orders
-from worldsim.engine.refusals import Refusals
-from worldsim.engine.telemetry import UNTOLD, tick_of, told_by
+from worldsim.engine.telemetry import NO_TELEMETRY, tick_of, told_by
 from worldsim.engine.trace import Trace
 from worldsim.judge.tick import Packets, Tick
 from worldsim.judge.verdict import Figures, Judge
@@ -108,7 +106,7 @@ class SlotLoop:
         self.team = Team(scenario)
         self.timeline = Timeline(scenario)
         self.orders = Orders()
-        self.company = Company(scenario.rows, scenario.fleet.tick_hz)
+        self.radio_use = RadioUse(scenario.rows, scenario.fleet.tick_hz)
         self._planned: dict[str, Any] = {}
         self._formation = scenario.formation
         self._recorder = recorder
@@ -116,8 +114,8 @@ class SlotLoop:
         self._packets = packets
         self._places: list[tuple[int, int] | None] = [None] * scenario.rows
         self._headings = world.fleet.yaw.tolist()
-        self._told = [UNTOLD] * scenario.rows
-        self.refusals = Refusals()
+        self._told = [NO_TELEMETRY] * scenario.rows
+        self.rejections = RejectionCounters()
 
     def due(self) -> Iterable[Deed]:
         """Return what is to happen before the present slot: do each, and ``take`` it, in turn."""
@@ -188,15 +186,15 @@ class SlotLoop:
             self.trace.command(agent, encoded)
             told = command.telemetry
             self._told[agent] = told_by(told, self._headings[agent])
-            self.company.note(agent, len(told.heard))
+            self.radio_use.note(agent, len(told.heard))
             self.orders.heard(told.mission)
             self._watch_place(agent, told.place)
             if told.rejected:
-                self.refusals.note(agent, command)
+                self.rejections.note(agent, command)
 
-    def close(self, verdicts: bytes) -> None:
+    def close(self, digest: bytes) -> None:
         """End the slot with the medium's digest: the vehicles fly through it."""
-        self.trace.verdicts(verdicts)
+        self.trace.verdicts(digest)
         self.world.advance()
 
     def finish(self) -> None:
@@ -241,7 +239,7 @@ class SlotLoop:
         for agent, (position, yaw) in start.stands.items():
             self.world.enter(agent, position, yaw)
         for agent, incarnation in start.incarnations.items():
-            self._told[agent], self._places[agent] = UNTOLD, None
+            self._told[agent], self._places[agent] = NO_TELEMETRY, None
             self.event(start.kind, agent, incarnation=incarnation, **self._planned)
         if not start.incarnations:
             refused = start.refused or "nobody to come back"
@@ -299,7 +297,7 @@ class SlotLoop:
 
     def _show(self) -> None:
         awake = self.team.awake
-        self.company.tick(awake)
+        self.radio_use.tick(awake)
         tick = tick_of(self.world, self._told, awake, self._shows, self._packets())
         self.figures = self.judge.see(tick)
         if self._recorder is not None and self._shows:

@@ -14,7 +14,7 @@ MOVING_MPS = 0.02
 NO_LINKS: NDArray[np.int32] = np.zeros((0, 2), dtype=np.int32)
 
 
-class Told(msgspec.Struct, frozen=True, gc=False):
+class TelemetryRow(msgspec.Struct, frozen=True, gc=False):
     """What an agent last told of its reasons, as a row of a tick; see Telemetry and Tick."""
 
     target: Vector
@@ -29,14 +29,14 @@ class Told(msgspec.Struct, frozen=True, gc=False):
     record_age_s: float
 
 
-UNTOLD = Told((nan, nan, nan), (-1, -1), nan, nan, (), 0, -1, -1, -1, nan)
+NO_TELEMETRY = TelemetryRow((nan, nan, nan), (-1, -1), nan, nan, (), 0, -1, -1, -1, nan)
 
 
-def told_by(telemetry: Telemetry, heading: float) -> Told:
+def told_by(telemetry: Telemetry, heading: float) -> TelemetryRow:
     """Return an agent's telemetry as its row; heading: what it observed as its own [rad]."""
-    return Told(
-        telemetry.target or UNTOLD.target,
-        telemetry.place or UNTOLD.place,
+    return TelemetryRow(
+        telemetry.target or NO_TELEMETRY.target,
+        telemetry.place or NO_TELEMETRY.place,
         telemetry.force,
         _turn_deg(telemetry.wanted, heading),
         telemetry.heard,
@@ -49,13 +49,13 @@ def told_by(telemetry: Telemetry, heading: float) -> Told:
 
 
 def tick_of(
-    world: World, told: list[Told], awake: NDArray[np.bool_], shown: bool, packets: Packets
+    world: World, told: list[TelemetryRow], awake: NDArray[np.bool_], shown: bool, packets: Packets
 ) -> Tick:
     """Return the present tick; shown: with what is recorded and not judged, links first of all.
 
     awake (N,): who steps; the others tell nothing.
     """
-    rows = [row if up else UNTOLD for row, up in zip(told, awake.tolist(), strict=True)]
+    rows = [row if up else NO_TELEMETRY for row, up in zip(told, awake.tolist(), strict=True)]
     fleet = world.fleet
     reasons = np.array([(*row.target, row.force, row.turn_deg) for row in rows], dtype=np.float32)
     attitude = np.empty((len(rows), 3), dtype=np.float32)
@@ -77,12 +77,12 @@ def tick_of(
     )
 
 
-def _links(rows: list[Told]) -> NDArray[np.int32]:
+def _links(rows: list[TelemetryRow]) -> NDArray[np.int32]:
     pairs = [(row, other) for row, each in enumerate(rows) for other in each.heard]
     return np.array(pairs, dtype=np.int32).reshape(-1, 2)
 
 
-def _standings(rows: list[Told]) -> Standings:
+def _standings(rows: list[TelemetryRow]) -> Standings:
     return Standings(
         tier=np.array([row.tier for row in rows], dtype=np.int16),
         parent=np.array([row.parent for row in rows], dtype=np.int32),

@@ -13,7 +13,7 @@ from time import perf_counter, process_time
 from agent.codec import decode_beacon, decode_command, decode_gossip, decode_observation, encode
 from agent.core import Agent, Decoders
 from netem.medium import Medium
-from netem.messages import Verdicts
+from netem.messages import MediumCounters
 from netem.wire.frame import (
     BATCH_RING,
     Batch,
@@ -23,8 +23,7 @@ from netem.wire.frame import (
     unpack_batch,
     unpack_transmission,
 )
-from worldsim.engine.meaning import Deed
-from worldsim.engine.membership import Start, Stop
+from worldsim.engine.membership import Deed, Start, Stop
 from worldsim.engine.step import Event, Opened, Recorder, SlotLoop, world_of
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.timeline import Change, Flapping, Heal, Jamming, Partition
@@ -39,7 +38,7 @@ class Flight:
     """A finished run in virtual time."""
 
     loop: SlotLoop
-    verdicts: Verdicts
+    medium_counters: MediumCounters
     rejected: int
     wall_s: float
     cpu_s: float
@@ -62,12 +61,12 @@ class VirtualFleet:
     @property
     def rejected(self) -> int:
         """Messages that agents refused to believe."""
-        return sum(self.loop.refusals.by_cause().values())
+        return sum(self.loop.rejections.by_cause().values())
 
     @property
-    def verdicts(self) -> Verdicts:
+    def medium_counters(self) -> MediumCounters:
         """The medium's counters."""
-        return self._medium.verdicts(self.loop.world.slot)
+        return self._medium.counters(self.loop.world.slot)
 
     def slot(self) -> None:
         """Run one slot: what is due before it, truth, batches, steps, verdicts, flight."""
@@ -144,7 +143,7 @@ def fly(
     fleet.loop.finish()
     return Flight(
         fleet.loop,
-        fleet.verdicts,
+        fleet.medium_counters,
         fleet.rejected,
         perf_counter() - wall,
         process_time() - cpu,

@@ -11,10 +11,9 @@ import msgspec
 import numpy as np
 import zenoh
 
-from netem.wire.bus import Post, Waiting, drained
+from netem.wire.bus import Bus, Waiting, drained
 from worldsim.engine.barriers import in_force
-from worldsim.engine.meaning import Deed
-from worldsim.engine.membership import Hold, Start, Stop
+from worldsim.engine.membership import Deed, Hold, Start, Stop
 from worldsim.engine.step import Event, SlotLoop
 from worldsim.scenario.decoding import decode
 from worldsim.scenario.event_checks import Present, broken_now
@@ -159,9 +158,9 @@ def _unsaid(keys: dict[str, Any]) -> str | None:
 class Reception:
     """Where requests come in over Zenoh, and are answered between slots."""
 
-    def __init__(self, post: Post, control: Control) -> None:
+    def __init__(self, bus: Bus, control: Control) -> None:
         self._control = control
-        self._questions: Waiting[zenoh.Query] = post.questions("control")
+        self._questions: Waiting[zenoh.Query] = bus.questions("control")
 
     def attend(self, do: Do) -> None:
         """Answer what has come, a few a slot."""

@@ -7,69 +7,72 @@ vehicles.
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+import msgspec
+
 from agent.codec import RejectedError, decode_command, encode
-from netem.messages import Truth, Verdicts
-from netem.wire.bus import Post
+from netem.messages import MediumCounters, Orders, Truth
+from netem.wire.bus import Bus
 from netem.wire.frame import WireError, pack, unpack
-from worldsim.engine.meaning import Deed
-from worldsim.engine.membership import Begin, Hold, Stop
+from worldsim.engine.membership import Begin, Deed, Hold, Start, Stop
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS
 from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
 from worldsim.fleet.control import Control, Reception
 from worldsim.fleet.delivery_latency import ArrivalBook
-from worldsim.fleet.hands import Hands
-from worldsim.fleet.launcher_link import Loss, Outside
+from worldsim.fleet.launcher_link import LauncherLink, Loss
 from worldsim.fleet.pacing import Pacer, Punctuality
-from worldsim.fleet.progress import Headway
-from worldsim.fleet.startup import Muster
+from worldsim.fleet.progress import ProgressReporter
+from worldsim.fleet.startup import Startup
 from worldsim.judge.tick import Packets
 from worldsim.scenario.tables import Scenario
+from worldsim.scenario.timeline import Change, Flapping, Heal, Jamming, Partition
 
+START_WITHIN_S = 5.0
+"""So long before the end of a long boot a process begins, which waits 30 s for word and no more."""
 REPORTS_RING = 4
 LOOK_EVERY_S = 0.25
 FINAL_VERDICTS_WITHIN_S = 1.0
 MAX_VERDICTS_B = 64 * 1024
 
 
-class Flight:
+class FreeRunningFleet:
     """A fleet in the air."""
 
     def __init__(
         self,
         scenario: Scenario,
-        post: Post,
+        bus: Bus,
         recorder: Recorder,
-        outside: Outside,
-        muster: Muster,
+        launcher: LauncherLink,
+        startup: Startup,
         speed: float,
     ) -> None:
         rows = range(scenario.rows)
         self.loop = SlotLoop(
             scenario, world_of(scenario, PROCESS_COMMAND_TICKS), recorder, self._packets
         )
-        self.verdicts: Verdicts | None = None
+        self.medium_counters: MediumCounters | None = None
         self.punctuality = Punctuality(len(rows))
         self.real_time_factor: float | None = None
         self.failure: str | None = None
         self._scenario = scenario
-        self._outside = outside
-        self._muster = muster
-        self._hands = Hands(post, muster, outside, scenario.fleet.boot_s / speed)
-        self._reception = Reception(post, Control(scenario, self.loop, outside.launches))
+        self._launcher = launcher
+        self._startup = startup
+        self._actions = ProcessActions(bus, startup, launcher, scenario.fleet.boot_s / speed)
+        self._reception = Reception(bus, Control(scenario, self.loop, launcher.launches))
         self.begun = self._landed = False
         self._refused: Counter[str] = Counter()
         self._pacer = Pacer(1.0 / (scenario.slot_hz * speed))
-        self._headway = Headway(scenario.duration_s, self.loop, outside)
-        self._truth, self._over = post.putter("truth"), post.putter("over")
-        self._observers = [post.putter("observation", agent) for agent in rows]
-        self._commands = post.rings("command", rows)
-        self._reports = post.ring("verdicts", size=REPORTS_RING)
+        self._progress_reporter = ProgressReporter(scenario.duration_s, self.loop, launcher)
+        self._truth, self._over = bus.putter("truth"), bus.putter("over")
+        self._observers = [bus.putter("observation", agent) for agent in rows]
+        self._commands = bus.rings("command", rows)
+        self._reports = bus.ring("verdicts", size=REPORTS_RING)
         clock = self.loop.world.clock
         self._book = ArrivalBook(clock.slots_per_tick, 1.0 / clock.slot_hz)
-        self._arrivals = [post.ring("arrivals", agent) for agent in rows]
+        self._arrivals = [bus.ring("arrivals", agent) for agent in rows]
         self._slots_a_report = round(clock.slot_hz)
 
     @property
@@ -80,7 +83,11 @@ class Flight:
     @property
     def delivery(self) -> dict[str, Any] | None:
         """How late frames came, as far as the agents told."""
-        delivered = self.verdicts.fates.get("delivered", 0) if self.verdicts is not None else 0
+        delivered = (
+            self.medium_counters.fates.get("delivered", 0)
+            if self.medium_counters is not None
+            else 0
+        )
         return self._book.summary(delivered)
 
     @property
@@ -107,14 +114,17 @@ class Flight:
             return
         self._landed = True
         if self.begun:
-            self._outside.landing()
+            self._launcher.landing()
         self._over(b"")
         deadline = time.monotonic() + FINAL_VERDICTS_WITHIN_S
         while (left_s := deadline - time.monotonic()) > 0.0:
             report = self._reports.wait(left_s)
             if report is not None:
                 self._read_report(report)
-            if self.verdicts is not None and self.verdicts.slot >= self.loop.world.slot:
+            if (
+                self.medium_counters is not None
+                and self.medium_counters.slot >= self.loop.world.slot
+            ):
                 break
         for agent in range(len(self._arrivals)):
             self._read_arrivals(agent)
@@ -122,14 +132,14 @@ class Flight:
     def _slot(self, unwanted: Callable[[], bool]) -> None:
         slot = self.loop.world.slot
         self._pacer.begin(slot)
-        self._muster.instruct_agents()
+        self._startup.instruct_agents()
         for deed in self.loop.due():
             self._do(deed)
         self._reception.attend(lambda deed: self._do(deed, by="operator"))
         self._send(self.loop.open())
         self._strike_out()
         while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not unwanted():
-            self._outside.wait(min(left_s, LOOK_EVERY_S))
+            self._launcher.wait(min(left_s, LOOK_EVERY_S))
             self._strike_out()
         for agent, said in self._commands.drain():
             for data in said:
@@ -140,11 +150,11 @@ class Flight:
         for agent in range(slot % self._slots_a_report, len(self._arrivals), self._slots_a_report):
             self._read_arrivals(agent)
         self.loop.close(b"")
-        self._headway.tell(self._pacer.elapsed_s, self.late_fraction)
+        self._progress_reporter.tell(self._pacer.elapsed_s, self.late_fraction)
 
     def _do(self, deed: Deed, **signed: str) -> None:
         """Carry out what happens between slots, and let it count at once."""
-        late = self._hands.do(deed, self.loop.world.slot, self.loop.team.incarnations)
+        late = self._actions.do(deed, self.loop.world.slot, self.loop.team.incarnations)
         self.loop.take(deed, **signed)
         if isinstance(deed, Stop | Hold | Begin):
             self.punctuality.forget(deed.agents)
@@ -174,7 +184,7 @@ class Flight:
 
     def _read_report(self, data: bytes) -> None:
         try:
-            self.verdicts = unpack(data, Verdicts, MAX_VERDICTS_B)
+            self.medium_counters = unpack(data, MediumCounters, MAX_VERDICTS_B)
         except WireError:
             self._refused["verdicts"] += 1
 
@@ -187,13 +197,46 @@ class Flight:
                 self._refused["arrivals"] += 1
 
     def _strike_out(self) -> None:
-        for loss in self._outside.losses():
+        for loss in self._launcher.losses():
             if self.loop.team.has(loss.agent, loss.incarnation):
                 self.loop.lost(loss.agent, **_known(loss), planned=False)
 
     def _packets(self) -> Packets:
-        return self.verdicts.packets() if self.verdicts is not None else {}
+        return self.medium_counters.packets() if self.medium_counters is not None else {}
 
 
 def _known(loss: Loss) -> dict[str, int]:
     return {key: value for key in ("signal", "status") if (value := getattr(loss, key)) is not None}
+
+
+class ProcessActions:
+    """What a flight reaches the other processes with; boot_s: on the wall clock."""
+
+    def __init__(self, bus: Bus, startup: Startup, launcher: LauncherLink, boot_s: float) -> None:
+        self._orders = bus.putter("orders")
+        self._startup = startup
+        self._launcher = launcher
+        self._after_s = max(0.0, boot_s - START_WITHIN_S)
+
+    def do(self, deed: Deed, slot: int, incarnations: Sequence[int]) -> list[int]:
+        """Carry out a deed before a slot; return the agents that should be there, and are not.
+
+        incarnations: everybody's, as they were before the deed.
+        """
+        match deed:
+            case Stop(agents=agents):
+                self._launcher.act("kill", _named(agents, incarnations))
+            case Hold(kind=kind, agents=agents):
+                self._launcher.act(kind, _named(agents, incarnations))
+            case Start(incarnations=started):
+                self._startup.expect(started)
+                self._launcher.act("start", list(started.items()), self._after_s)
+            case Begin(agents=agents):
+                return self._startup.absent(agents)
+            case Change() | Partition() | Heal() | Jamming() | Flapping():
+                self._orders(msgspec.json.encode(Orders(slot, (deed.order,))))
+        return []
+
+
+def _named(agents: Iterable[int], incarnations: Sequence[int]) -> list[tuple[int, int]]:
+    return [(agent, incarnations[agent]) for agent in agents]

@@ -9,7 +9,7 @@ Line = dict[str, Any]
 MAX_LINE_B = 64 * 1024
 
 
-class Lines:
+class MessageSocket:
     """One end of a socket pair; ``closed`` once the other end is gone.
 
     Reading never waits: wait for ``fileno`` to become readable.
@@ -20,10 +20,10 @@ class Lines:
         self._end = end
 
     @staticmethod
-    def pair() -> tuple["Lines", "Lines"]:
+    def pair() -> tuple["MessageSocket", "MessageSocket"]:
         """Return two connected ends."""
         near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        return Lines(near), Lines(far)
+        return MessageSocket(near), MessageSocket(far)
 
     def fileno(self) -> int:
         """Return the descriptor to wait for."""

@@ -17,14 +17,14 @@ from rich.console import Console
 from netem import process as netem_process
 from netem.wire.access import OPERATOR, Guard, write_users
 from netem.wire.keys import agent_name, medium_name
+from netem.wire.shutdown import interruptible, uninterrupted
 from worldsim.fleet import process as world_process
 from worldsim.fleet.fork import Exit
-from worldsim.fleet.interruption import interruptible, uninterrupted
-from worldsim.fleet.ipc import Line, Lines
+from worldsim.fleet.ipc import Line, MessageSocket
 from worldsim.fleet.launcher_link import Conducted, Progress
 from worldsim.fleet.process import Terms
-from worldsim.fleet.process_table import ProcessRow, Roster, processes
-from worldsim.fleet.supervisor import Kin
+from worldsim.fleet.process_table import ProcessRow, ProcessTable, processes
+from worldsim.fleet.supervisor import Supervisor
 from worldsim.fleet.terminal import Terminal
 from worldsim.fleet.zygote import Brood, Zygote
 from worldsim.results.run_folder import RunDirectory, unwritable
@@ -84,10 +84,10 @@ class Launch:
         self._terms = terms
         self._endpoint = f"tcp/127.0.0.1:{_free_port()}"
         self._guard = Guard(directory.users, terms.run, scenario.rows)
-        self._roster = Roster(directory.path, terms.run, self._endpoint)
-        self._kin = Kin(directory.logs, self._child_ended)
-        self._zygote, self._zygote_end = Lines.pair()
-        self._world, self._world_end = Lines.pair()
+        self._table = ProcessTable(directory.path, terms.run, self._endpoint)
+        self._supervisor = Supervisor(directory.logs, self._child_ended)
+        self._zygote, self._zygote_end = MessageSocket.pair()
+        self._world, self._world_end = MessageSocket.pair()
         self._doomed: set[tuple[int, int]] = set()
         self._missing: list[str] | None = None
         self._say_missing_at_s = time.monotonic() + PATIENCE_S
@@ -105,8 +105,8 @@ class Launch:
             f"{name}: starting netem, the world and {count} agents; logs in {self._directory.logs}"
         )
         self._start()
-        while "world" in self._kin.pids and not self._broken:
-            self._kin.turn(LOOK_EVERY_S)
+        while "world" in self._supervisor.pids and not self._broken:
+            self._supervisor.turn(LOOK_EVERY_S)
             self._say_who_is_missing()
         self._end_world()
 
@@ -140,34 +140,34 @@ class Launch:
         self.terminal.close()
         self._zygote.send(end=True)
         mediums = [medium_name(shard) for shard in range(self._terms.shards)]
-        self._kin.end(["world", *mediums], END_WITHIN_S, signal.SIGTERM)
-        self._kin.end(["zygote"], END_WITHIN_S, None)
-        everybody = list(self._kin.pids)
-        self._kin.end(everybody, END_WITHIN_S, signal.SIGKILL)
+        self._supervisor.end(["world", *mediums], END_WITHIN_S, signal.SIGTERM)
+        self._supervisor.end(["zygote"], END_WITHIN_S, None)
+        everybody = list(self._supervisor.pids)
+        self._supervisor.end(everybody, END_WITHIN_S, signal.SIGKILL)
         self._directory.users.unlink(missing_ok=True)
 
     def _end_world(self) -> None:
         self._landing = True
-        self._kin.end(["world"], LANDING_WITHIN_S, signal.SIGTERM)
+        self._supervisor.end(["world"], LANDING_WITHIN_S, signal.SIGTERM)
 
     def _start(self) -> None:
         agents = range(self._scenario.fleet.agents)
         self._let_in()
-        zygote = self._kin.start("zygote", signal.SIGKILL, self._be_zygote)
+        zygote = self._supervisor.start("zygote", signal.SIGKILL, self._be_zygote)
         self._zygote_end.close()
         mediums = {
-            medium_name(shard): self._kin.start(
+            medium_name(shard): self._supervisor.start(
                 medium_name(shard), signal.SIGKILL, partial(self._be_netem, shard)
             )
             for shard in range(self._terms.shards)
         }
         # The world is asked to end, so that it finishes the recording even without a launcher.
-        world = self._kin.start("world", signal.SIGTERM, self._be_world)
+        world = self._supervisor.start("world", signal.SIGTERM, self._be_world)
         self._world_end.close()
         for name, pid in {"zygote": zygote, **mediums, "world": world}.items():
-            self._roster.add(name, pid)
-        self._kin.listen(self._zygote, self._hear_zygote)
-        self._kin.listen(self._world, self._hear_world)
+            self._table.add(name, pid)
+        self._supervisor.listen(self._zygote, self._hear_zygote)
+        self._supervisor.listen(self._world, self._hear_world)
         self._zygote.send(do="start", whom=[(agent, 0) for agent in agents], after_s=0.0)
 
     def _let_in(self) -> None:
@@ -210,13 +210,13 @@ class Launch:
         lines = self._zygote.receive()
         for line in lines:
             if "spawned" in line:
-                self._roster.add(f"agent-{line['spawned']}", line["pid"])
+                self._table.add(f"agent-{line['spawned']}", line["pid"])
             elif "exit" in line:
                 self._agent_ended(line)
             else:
                 self._world.send(**line)
         if not self._landing and any("spawned" in line for line in lines):
-            self._roster.write()
+            self._table.write()
 
     def _hear_world(self) -> None:
         for line in self._world.receive():
@@ -229,7 +229,7 @@ class Launch:
             elif "missing" in line:
                 self._missing = line["missing"]
             elif "waiting" in line:
-                why = f"waiting for {line['waiting']}{self._roster.stopped()}"
+                why = f"waiting for {line['waiting']}{self._table.stopped()}"
                 self.terminal.say(f"standing still, {why}")
             else:
                 self._landing = True
@@ -238,7 +238,7 @@ class Launch:
         """Hand what the world wants done to the zygote, which has the agents."""
         if line["do"] == "kill":
             self._doomed.update((agent, incarnation) for agent, incarnation in line["whom"])
-        self._roster.note(line["do"], line["whom"])
+        self._table.note(line["do"], line["whom"])
         self._zygote.send(**line)
 
     def _agent_ended(self, line: Line) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from math import inf
 from typing import NamedTuple, Protocol
 
-from worldsim.fleet.ipc import Lines
+from worldsim.fleet.ipc import MessageSocket
 
 PRINT_EVERY_S = 2.0
 
@@ -52,7 +52,7 @@ class Progress(NamedTuple):
         )
 
 
-class Outside(Protocol):
+class LauncherLink(Protocol):
     """What a flight needs of whoever started it."""
 
     launches: bool
@@ -98,7 +98,7 @@ class Conducted:
 
     launches = True
 
-    def __init__(self, lines: Lines) -> None:
+    def __init__(self, lines: MessageSocket) -> None:
         self._lines = lines
         self._losses: list[Loss] = []
         self._done: list[tuple[str, list[list[int]]]] = []
@@ -222,6 +222,6 @@ class ByHand:
         return due
 
 
-def _wait(news: list[Lines], left_s: float) -> None:
+def _wait(news: list[MessageSocket], left_s: float) -> None:
     if left_s > 0.0:
         select.select(news, [], [], left_s)

@@ -6,12 +6,13 @@ the host's speed or load, the run is the one of virtual time.
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from agent.codec import RejectedError, decode_command, encode
 from netem.delivery_log import Digest, joined
-from netem.messages import Done, Truth, Turn, Verdicts, together, unpack_done
+from netem.messages import Done, MediumCounters, RadioOrder, Truth, Turn, together, unpack_done
 from netem.wire.barrier import (
+    ANSWER_WITHIN_S,
     LOOK_EVERY_S,
     TURN_RING,
     LockstepError,
@@ -19,24 +20,25 @@ from netem.wire.barrier import (
     answer,
     same_slot,
 )
-from netem.wire.bus import Post, Ring
+from netem.wire.bus import Bus, Ring
 from netem.wire.frame import WireError, pack
 from netem.wire.keys import medium_name
-from worldsim.engine.meaning import Deed
+from worldsim.engine.membership import Begin, Deed, Hold, Stop
 from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
 from worldsim.fleet.control import Control, Reception
-from worldsim.fleet.grip import Grip
-from worldsim.fleet.launcher_link import Outside
-from worldsim.fleet.progress import Headway, Standstill
-from worldsim.fleet.startup import Muster
+from worldsim.fleet.launcher_link import LauncherLink
+from worldsim.fleet.progress import ProgressReporter, Standstill
+from worldsim.fleet.startup import Startup
 from worldsim.judge.tick import Packets
 from worldsim.scenario.tables import Scenario
+from worldsim.scenario.timeline import Change, Flapping, Heal, Jamming, Partition
 
+DONE_LOOK_EVERY_S = 0.02
 COMMAND_TICKS = 1
 """As in virtual time: none is ever late."""
 
 
-class Lockstep:
+class LockstepFleet:
     """A fleet in the air, everybody waiting for everybody."""
 
     late_fraction: float | None = None
@@ -47,30 +49,30 @@ class Lockstep:
     def __init__(
         self,
         scenario: Scenario,
-        post: Post,
+        bus: Bus,
         recorder: Recorder,
-        outside: Outside,
-        muster: Muster,
+        launcher: LauncherLink,
+        startup: Startup,
         shards: int,
     ) -> None:
         rows = range(scenario.rows)
         self.loop = SlotLoop(scenario, world_of(scenario, COMMAND_TICKS), recorder, self._packets)
-        self.verdicts: Verdicts | None = None
+        self.medium_counters: MediumCounters | None = None
         self.real_time_factor: float | None = None
         self.failure: str | None = None
         self.begun = self._landed = False
         self._slots = scenario.slots
-        self._outside = outside
+        self._launcher = launcher
         self._unwanted: Callable[[], bool] = lambda: False
-        self._grip = Grip(muster, outside, self._watch, self._over_already)
-        self._reception = Reception(post, Control(scenario, self.loop, outside.launches))
-        self._headway = Headway(scenario.duration_s, self.loop, outside)
+        self._actions = AwaitedActions(startup, launcher, self._watch, self._over_already)
+        self._reception = Reception(bus, Control(scenario, self.loop, launcher.launches))
+        self._progress_reporter = ProgressReporter(scenario.duration_s, self.loop, launcher)
         self._digest = Digest()
-        self._truth = post.putter("truth", lockstep=True)
-        self._over = post.putter("over")
-        self._observers = [post.putter("observation", agent, lockstep=True) for agent in rows]
-        self._commands = [post.ring("command", agent, TURN_RING) for agent in rows]
-        self._done = [post.ring("done", shard, TURN_RING) for shard in range(shards)]
+        self._truth = bus.putter("truth", lockstep=True)
+        self._over = bus.putter("over")
+        self._observers = [bus.putter("observation", agent, lockstep=True) for agent in rows]
+        self._commands = [bus.ring("command", agent, TURN_RING) for agent in rows]
+        self._done = [bus.ring("done", shard, TURN_RING) for shard in range(shards)]
 
     def fly(self, unwanted: Callable[[], bool]) -> bool:
         """Fly the scenario's slots until the end, or until unwanted; return whether all of them.
@@ -83,7 +85,7 @@ class Lockstep:
         try:
             while self.loop.world.slot < self._slots and not unwanted():
                 self._slot()
-                self._headway.tell(time.perf_counter() - begun_s, None)
+                self._progress_reporter.tell(time.perf_counter() - begun_s, None)
         except UnwantedError:
             self.failure = self._broken()
             return False
@@ -102,7 +104,7 @@ class Lockstep:
         if not self._landed:
             self._landed = True
             if self.begun:
-                self._outside.landing()
+                self._launcher.landing()
             self._over(b"")
 
     def _slot(self) -> None:
@@ -118,7 +120,7 @@ class Lockstep:
 
     def _do(self, deed: Deed, **signed: str) -> None:
         """Have a deed done, see that it is, and let it count."""
-        self._grip.do(deed, self.loop.team.incarnations)
+        self._actions.do(deed, self.loop.team.incarnations)
         self.loop.take(deed, **signed)
 
     def _open(self, opened: Opened) -> None:
@@ -126,7 +128,7 @@ class Lockstep:
             Truth(opened.slot, opened.time_s, opened.positions),
             tuple(agent for agent, _ in opened.observations),
             tuple(self.loop.team.incarnations),
-            self._grip.orders(),
+            self._actions.orders(),
         )
         self._truth(pack(turn))
         for agent, observation in opened.observations:
@@ -147,7 +149,7 @@ class Lockstep:
     def _played(self, slot: int) -> bytes:
         """Wait until all mediums have played a slot; return the digest of all fates so far."""
         parts = [self._part(shard, slot) for shard in range(len(self._done))]
-        self.verdicts = together([part.verdicts for part in parts])
+        self.medium_counters = together([part.medium_counters for part in parts])
         self._digest.take(joined(dict(part.pages) for part in parts))
         return self._digest.value
 
@@ -162,7 +164,7 @@ class Lockstep:
 
     def _answer(self, ring: Ring, what: str) -> bytes:
         """Wait for a message; meanwhile see who is lost, and whether the run is still wanted."""
-        standstill = Standstill(what, self._outside)
+        standstill = Standstill(what, self._launcher)
 
         def over() -> bool:
             standstill.lasts(LOOK_EVERY_S)
@@ -176,14 +178,86 @@ class Lockstep:
 
     def _watch(self) -> None:
         """Raise LockstepError when somebody ended who takes part, and was not meant to."""
-        for loss in self._outside.losses():
+        for loss in self._launcher.losses():
             if self.loop.team.has(loss.agent, loss.incarnation):
                 raise LockstepError(str(loss))
 
     def _broken(self) -> str | None:
         """Return which process of which there is one is gone, if that is why the run ends."""
-        self._outside.losses()
-        return self._outside.broken
+        self._launcher.losses()
+        return self._launcher.broken
 
     def _packets(self) -> Packets:
-        return self.verdicts.packets() if self.verdicts is not None else {}
+        return self.medium_counters.packets() if self.medium_counters is not None else {}
+
+
+class AwaitedActions:
+    """What lockstep reaches the other processes with, and waits for them.
+
+    watch: raises LockstepError when somebody is lost who should not be; unwanted: whether the run
+    is over.
+    """
+
+    def __init__(
+        self,
+        startup: Startup,
+        launcher: LauncherLink,
+        watch: Callable[[], None],
+        unwanted: Callable[[], bool],
+    ) -> None:
+        self._startup = startup
+        self._launcher = launcher
+        self._watch = watch
+        self._unwanted = unwanted
+        self._orders: list[RadioOrder] = []
+
+    def do(self, deed: Deed, incarnations: Sequence[int]) -> None:
+        """Carry out a deed; what is ordered of the medium waits for ``orders``.
+
+        A process starts when its agent has booted: until then there is nothing for it to do.
+        incarnations: everybody's, as they were before the deed. Raises LockstepError when it does
+        not come to pass, UnwantedError when the run ends meanwhile.
+        """
+        match deed:
+            case Stop(agents=agents):
+                self._act("kill", agents, incarnations)
+                self._until(lambda: not self._startup.present(agents), f"the end of {agents}")
+            case Hold(kind=kind, agents=agents):
+                self._act(kind, agents, incarnations)
+            case Begin(agents=agents):
+                self._begin(agents, incarnations)
+            case Change() | Partition() | Heal() | Jamming() | Flapping():
+                self._orders.append(deed.order)
+
+    def orders(self) -> tuple[RadioOrder, ...]:
+        """Return, and forget, what the medium is to do before the next slot."""
+        orders = tuple(self._orders)
+        self._orders.clear()
+        return orders
+
+    def _begin(self, agents: tuple[int, ...], incarnations: Sequence[int]) -> None:
+        self._startup.expect({agent: incarnations[agent] for agent in agents})
+        self._act("start", agents, incarnations)
+        self._until(lambda: self._up(agents), f"a sign of life of {agents}")
+
+    def _up(self, agents: tuple[int, ...]) -> bool:
+        self._startup.instruct_agents()
+        self._watch()
+        return not self._startup.absent(agents)
+
+    def _act(self, kind: str, agents: Iterable[int], incarnations: Sequence[int]) -> None:
+        whom = [(agent, incarnations[agent]) for agent in agents]
+        if whom:
+            self._launcher.act(kind, whom)
+            self._until(lambda: self._launcher.has_done(kind, whom), f"a {kind} of {whom}")
+
+    def _until(self, there: Callable[[], bool], what: str) -> None:
+        waited_s, standstill = 0.0, Standstill(what, self._launcher)
+        while not there():
+            if self._unwanted():
+                raise UnwantedError
+            if waited_s > ANSWER_WITHIN_S:
+                raise LockstepError(f"{what} has not come within {ANSWER_WITHIN_S:g} s")
+            self._launcher.wait(DONE_LOOK_EVERY_S)
+            waited_s += DONE_LOOK_EVERY_S
+            standstill.lasts(DONE_LOOK_EVERY_S)

@@ -5,7 +5,7 @@ from pathlib import Path
 import msgspec
 
 from netem.wire.access import OPERATOR, AccessError, Login, login_of
-from netem.wire.bus import Post, RefusedError
+from netem.wire.bus import Bus, RefusedError
 from netem.wire.keys import Keys
 from netem.wire.session import SessionError, open_client
 from worldsim.fleet.control import Answer, Request
@@ -26,8 +26,8 @@ def ask(run: Path, request: Request) -> Answer:
         raise OperatorError(f"{run}: its fleet flies no more")
     try:
         with open_client(fleet.endpoint, OPEN_WITHIN_S, login=_login(run)) as session:
-            post = Post(session, Keys(fleet.run))
-            told = post.ask("control", None, msgspec.json.encode(request), ANSWER_WITHIN_S)
+            bus = Bus(session, Keys(fleet.run))
+            told = bus.ask("control", None, msgspec.json.encode(request), ANSWER_WITHIN_S)
     except (AccessError, SessionError) as error:
         raise OperatorError(f"{run}: {error}") from error
     except RefusedError as refusal:

@@ -7,18 +7,18 @@ from typing import Any, NamedTuple
 
 import zenoh
 
-from netem.messages import Verdicts
+from netem.messages import MediumCounters
 from netem.wire.access import AccessError, login_of
-from netem.wire.bus import Post
+from netem.wire.bus import Bus
 from netem.wire.keys import Keys
 from netem.wire.session import SessionError, open_client
-from netem.wire.stop import Stop
-from worldsim.fleet.free_running import Flight
-from worldsim.fleet.launcher_link import Outside
-from worldsim.fleet.lockstep import Lockstep
-from worldsim.fleet.startup import Muster, MusterError, assemble
+from netem.wire.shutdown import Stop
+from worldsim.fleet.free_running import FreeRunningFleet
+from worldsim.fleet.launcher_link import LauncherLink
+from worldsim.fleet.lockstep import LockstepFleet
+from worldsim.fleet.startup import Startup, StartupError, assemble
 from worldsim.results.run_folder import RunDirectory, RunDirectoryError, RunWriteError
-from worldsim.results.sinks import Notebook, notebook
+from worldsim.results.sinks import Sinks, open_sinks
 from worldsim.results.summary import EXIT_STATUS, summarise
 from worldsim.scenario.tables import Scenario
 
@@ -50,7 +50,7 @@ def run(
     scenario: Scenario,
     directory: Callable[[], RunDirectory],
     terms: Terms,
-    outside_of: Callable[[Muster], Outside],
+    launcher_of: Callable[[Startup], LauncherLink],
 ) -> int:
     """Conduct a run at a router, and say in one line what stood in its way; return the status.
 
@@ -59,8 +59,8 @@ def run(
     try:
         login = login_of(terms.users, "world") if terms.users is not None else None
         with open_client(connect, patient=terms.lockstep, login=login) as session:
-            return conduct(session, scenario, directory(), terms, outside_of)
-    except (AccessError, SessionError, MusterError, RunDirectoryError) as error:
+            return conduct(session, scenario, directory(), terms, launcher_of)
+    except (AccessError, SessionError, StartupError, RunDirectoryError) as error:
         print(f"world: {error}", file=sys.stderr)
         return 1 if isinstance(error, RunWriteError) else 2
 
@@ -70,7 +70,7 @@ def conduct(
     scenario: Scenario,
     directory: RunDirectory,
     terms: Terms,
-    outside_of: Callable[[Muster], Outside],
+    launcher_of: Callable[[Startup], LauncherLink],
 ) -> int:
     """Assemble a fleet, fly it and judge it; return the exit status of the contract.
 
@@ -79,62 +79,62 @@ def conduct(
     took off leaves neither.
     """
     stop = Stop()
-    post = Post(session, Keys(terms.run))
-    post.show_life("world")
-    muster = Muster(post, scenario, terms.lockstep, terms.shards)
-    outside = outside_of(muster)
-    notes = notebook(directory, scenario, directory.path.name, terms.mode, terms.recording)
-    flight = _flight(scenario, post, notes, outside, muster, terms)
+    bus = Bus(session, Keys(terms.run))
+    bus.show_life("world")
+    startup = Startup(bus, scenario, terms.lockstep, terms.shards)
+    launcher = launcher_of(startup)
+    notes = open_sinks(directory, scenario, directory.path.name, terms.mode, terms.recording)
+    flight = _flight(scenario, bus, notes, launcher, startup, terms)
     whole = False
 
     def unwanted() -> bool:
-        return stop.asked or outside.stopped is not None
+        return stop.asked or launcher.stopped is not None
 
     try:
-        whole = assemble(muster, terms.speed, unwanted, outside) and flight.fly(unwanted)
+        whole = assemble(startup, terms.speed, unwanted, launcher) and flight.fly(unwanted)
     finally:
         flight.land()
         notes.close()
-        ended_by = None if whole else outside.stopped or "interrupted"
+        ended_by = None if whole else launcher.stopped or "interrupted"
         summary = _summary(scenario, flight, terms.mode, ended_by)
         if flight.begun:
             directory.write_summary(summary)
         else:
             directory.nothing_flew()
     told = summary["outcome"] if flight.begun else f"{ended_by} before take-off"
-    print(f"world: {told}{_lateness(flight.verdicts)}", flush=True)
+    print(f"world: {told}{_lateness(flight.medium_counters)}", flush=True)
     return EXIT_STATUS[summary["outcome"]]
 
 
 def _flight(
     scenario: Scenario,
-    post: Post,
-    notes: Notebook,
-    outside: Outside,
-    muster: Muster,
+    bus: Bus,
+    notes: Sinks,
+    launcher: LauncherLink,
+    startup: Startup,
     terms: Terms,
-) -> Flight | Lockstep:
+) -> FreeRunningFleet | LockstepFleet:
     if terms.lockstep:
-        return Lockstep(scenario, post, notes, outside, muster, terms.shards)
-    return Flight(scenario, post, notes, outside, muster, terms.speed)
+        return LockstepFleet(scenario, bus, notes, launcher, startup, terms.shards)
+    return FreeRunningFleet(scenario, bus, notes, launcher, startup, terms.speed)
 
 
-def _lateness(verdicts: Verdicts | None) -> str:
-    if verdicts is None or verdicts.late_s is None:
+def _lateness(medium_counters: MediumCounters | None) -> str:
+    if medium_counters is None or medium_counters.late_s is None:
         return ""
-    typical_s, worst_s = verdicts.late_s
+    typical_s, worst_s = medium_counters.late_s
     return f"; netem late by {typical_s * 1e3:.1f} ms (median), {worst_s * 1e3:.1f} ms (worst)"
 
 
 def _summary(
-    scenario: Scenario, flight: Flight | Lockstep, mode: str, ended_by: str | None
+    scenario: Scenario, flight: FreeRunningFleet | LockstepFleet, mode: str, ended_by: str | None
 ) -> dict[str, Any]:
     late = flight.late_fraction
     return summarise(
         scenario,
         flight.loop,
         mode=mode,
-        verdicts=flight.verdicts,
+        medium_counters=flight.medium_counters,
         refused=flight.refused,
         delivery=flight.delivery,
         late_tick_fraction=late,

@@ -22,7 +22,7 @@ class ProcessRow(NamedTuple):
     alive: bool
 
 
-class Roster:
+class ProcessTable:
     """Keeps a run's fleet.json while processes are started."""
 
     def __init__(self, folder: Path, run: str, endpoint: str) -> None:

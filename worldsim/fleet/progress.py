@@ -3,27 +3,27 @@
 import numpy as np
 
 from worldsim.engine.step import SlotLoop
-from worldsim.fleet.launcher_link import Outside, Progress
+from worldsim.fleet.launcher_link import LauncherLink, Progress
 from worldsim.judge.phase import CONVERGED_M
 
 TELL_EVERY_S = 0.25
 STANDSTILL_S = 2.0
 
 
-class Headway:
+class ProgressReporter:
     """Tells progress a few times a second of wall time."""
 
-    def __init__(self, duration_s: float, loop: SlotLoop, outside: Outside) -> None:
+    def __init__(self, duration_s: float, loop: SlotLoop, launcher: LauncherLink) -> None:
         self._duration_s = duration_s
         self._loop = loop
-        self._outside = outside
+        self._launcher = launcher
         self._tell_at_s = 0.0
 
     def tell(self, elapsed_s: float, late: float | None) -> None:
         """Tell how far it is, if it is time to; late: share of late ticks, where there can be."""
         if elapsed_s >= self._tell_at_s:
             self._tell_at_s = elapsed_s + TELL_EVERY_S
-            self._outside.progress(self._progress(late))
+            self._launcher.progress(self._progress(late))
 
     def _progress(self, late: float | None) -> Progress:
         figures = self._loop.figures
@@ -41,9 +41,9 @@ class Headway:
 class Standstill:
     """A wait for what has to come before a flight goes on; told once, when it has become long."""
 
-    def __init__(self, what: str, outside: Outside) -> None:
+    def __init__(self, what: str, launcher: LauncherLink) -> None:
         self._what = what
-        self._outside = outside
+        self._launcher = launcher
         self._waited_s = 0.0
 
     def lasts(self, more_s: float) -> None:
@@ -51,4 +51,4 @@ class Standstill:
         before_s = self._waited_s
         self._waited_s += more_s
         if before_s < STANDSTILL_S <= self._waited_s:
-            self._outside.waiting(self._what)
+            self._launcher.waiting(self._what)

@@ -8,38 +8,38 @@ import zenoh
 
 from agent.config import AgentSetup
 from netem.messages import MediumSetup
-from netem.wire.bus import Post, RefusedError, Roll, Waiting, drained
+from netem.wire.bus import Bus, Presence, RefusedError, Waiting, drained
 from netem.wire.keys import medium_name
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
-from worldsim.fleet.launcher_link import Outside
+from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 
-MUSTER_WITHIN_S = 30.0
+STARTUP_WITHIN_S = 30.0
 LOOK_EVERY_S = 0.02
 QUESTIONS_AT_ONCE = 64
 
 
-class MusterError(RuntimeError):
+class StartupError(RuntimeError):
     """Not everybody came; the text says who is missing."""
 
 
-class Muster:
+class Startup:
     """Answers agents that ask for their setup, at the start and late; knows who is there.
 
     lockstep: whether they take turns; shards: how many mediums share the agents out.
     """
 
     def __init__(
-        self, post: Post, scenario: Scenario, lockstep: bool = False, shards: int = 1
+        self, bus: Bus, scenario: Scenario, lockstep: bool = False, shards: int = 1
     ) -> None:
-        self._post = post
+        self._bus = bus
         self._scenario = scenario
         self._lockstep = lockstep
         self._shards = shards
         self._uninstructed = list(range(shards))
         self._incarnations = dict.fromkeys(range(scenario.fleet.agents), 0)
-        self._roll: Roll = post.roll()
-        self._questions: Waiting[zenoh.Query] = post.questions("setup")
+        self._presence: Presence = bus.presence()
+        self._questions: Waiting[zenoh.Query] = bus.questions("setup")
 
     def instruct_medium(self, speed: float) -> bool:
         """Tell each medium its conditions; False while one is missing.
@@ -50,7 +50,7 @@ class Muster:
             shard = self._uninstructed[0]
             question = msgspec.json.encode(self._medium_setup(shard, speed))
             topic, who = ("shard", shard) if shard else ("medium", None)
-            if self._post.ask(topic, who, question, timeout_s=2.0) is None:
+            if self._bus.ask(topic, who, question, timeout_s=2.0) is None:
                 return False
             self._uninstructed.pop(0)
         return True
@@ -63,11 +63,11 @@ class Muster:
 
     def missing(self) -> list[str]:
         """Return the names of those who have not come."""
-        self._roll.gone()
+        self._presence.gone()
         agents = range(self._scenario.fleet.agents)
         mediums = [medium_name(shard) for shard in range(self._shards)]
         wanted = [*mediums, *(f"agent-{agent}" for agent in agents)]
-        return [name for name in wanted if name not in self._roll.present]
+        return [name for name in wanted if name not in self._presence.present]
 
     def expect(self, incarnations: Mapping[int, int]) -> None:
         """Let agents come, too, or again: each with its incarnation."""
@@ -75,8 +75,8 @@ class Muster:
 
     def absent(self, agents: Iterable[int]) -> list[int]:
         """Return which of these agents show no sign of life."""
-        self._roll.gone()
-        return [agent for agent in agents if f"agent-{agent}" not in self._roll.present]
+        self._presence.gone()
+        return [agent for agent in agents if f"agent-{agent}" not in self._presence.present]
 
     def present(self, agents: Iterable[int]) -> list[int]:
         """Return which of these agents show a sign of life."""
@@ -85,7 +85,7 @@ class Muster:
 
     def gone(self) -> list[str]:
         """Return who went since the last call, as liveliness has it: a hint."""
-        return self._roll.gone()
+        return self._presence.gone()
 
     def _medium_setup(self, shard: int, speed: float) -> MediumSetup:
         rows = range(self._scenario.rows)
@@ -112,28 +112,30 @@ class Muster:
         query.reply(query.key_expr, msgspec.json.encode(setup))
 
 
-def assemble(muster: Muster, speed: float, unwanted: Callable[[], bool], outside: Outside) -> bool:
+def assemble(
+    startup: Startup, speed: float, unwanted: Callable[[], bool], launcher: LauncherLink
+) -> bool:
     """Wait until everybody is there; False when ``unwanted`` says that it is for nothing.
 
-    Raises :class:`MusterError` after MUSTER_WITHIN_S, and when the medium refuses.
+    Raises :class:`MusterError` after STARTUP_WITHIN_S, and when the medium refuses.
     """
-    deadline = time.monotonic() + MUSTER_WITHIN_S
+    deadline = time.monotonic() + STARTUP_WITHIN_S
     missing: list[str] | None = None
     instructed = False
     while not unwanted():
         try:
-            instructed = instructed or muster.instruct_medium(speed)
+            instructed = instructed or startup.instruct_medium(speed)
         except RefusedError as error:
-            raise MusterError(f"netem refuses: {error}") from error
-        muster.instruct_agents()
-        before, missing = missing, muster.missing()
+            raise StartupError(f"netem refuses: {error}") from error
+        startup.instruct_agents()
+        before, missing = missing, startup.missing()
         if missing != before:
-            outside.missing(shortened(missing))
+            launcher.missing(shortened(missing))
         if not missing:
             return True
         if time.monotonic() > deadline:
-            raise MusterError(
-                f"not there within {MUSTER_WITHIN_S:g} s: {', '.join(shortened(missing))}"
+            raise StartupError(
+                f"not there within {STARTUP_WITHIN_S:g} s: {', '.join(shortened(missing))}"
             )
         time.sleep(LOOK_EVERY_S)
     return False

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from worldsim.fleet.fork import Exit, fork, reaped
-from worldsim.fleet.ipc import Lines
+from worldsim.fleet.ipc import MessageSocket
 
 Act = Callable[[], None]
 
 
-class Kin:
+class Supervisor:
     """Named children and the lines to them: what happens on either is acted upon in ``turn``.
 
     ``on_exit`` hears the name of a child that ended, and how.
@@ -35,7 +35,7 @@ class Kin:
         )
         return pid
 
-    def listen(self, lines: Lines, hear: Act) -> None:
+    def listen(self, lines: MessageSocket, hear: Act) -> None:
         """Call ``hear`` whenever something comes in on ``lines``, until they are closed."""
 
         def act() -> None:

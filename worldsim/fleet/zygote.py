@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from agent import process as agent_process
 from worldsim.fleet.fork import fork, reaped
-from worldsim.fleet.ipc import Line, Lines
+from worldsim.fleet.ipc import Line, MessageSocket
 
 END_WITHIN_S = 2.0
 SIGNALS = {"kill": signal.SIGKILL, "pause": signal.SIGSTOP, "resume": signal.SIGCONT}
@@ -40,7 +40,7 @@ class Brood(NamedTuple):
 class Zygote:
     """Forks agents on request, and reports their exits; ends them all when asked or alone."""
 
-    def __init__(self, lines: Lines, brood: Brood) -> None:
+    def __init__(self, lines: MessageSocket, brood: Brood) -> None:
         self._lines = lines
         self._brood = brood
         self._agents: dict[int, tuple[int, int]] = {}

@@ -39,7 +39,7 @@ class Components(NamedTuple):
         return found
 
 
-class Reach:
+class Connectivity:
     """The radio as the judge knows it."""
 
     def __init__(self, scenario: Scenario) -> None:

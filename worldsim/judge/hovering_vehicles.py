@@ -18,7 +18,7 @@ from worldsim.judge.phase import Phase
 from worldsim.judge.tick import Singles, Tick
 
 
-class Bodies:
+class HoveringVehicles:
     """Finds the layout that is left to the living; spacing: d_ir [m]. Sees every tick."""
 
     def __init__(self, spacing: float) -> None:

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agent.messages import Place
-from worldsim.judge.connectivity import Components, Reach
-from worldsim.judge.hovering_vehicles import Bodies
+from worldsim.judge.connectivity import Components, Connectivity
+from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.phase import CONVERGED_S, Phase
 from worldsim.judge.recovery import LOSSES, RETURNS
 from worldsim.judge.tick import Tick
@@ -44,9 +44,9 @@ class Tally:
 class Invariants:
     """Watches the allocation of a whole run; bodies: shown every tick."""
 
-    def __init__(self, scenario: Scenario, bodies: Bodies) -> None:
+    def __init__(self, scenario: Scenario, bodies: HoveringVehicles) -> None:
         self.tallies = {name: Tally() for name in ("I2", "I3", "I4", "I6", "I7")}
-        self._reach = Reach(scenario)
+        self._reach = Connectivity(scenario)
         self._bodies = bodies
         self._boot_s = scenario.fleet.boot_s
         self._fault_s = 0.0

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from agent.messages import Place
-from worldsim.judge.hovering_vehicles import Bodies
+from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.phase import CONVERGED_S, Phase
 from worldsim.judge.tick import Tick
 
@@ -33,7 +33,7 @@ class Recovery:
 class Recoveries:
     """Every change of the team in a run, and what became of it; bodies: shown every tick."""
 
-    def __init__(self, bodies: Bodies) -> None:
+    def __init__(self, bodies: HoveringVehicles) -> None:
         self.all: list[Recovery] = []
         self._open: list[Recovery] = []
         self._since_s: float | None = None

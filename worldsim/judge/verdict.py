@@ -14,7 +14,7 @@ import numpy as np
 from agent.guidance.cone import cone_of
 from agent.messages import FramePath
 from agent.qstructure.formation import Formation, FormationSpec
-from worldsim.judge.hovering_vehicles import Bodies
+from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.invariants import Invariants
 from worldsim.judge.metrics import Floats, Separation, conserved
 from worldsim.judge.obstacle_clearance import Clearance
@@ -62,7 +62,7 @@ class Judge:
         formation = Formation(scenario.formation, scenario.control.spacing_m)
         self.phases = [Phase(formation, 0.0, path_of(scenario.frame))]
         self.queues = [Queues(self.phases[0])]
-        self._bodies = Bodies(scenario.control.spacing_m)
+        self._bodies = HoveringVehicles(scenario.control.spacing_m)
         self._recoveries = Recoveries(self._bodies)
         self._allocation = Invariants(scenario, self._bodies) if scenario.expect.converge else None
         self.ticks = 0

@@ -30,7 +30,7 @@ def conditions_of(model: LinkModel) -> Conditions:
 
 def close_by(link: LinkModel) -> LinkModel:
     """Return a link as it is at no distance and where nothing waits to be sent."""
-    return replace(link, path_loss=None, rate_kbit=inf, own_air=False)
+    return replace(link, path_loss=None, rate_kbit=inf, own_rate=False)
 
 
 class Flight:

@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
-from worldsim.link_check.checks import findings
+from worldsim.link_check.checks import Finding, findings
 from worldsim.link_check.parameter_sets import parameter_sets
-from worldsim.link_check.telling import HEAD, told
 from worldsim.scenario.tables import Scenario
+
+HEAD = f"  {'':6} {'':32} {'configured':>12} {'measured':>12} {'99.9 %':>12}"
 
 
 def survey(scenario: Scenario, file: Path) -> bool:
@@ -23,3 +24,10 @@ def survey(scenario: Scenario, file: Path) -> bool:
             held = held and finding.held
     plot(sets, scenario.seed, file)
     return held
+
+
+def told(finding: Finding) -> str:
+    """Return a finding as a line of a table."""
+    word = "held" if finding.held else "BROKEN"
+    figures = f"{finding.configured:12.4f} {finding.measured:12.4f} {finding.bound:12.4f}"
+    return f"  {word:6} {finding.name:32} {figures}"

@@ -12,7 +12,7 @@ from pyarrow.lib import array as arrow_array
 
 
 @dataclass(frozen=True, slots=True)
-class Sheet:
+class ColumnBlock:
     """Columns of one entity; ``rows`` are the ticks of the block that they belong to."""
 
     entity: str

@@ -14,7 +14,7 @@ from agent.messages import ROLES
 from worldsim.judge.tick import Singles, Standings, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout, palette
-from worldsim.recording.columns import Latest, Sheet, Thinned, strips_of
+from worldsim.recording.columns import ColumnBlock, Latest, Thinned, strips_of
 
 SAMPLES_HZ = 4.0
 LINES_PER_S = 500
@@ -36,7 +36,7 @@ class StandingSheets:
         self._labels = Latest()
         self._roles = Latest()
 
-    def of(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Sheet]:
+    def of(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
         """Return the sheets of a block; blocks come in order."""
         yield from self._labelled(ticks)
         yield from self._residuals(ticks, figures)
@@ -46,7 +46,7 @@ class StandingSheets:
             yield from self._told(ticks, standings)
             yield from self._lanes(standings)
 
-    def _labelled(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
+    def _labelled(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         """Return vehicles' names, with what sets an agent apart from a plain member.
 
         Where they are not shown unless one is pointed at, once a block is enough.
@@ -58,7 +58,9 @@ class StandingSheets:
         if rows:
             labels = [label for row in rows for label in self._labels_of(keys[row])]
             columns = rr.Boxes3D.columns(labels=labels)
-            yield Sheet(layout.VEHICLES, rows, columns.partition([len(self._names)] * len(rows)))
+            yield ColumnBlock(
+                layout.VEHICLES, rows, columns.partition([len(self._names)] * len(rows))
+            )
 
     def _labels_of(self, keys: NDArray[np.int16]) -> list[str]:
         words = {VERTEX: " vertex", SUB_VERTEX: " sub-vertex {}", DISTRESS: " distress"}
@@ -67,7 +69,9 @@ class StandingSheets:
             for name, (role, tier) in zip(self._names, keys.tolist(), strict=True)
         ]
 
-    def _hierarchy(self, ticks: Sequence[Tick], standings: Sequence[Standings]) -> Iterator[Sheet]:
+    def _hierarchy(
+        self, ticks: Sequence[Tick], standings: Sequence[Standings]
+    ) -> Iterator[ColumnBlock]:
         rows, strips, colours = [], [], []
         for row, (tick, standing) in enumerate(zip(ticks, standings, strict=True)):
             if self._lines.due(tick.index):
@@ -80,9 +84,11 @@ class StandingSheets:
             columns = rr.LineStrips3D.columns(
                 strips=strips_of(np.concatenate(strips)), colors=np.concatenate(colours)
             )
-            yield Sheet(layout.HIERARCHY, rows, columns.partition([len(some) for some in strips]))
+            yield ColumnBlock(
+                layout.HIERARCHY, rows, columns.partition([len(some) for some in strips])
+            )
 
-    def _told(self, ticks: Sequence[Tick], standings: Sequence[Standings]) -> Iterator[Sheet]:
+    def _told(self, ticks: Sequence[Tick], standings: Sequence[Standings]) -> Iterator[ColumnBlock]:
         rows = self._sampled(ticks)
         agents = len(self._names)
         for entity, series in (
@@ -93,9 +99,11 @@ class StandingSheets:
             if rows:
                 values = np.concatenate(series).astype(np.float64)
                 columns = rr.Scalars.columns(scalars=values)
-                yield Sheet(entity, rows, columns.partition([agents] * len(rows)))
+                yield ColumnBlock(entity, rows, columns.partition([agents] * len(rows)))
 
-    def _residuals(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Sheet]:
+    def _residuals(
+        self, ticks: Sequence[Tick], figures: Sequence[Figures]
+    ) -> Iterator[ColumnBlock]:
         rows = [row for row in self._sampled(ticks) if figures[row].queue_residual is not None]
         values = np.full((len(rows), self._queues), np.nan)
         for at, row in enumerate(rows):
@@ -104,16 +112,16 @@ class StandingSheets:
         if rows and self._queues:
             columns = rr.Scalars.columns(scalars=values.ravel())
             counts = [self._queues] * len(rows)
-            yield Sheet(layout.QUEUE_RESIDUAL, rows, columns.partition(counts))
+            yield ColumnBlock(layout.QUEUE_RESIDUAL, rows, columns.partition(counts))
 
-    def _lanes(self, standings: Sequence[Standings]) -> Iterator[Sheet]:
+    def _lanes(self, standings: Sequence[Standings]) -> Iterator[ColumnBlock]:
         """Return each agent's role over time."""
         roles = np.stack([standing.role[: layout.NAMED_MAX] for standing in standings])
         departs = self._roles.departs(roles)
         for agent in map(int, np.flatnonzero(departs.any(axis=0))):
             rows = [int(row) for row in np.flatnonzero(departs[:, agent])]
             words = [role_word(int(role)) for role in roles[rows, agent]]
-            yield Sheet(layout.role_of(agent), rows, rr.StateChange.columns(state=words))
+            yield ColumnBlock(layout.role_of(agent), rows, rr.StateChange.columns(state=words))
 
     def _sampled(self, ticks: Sequence[Tick]) -> list[int]:
         return [row for row, tick in enumerate(ticks) if tick.index % self._every == 0]

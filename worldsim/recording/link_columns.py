@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from worldsim.judge.tick import Singles, Tick
 from worldsim.recording import layout
-from worldsim.recording.columns import Latest, Sheet, Thinned, numbers, strips_of
+from worldsim.recording.columns import ColumnBlock, Latest, Thinned, numbers, strips_of
 
 LINES_MAX = 400
 LINES_PER_S = 2000
@@ -28,12 +28,12 @@ class HearingSheets:
         self._heard = Latest()
         self._drawn = Thinned(tick_hz, LINES_PER_S)
 
-    def of(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
+    def of(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         """Return the sheets of a block; blocks come in order."""
         yield from self._matrix(ticks)
         yield from self._lines(ticks)
 
-    def _matrix(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
+    def _matrix(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         hears = np.zeros((len(ticks), len(ticks[0].alive) ** 2), dtype=np.bool_)
         for row, tick in zip(hears, ticks, strict=True):
             row[_heard(tick)] = True
@@ -41,9 +41,9 @@ class HearingSheets:
         bits = np.packbits(hears, axis=1)
         rows = self._heard.changes(bits)
         if rows:
-            yield Sheet(layout.HEARD, rows, [numbers(layout.HEARS, bits[rows])])
+            yield ColumnBlock(layout.HEARD, rows, [numbers(layout.HEARS, bits[rows])])
 
-    def _lines(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
+    def _lines(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         rows, drawn = [], []
         for row, tick in enumerate(ticks):
             if self._drawn.due(tick.index):
@@ -52,7 +52,7 @@ class HearingSheets:
                 self._drawn.drawn(tick.index, len(drawn[-1]))
         if rows:
             columns = rr.LineStrips3D.columns(strips=strips_of(np.concatenate(drawn)))
-            yield Sheet(layout.LINKS, rows, columns.partition([len(some) for some in drawn]))
+            yield ColumnBlock(layout.LINKS, rows, columns.partition([len(some) for some in drawn]))
 
 
 def lines(tick: Tick) -> Singles:

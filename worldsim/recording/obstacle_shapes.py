@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from worldsim.judge.tick import Tick
 from worldsim.recording import layout, palette
-from worldsim.recording.columns import Sheet
+from worldsim.recording.columns import ColumnBlock
 from worldsim.truth.obstacles import Obstacles
 
 Rows = NDArray[np.intp]
@@ -41,14 +41,16 @@ class Shapes:
         for entity, rows, kind in self._moving:
             yield entity, [kind.from_fields(**self._form(kind, rows))]
 
-    def sheets(self, ticks: Sequence[Tick]) -> Iterator[Sheet]:
+    def sheets(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         """Return where those that move are, at every tick of a block."""
         if not self._moving:
             return
         centres = np.stack([self._obstacles.centres(tick.time_s) for tick in ticks])
         for entity, rows, kind in self._moving:
             columns = kind.columns(centers=centres[:, rows].reshape(-1, 3))
-            yield Sheet(entity, range(len(ticks)), columns.partition([len(rows)] * len(ticks)))
+            yield ColumnBlock(
+                entity, range(len(ticks)), columns.partition([len(rows)] * len(ticks))
+            )
 
     def _form(self, kind: Any, rows: Rows) -> dict[str, Any]:
         radius, half = self._obstacles.radius[rows], self._obstacles.half[rows]

@@ -22,12 +22,12 @@ from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout
 from worldsim.recording.blueprint import blueprint_of, stage_of
-from worldsim.recording.columns import Sheet
+from worldsim.recording.columns import ColumnBlock
 from worldsim.recording.hierarchy_columns import StandingSheets
 from worldsim.recording.obstacle_shapes import Shapes
 from worldsim.recording.static_entities import Scenery, limits, queues_of
-from worldsim.recording.tick_columns import Sheets
-from worldsim.recording.tolerant_sink import Spool
+from worldsim.recording.tick_columns import TickColumns
+from worldsim.recording.tolerant_sink import TolerantSink
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.target_frame import path_of
 from worldsim.truth.obstacles import Obstacles
@@ -69,7 +69,7 @@ class RunRecorder:
         self._scenario = scenario
         self._formation = Formation(scenario.formation, scenario.control.spacing_m)
         shared = np.array(self._formation.common, dtype=np.int16).reshape(-1, 2)
-        self._sheets = Sheets(shared, scenario.fleet.tick_hz, limits(scenario))
+        self._sheets = TickColumns(shared, scenario.fleet.tick_hz, limits(scenario))
         self._standings = StandingSheets(scenario.fleet.tick_hz, scenario.rows, queues_of(scenario))
         self._shapes = Shapes(Obstacles(scenario.obstacle))
         self._team = scenario.fleet.agents
@@ -110,7 +110,7 @@ class RunRecorder:
 
     def _open(self, path: Path, run_id: str, mode: str) -> None:
         rr.set_strict_mode(True)
-        self._spool = Spool(path, self._say)
+        self._spool = TolerantSink(path, self._say)
         self._track = Track(path_of(self._scenario.frame))
         scenery = Scenery(
             self._scenario,
@@ -172,7 +172,7 @@ class RunRecorder:
                 self._show_phase(event)
         self._stream.flush(timeout_sec=FLUSH_S)
 
-    def _sheets_of(self, ticks: list[Tick], figures: list[Figures]) -> Iterator[Sheet]:
+    def _sheets_of(self, ticks: list[Tick], figures: list[Figures]) -> Iterator[ColumnBlock]:
         yield from self._sheets.of(ticks, figures)
         yield from self._standings.of(ticks, figures)
         yield from self._shapes.sheets(ticks)

@@ -14,7 +14,7 @@ CHUNK_B = 256 * 1024
 END_S = 10.0
 
 
-class Spool:
+class TolerantSink:
     """A new file behind a pipe; ``path`` is what a writer opens, ``size`` what is kept [bytes].
 
     ``say`` hears of the first failure. Raises OSError when the file cannot be created.

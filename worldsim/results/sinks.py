@@ -16,7 +16,7 @@ class ClosingRecorder(Recorder, Protocol):
         """Write what is still to be written."""
 
 
-class Notebook:
+class Sinks:
     """Keeps events in the run's folder, and hands everything to the recorder if there is one."""
 
     def __init__(self, directory: RunDirectory, recorder: ClosingRecorder | None) -> None:
@@ -41,13 +41,13 @@ class Notebook:
             self._recorder.close()
 
 
-def notebook(
+def open_sinks(
     directory: RunDirectory, scenario: Scenario, run: str, mode: str, recording: bool
-) -> Notebook:
+) -> Sinks:
     """Open a run's notebook, with a recording or without."""
     if not recording:
-        return Notebook(directory, None)
+        return Sinks(directory, None)
     # rerun costs a second and 90 MB: only the process that records pays for it.
     from worldsim.recording.recorder import RunRecorder  # noqa: PLC0415
 
-    return Notebook(directory, RunRecorder(directory.recording, scenario, run, mode=mode))
+    return Sinks(directory, RunRecorder(directory.recording, scenario, run, mode=mode))

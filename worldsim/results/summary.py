@@ -5,7 +5,7 @@ from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
-from netem.messages import Verdicts
+from netem.messages import MediumCounters
 from worldsim.engine.step import SlotLoop
 from worldsim.judge.verdict import Expectation, Judge
 from worldsim.scenario.tables import Scenario
@@ -30,7 +30,7 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
     loop: SlotLoop,
     *,
     mode: str,
-    verdicts: Verdicts | None,
+    medium_counters: MediumCounters | None,
     late_tick_fraction: float | None,
     real_time_factor: float | None,
     duration_s: float,
@@ -48,7 +48,7 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
     if it was. refused: messages that the world refused, by cause. delivery: how late frames came.
     """
     judge = loop.judge
-    rejected = _rejected(loop, verdicts, refused)
+    rejected = _rejected(loop, medium_counters, refused)
     expectations = judge.expectations()
     invariants = judge.invariants()
     cut_off = f"{ended_by} after {duration_s:.1f} s" if interrupted else None
@@ -70,13 +70,13 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
         "recoveries": [asdict(recovery) for recovery in judge.recoveries],
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
-        "packets": _packets(verdicts, rejected),
+        "packets": _packets(medium_counters, rejected),
         "rejected_by_cause": rejected,
-        "direct_links": loop.company.links(),
-        "bytes_per_s": loop.company.bytes_per_s(verdicts),
+        "direct_links": loop.radio_use.links(),
+        "bytes_per_s": loop.radio_use.bytes_per_s(medium_counters),
         "invariants": invariants,
         "delivery": delivery,
-        "delivery_late_ms": _delivery_late_ms(verdicts),
+        "delivery_late_ms": _delivery_late_ms(medium_counters),
         "late_tick_fraction": late_tick_fraction,
         "real_time_factor": real_time_factor,
         "trace_sha256": None if mode == "processes" else loop.trace.sha256,
@@ -113,31 +113,31 @@ def _too_slow(host_too_slow: bool, late: float | None) -> str | None:
 
 
 def _rejected(
-    loop: SlotLoop, verdicts: Verdicts | None, refused: Mapping[str, int] | None
+    loop: SlotLoop, medium_counters: MediumCounters | None, refused: Mapping[str, int] | None
 ) -> dict[str, dict[str, int]]:
     """Return who refused how many messages for which cause."""
-    by_medium = verdicts.rejected if verdicts is not None else {}
-    told = {"agents": loop.refusals.by_cause(), "netem": by_medium, "world": refused or {}}
+    by_medium = medium_counters.rejected if medium_counters is not None else {}
+    told = {"agents": loop.rejections.by_cause(), "netem": by_medium, "world": refused or {}}
     return {who: dict(causes) for who, causes in told.items()}
 
 
 def _packets(
-    verdicts: Verdicts | None, rejected: Mapping[str, Mapping[str, int]]
+    medium_counters: MediumCounters | None, rejected: Mapping[str, Mapping[str, int]]
 ) -> dict[str, int | None]:
     """Count packets: sent as frames, addressed and each fate once for each agent that may hear."""
     names = ("sent", "addressed", *FATES, "in_flight")
-    if verdicts is None:
+    if medium_counters is None:
         return dict.fromkeys((*names, "rejected"))
-    counted = verdicts.packets()
+    counted = medium_counters.packets()
     refused = sum(count for causes in rejected.values() for count in causes.values())
     return {**{name: counted.get(name, 0) for name in names}, "rejected": refused}
 
 
-def _delivery_late_ms(verdicts: Verdicts | None) -> dict[str, float] | None:
+def _delivery_late_ms(medium_counters: MediumCounters | None) -> dict[str, float] | None:
     """How much later than due the radio's batches left; None in virtual time, where none can be."""
-    if verdicts is None or verdicts.late_s is None:
+    if medium_counters is None or medium_counters.late_s is None:
         return None
-    median_s, worst_s = verdicts.late_s
+    median_s, worst_s = medium_counters.late_s
     return {"median": 1000.0 * median_s, "worst": 1000.0 * worst_s}
 
 

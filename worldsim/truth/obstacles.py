@@ -166,17 +166,17 @@ def _from_corner(beyond: tuple[Floats, ...]) -> tuple[Floats, list[Floats]]:
     square = outer[0] * outer[0]
     for each in outer[1:]:
         square = square + each * each
-    outside = np.sqrt(square)
+    launcher = np.sqrt(square)
     inside = beyond[0]
     for each in beyond[1:]:
         inside = np.maximum(inside, each)
-    out, taken = outside > 0.0, np.zeros(inside.shape, dtype=np.bool_)
+    out, taken = launcher > 0.0, np.zeros(inside.shape, dtype=np.bool_)
     away = []
     for past, each in zip(outer, beyond, strict=True):
         face = (each == inside) & ~taken
         taken |= face
-        away.append(np.where(out, past / np.where(out, outside, 1.0), face))
-    return np.where(out, outside, inside), away
+        away.append(np.where(out, past / np.where(out, launcher, 1.0), face))
+    return np.where(out, launcher, inside), away
 
 
 def _unit(vector: Floats, length: Floats) -> Floats:

@@ -17,7 +17,7 @@ NOTHING = Sensed(())
 SALT = 1 << 60
 
 
-class Failures:
+class SensorFaults:
     """Which sensors of which agents have failed, and what they told when they got stuck."""
 
     def __init__(self, seed: int) -> None:

@@ -14,7 +14,7 @@ from agent.config import Vehicle
 from agent.messages import Command, Observation, Scan, Vector
 from worldsim.truth.proximity_sensor import ProximitySensor, Sensed
 from worldsim.truth.scanning_sensors import Scans
-from worldsim.truth.sensor_faults import Failures
+from worldsim.truth.sensor_faults import SensorFaults
 from worldsim.truth.vehicle import Fleet, Floats
 
 NOTHING = Sensed(())
@@ -66,7 +66,7 @@ class World:
         self._senses = ["proximity" in each.sensors for each in limits]
         self._sensor = sensor
         self._scanning = scans
-        self.failures = Failures(sensor.seed)
+        self.failures = SensorFaults(sensor.seed)
         self._longest = command_ticks * clock.slots_per_tick
         self._expires = np.zeros(len(yaw), dtype=np.int64)
         # A row each: velocity, yaw, pitch and roll, so that a command is one assignment.

@@ -2,7 +2,13 @@
 
 import pytest
 
-from agent.comms.unidentified_vehicles import MEMORY_S, SILENCE_S, Departed, Member, SilentBodies
+from agent.comms.unidentified_vehicles import (
+    MEMORY_S,
+    SILENCE_S,
+    Departed,
+    Member,
+    UnidentifiedVehicles,
+)
 from tests.agent.comms.making import ORIGIN, beacon
 
 BODY = (1.0, 0.0, 0.0)
@@ -15,32 +21,32 @@ def looked(bodies, now_s, sensed=(BODY,), team=(FAR_MEMBER,), departed=(), here=
 
 
 def test_a_body_is_silent_once_nothing_was_heard_of_it_for_long():
-    bodies = SilentBodies(0.5)
+    bodies = UnidentifiedVehicles(0.5)
     assert looked(bodies, 10.0) == ()
     assert looked(bodies, 10.0 + SILENCE_S - 0.1) == ()
     assert looked(bodies, 10.0 + SILENCE_S) == (BODY,)
 
 
 def test_a_member_that_fell_silent_where_its_body_hovers_is_silent_at_once():
-    bodies = SilentBodies(0.5)
+    bodies = UnidentifiedVehicles(0.5)
     assert looked(bodies, 10.0, team=(FAR_MEMBER, Member(BODY, 1.4))) == ()
     assert looked(bodies, 10.2, departed=[Departed(BODY, 8.6)]) == (BODY,)
 
 
 def test_a_member_that_fell_silent_elsewhere_explains_no_body():
-    bodies = SilentBodies(0.5)
+    bodies = UnidentifiedVehicles(0.5)
     assert looked(bodies, 10.0, departed=[Departed((1.0, 0.5, 0.0), 8.0)]) == ()
 
 
 def test_a_member_explains_a_body_as_far_as_it_may_have_flown_since():
-    bodies = SilentBodies(0.5)
+    bodies = UnidentifiedVehicles(0.5)
     old = Member((2.0, 0.0, 0.0), 1.5)
     for now_s in (10.0, 12.0, 14.0):
         assert looked(bodies, now_s, team=(FAR_MEMBER, old)) == ()
 
 
 def test_a_body_beyond_whom_one_hears_may_be_out_of_the_radios_range():
-    bodies = SilentBodies(0.5)
+    bodies = UnidentifiedVehicles(0.5)
     for now_s in (10.0, 12.0, 14.0):
         assert (
             bodies.look(
@@ -54,7 +60,7 @@ def test_a_body_beyond_whom_one_hears_may_be_out_of_the_radios_range():
     ("away", "remembered"), [((3.0, 0.0, 0.0), True), ((0.5, 0.0, 0.0), False)]
 )
 def test_a_body_is_remembered_out_of_sight_but_not_where_it_would_be_seen(away, remembered):
-    bodies = SilentBodies(0.5)
+    bodies = UnidentifiedVehicles(0.5)
     for now_s in (10.0, 12.0):
         looked(bodies, now_s)
     assert looked(bodies, 12.2, sensed=(), here=away) == ((BODY,) if remembered else ())
@@ -62,7 +68,7 @@ def test_a_body_is_remembered_out_of_sight_but_not_where_it_would_be_seen(away, 
 
 
 def test_a_body_that_flies_past_is_not_remembered_where_it_was_seen_last():
-    bodies = SilentBodies(0.5)
+    bodies = UnidentifiedVehicles(0.5)
     gone = [Departed((1.0, 0.0, 0.0), 8.0)]
     assert looked(bodies, 10.0, departed=gone) == (BODY,)
     for step in range(1, 12):
@@ -72,7 +78,7 @@ def test_a_body_that_flies_past_is_not_remembered_where_it_was_seen_last():
 
 @pytest.mark.parametrize("tells", [True, False])
 def test_a_neighbour_who_would_see_a_remembered_body_and_tells_of_none_is_believed(tells):
-    bodies = SilentBodies(0.5)
+    bodies = UnidentifiedVehicles(0.5)
     for now_s in (10.0, 12.0):
         looked(bodies, now_s)
     witness = beacon(5, 1, 12.2, at=(1.0, 1.0, 0.0))

@@ -11,7 +11,7 @@ from agent.guidance.safety_filter import (
     Bound,
     PromiseFilter,
     RangingFilter,
-    Told,
+    TelemetryRow,
     limited,
     shortened,
 )
@@ -117,7 +117,7 @@ class Speaker:
                 self.heard = message
         stamp, position, cap = self.heard
         relative = tuple(b - a for a, b in zip(self.position, position, strict=True))
-        told = [Told(relative, now - stamp, cap)]
+        told = [TelemetryRow(relative, now - stamp, cap)]
         self.filter.promise(now, told)
         self.cap = self.filter.speed_cap
         wanted = tuple(0.5 * x / max(hypot(*relative), 1e-9) for x in relative)
@@ -156,7 +156,7 @@ def test_promises_keep_blind_pairs_apart(loss, delay_s):
 
 def test_a_promise_is_kept_for_three_seconds():
     promises = PromiseFilter(D_OB, 0.5, 0.05)
-    near = [Told((0.4, 0.0, 0.0), 0.0, 0.5)]
+    near = [TelemetryRow((0.4, 0.0, 0.0), 0.0, 0.5)]
     low = promises.promise(0.0, near)
     for tick in range(1, 60):
         promises.promise(tick * 0.05, [])

@@ -8,7 +8,7 @@ import pytest
 from agent.config import Sensors
 from agent.messages import Observation, Scan
 from agent.sensing.ray_pattern import pattern_of
-from agent.sensing.sensor_health import LOOKS, PROXIMITY, Trust
+from agent.sensing.sensor_health import LOOKS, PROXIMITY, SensorHealth
 from tests.agent.comms.making import beacon
 
 LASER = pattern_of("laser", Sensors(), 20.0)
@@ -22,7 +22,7 @@ def seen(tick, x=0.0, vehicles=(), scans=(), obstacles=()):
 
 
 def trust(patterns=(), ranging=True, noisy=(PROXIMITY, 0)):
-    return Trust(patterns, ranging, frozenset(noisy), 20.0, 0.5)
+    return SensorHealth(patterns, ranging, frozenset(noisy), 20.0, 0.5)
 
 
 def test_a_reading_that_stays_while_one_moves_is_doubted_until_it_changes():

@@ -1,0 +1,60 @@
+"""The lockstep shell of an agent: each observation has its inbox, and it waits for both.
+
+A message of another slot ends the run.
+"""
+
+from collections.abc import Callable
+
+from agent.codec import RejectedError, decode_observation
+from agent.config import AgentSetup
+from agent.stepping import Controls
+from netem.wire.barrier import TURN_RING, LockstepError, answer, same_slot
+from netem.wire.bus import Bus, Ring
+from netem.wire.frame import Batch, Inbox, WireError, unpack_batch, unpack_inbox
+
+
+class LockstepAgent:
+    """In lockstep: each observation has its inbox, and both are waited for.
+
+    unwanted: whether the run is over.
+    """
+
+    def __init__(self, bus: Bus, setup: AgentSetup, unwanted: Callable[[], bool]) -> None:
+        command = bus.putter("command", setup.id, lockstep=True)
+        self._controls = Controls(setup, command, bus.putter("tx", setup.id, lockstep=True))
+        self._inbox = bus.ring("rx", setup.id, TURN_RING)
+        self._unwanted = unwanted
+
+    def see(self, data: bytes) -> None:
+        """Step on an observation, with what was heard by its slot.
+
+        Raises LockstepError where either is missing, cannot be read or is of another slot;
+        UnwantedError when the run ends meanwhile.
+        """
+        try:
+            observation = decode_observation(data)
+        except RejectedError as error:
+            raise LockstepError(f"an observation that cannot be read: {error}") from error
+        what = f"the inbox of slot {observation.slot}"
+        inbox = _inbox(what, self._inbox, self._unwanted)
+        same_slot(what, inbox.slot, observation.slot)
+        for batch in inbox.batches:
+            self._controls.hear(_batch(what, batch), observation.time_s)
+        self._controls.step(observation)
+
+    def report(self) -> None:
+        """Say nothing: in turns nothing is late."""
+
+
+def _inbox(what: str, ring: Ring, unwanted: Callable[[], bool]) -> Inbox:
+    try:
+        return unpack_inbox(answer(ring, what, unwanted))
+    except WireError as error:
+        raise LockstepError(f"{what}: {error}") from error
+
+
+def _batch(what: str, data: bytes) -> Batch:
+    try:
+        return unpack_batch(data)
+    except WireError as error:
+        raise LockstepError(f"{what}: {error}") from error
