@@ -100,7 +100,7 @@ def _checked(answer: bytes) -> AgentSetup:
 
 
 def _fly(bus: Bus, setup: AgentSetup, run: str, stop: Stop) -> None:
-    observations, ending = bus.ring("observation", setup.id), Ending(bus, stop)
+    observations, ending = bus.ring("observation", setup.id), Ending(bus.ring("over"), stop)
     shell = LockstepAgent(bus, setup, ending) if setup.lockstep else FreeRunningAgent(bus, setup)
     _wait_for_ears(bus, ending)
     bus.show_life(f"agent-{setup.id}")

@@ -118,7 +118,7 @@ def _serve_run(bus: Bus, server: SetupServer, setup: MediumSetup, stop: Stop) ->
     print(
         f"{name} serves run {server.run!r} of {setup.agents} agents, seed {setup.seed}", flush=True
     )
-    truths, ending = bus.ring("truth", size=TRUTH_RING), Ending(bus, stop)
+    truths, ending = bus.ring("truth", size=TRUTH_RING), Ending(bus.ring("over"), stop)
     radio = (
         LockstepMedium(bus, setup, server.shard, ending)
         if setup.lockstep

@@ -97,12 +97,11 @@ def flights(folder: Path) -> dict[str, list[str]]:
         for file in sorted(LIBRARY.glob("*.toml"))
     }
     rows["wedge-9 at 50 %, 200 ms, 40 ms"] = ["sim", wedge, "--seed", "1", *lossy]
-    rows["chaos"] = ["sim", str(chaos)]
-    for name, file in (("chaos", chaos), ("wedge-9", wedge)):
-        lockstep = ["run", str(file), "--seed", "1", "--lockstep", "--duration", "12"]
-        rows[f"{name} in lockstep"] = lockstep
-        rows[f"{name} in lockstep, 2 mediums"] = [*lockstep, "--shards", "2"]
-        rows[f"{name}, 12 s"] = ["sim", str(file), "--seed", "1", "--duration", "12"]
+    for name, file, seconds in (("chaos", chaos, "30"), ("wedge-9", wedge, "12")):
+        flight = [str(file), "--seed", "1", "--duration", seconds]
+        rows[f"{name}, {seconds} s"] = ["sim", *flight]
+        rows[f"{name} in lockstep"] = ["run", *flight, "--lockstep"]
+        rows[f"{name} in lockstep, 2 mediums"] = ["run", *flight, "--lockstep", "--shards", "2"]
     return rows
 
 

@@ -8,8 +8,10 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import TYPE_CHECKING
 
-from netem.wire.bus import Bus
+if TYPE_CHECKING:
+    from netem.wire.bus import Ring
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -31,11 +33,14 @@ class Stop:
 
 
 class Ending:
-    """Whether the run is over for this process: it was asked to end, or the world says so."""
+    """Whether the run is over for this process: it was asked to end, or the world says so.
 
-    def __init__(self, bus: Bus, stop: Stop) -> None:
+    over: the ring of the topic on which the world says so.
+    """
+
+    def __init__(self, over: "Ring", stop: Stop) -> None:
         self._told = False
-        self._over = bus.ring("over")
+        self._over = over
         self._stop = stop
 
     def __call__(self) -> bool:

@@ -6,7 +6,7 @@ from random import Random
 import pytest
 
 from agent.config import Vehicle
-from agent.guidance import guard
+from agent.guidance import safety_monitor
 from agent.guidance.nonholonomic import forward_kept
 from agent.guidance.safety_filter import Bound, approach_of
 from tests.laws.kinds import Craft, anything, least_distance, straight
@@ -51,7 +51,7 @@ def test_nobody_comes_nearer_to_what_stands_than_its_clearance(name):
 
 
 def test_without_reckoning_the_brakes_they_collide(monkeypatch):
-    monkeypatch.setattr(guard.Guard, "_stopping_s", lambda self, speed: 0.0)
+    monkeypatch.setattr(safety_monitor.Guard, "_stopping_s", lambda self, speed: 0.0)
     crafts = [CRAFTS["fast"]] * 2
     assert min(least_distance(Random(seed), crafts)[1] for seed in range(60)) < D_OB - 0.01
 
