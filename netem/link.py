@@ -10,7 +10,7 @@ from math import inf, log10
 
 import msgspec
 
-from netem.messages import GilbertElliott, PathLoss
+from netem.link_keys import GilbertElliott, PathLoss
 from netem.random_draws import SHAPES, SHARING, Numbers, below, correlated, draw, draw_shared, pair
 from netem.range_index import Near
 from netem.rate_queue import RateQueue

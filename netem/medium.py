@@ -24,9 +24,9 @@ from netem.link import (
     Sending,
     Verdict,
 )
+from netem.link_keys import Conditions
 from netem.messages import (
     Changed,
-    Conditions,
     Flapped,
     Healed,
     Jammed,

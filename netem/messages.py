@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from netem.link_keys import Conditions, Table
 from netem.wire.frame import AgentId, Count, unpack_typed
 
 Metres = Annotated[float, Meta(ge=-1e6, le=1e6)]
@@ -16,79 +17,8 @@ MAX_CONDITIONS_B = 1024 * 1024
 MAX_ORDERS_B = 1024 * 1024
 MAX_TURN_B = MAX_TRUTH_B + MAX_ORDERS_B
 MAX_DONE_B = 4 * 1024 * 1024
-MIN_RATE_KBIT = 0.001
-"""A byte in 8 s; below that a frame would be on the air for longer than any flight."""
-
 FlapPeriod = Annotated[float, Meta(ge=0.05, le=86_400)]
 """How long a flap takes [s]; faster than slots it would be down by chance."""
-Percent = Annotated[float, Meta(ge=0, le=100)]
-
-
-class _Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A table within the conditions."""
-
-
-class GilbertElliott(_Table, frozen=True):
-    """Losses in bursts, in tc-netem's words (its p, r, 1-h, 1-k).
-
-    A link is good or bad. p_percent: from good to bad, for each frame; r_percent: back, so a burst
-    lasts 100 / r_percent frames on average. loss_bad_percent, loss_good_percent: of the frames sent
-    while it is one or the other.
-    """
-
-    p_percent: Percent
-    r_percent: Percent
-    loss_bad_percent: Percent = 100.0
-    loss_good_percent: Percent = 0.0
-
-
-class PathLoss(_Table, frozen=True):
-    """A soft edge: log-distance path loss with log-normal shadowing, drawn for each frame.
-
-    Over d [m] the loss is reference_loss_db + 10 exponent log10(d / reference_distance_m), and no
-    less than reference_loss_db. budget_db: the loss at which half of the frames are received;
-    shadowing_db: the standard deviation round it.
-    """
-
-    exponent: Annotated[float, Meta(gt=0, le=10)]
-    reference_loss_db: Annotated[float, Meta(ge=0, le=300)]
-    budget_db: Annotated[float, Meta(ge=0, le=300)]
-    reference_distance_m: Annotated[float, Meta(gt=0, le=1e6)] = 1.0
-    shadowing_db: Annotated[float, Meta(gt=0, le=50)] = 4.0
-
-
-class LinkKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The keys of a link as a scenario writes them; left out means: as the wider table says."""
-
-    range_m: Annotated[float, Meta(gt=0, le=1e6)] | None = None
-    delay_ms: Annotated[float, Meta(ge=0, le=60_000)] | None = None
-    jitter_ms: Annotated[float, Meta(ge=0, le=60_000)] | None = None
-    delay_correlation_percent: Annotated[float, Meta(ge=0, lt=100)] | None = None
-    distribution: Literal["uniform", "normal", "pareto", "paretonormal"] | None = None
-    loss_percent: Percent | None = None
-    duplicate_percent: Percent | None = None
-    corrupt_percent: Percent | None = None
-    reorder_percent: Percent | None = None
-    rate_kbit: Annotated[float, Meta(ge=MIN_RATE_KBIT, le=1e9)] | None = None
-    rate_overhead_b: Annotated[int, Meta(ge=0, le=10_000)] | None = None
-    limit: Annotated[int, Meta(ge=1, le=1_000_000)] | None = None
-    gemodel: GilbertElliott | None = None
-    path_loss: PathLoss | None = None
-
-
-class DirectedLink(LinkKeys, frozen=True, kw_only=True, rename={"source": "from"}):
-    """One directed link's own values."""
-
-    source: AgentId
-    to: AgentId
-
-
-class Conditions(LinkKeys, frozen=True):
-    """The radio's conditions: both channels, a channel's own values, a link's own values."""
-
-    local: LinkKeys = LinkKeys()
-    multihop: LinkKeys = LinkKeys()
-    link: tuple[DirectedLink, ...] = ()
 
 
 Groups = tuple[tuple[AgentId, ...], ...]
@@ -99,14 +29,14 @@ bridge: clean but for some agents that hear and are heard by all; ring: each age
 the two beside it in its list, the last beside the first."""
 
 
-class Jam(_Table, frozen=True):
+class Jam(Table, frozen=True):
     """A sphere [m; world frame]: no frame gets to or from a radio in it."""
 
     centre_m: Position
     radius_m: Annotated[float, Meta(gt=0, le=1e6)]
 
 
-class Flap(_Table, frozen=True):
+class Flap(Table, frozen=True):
     """Links that go down and up again: down for the first half of each period, from ``from_s`` on.
 
     links: directed, as (from, to); none: all.

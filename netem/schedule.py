@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from netem.link import LinkModel
-from netem.messages import Conditions, DirectedLink, LinkKeys
+from netem.link_keys import Conditions, DirectedLink, LinkKeys
 from netem.wire.frame import CHANNELS
 
 _Keys = TypeVar("_Keys", bound=LinkKeys)

@@ -4,8 +4,9 @@ import msgspec
 import pytest
 
 from netem.fault_queue import FaultQueue
+from netem.link_keys import Conditions
 from netem.medium import Medium
-from netem.messages import Changed, Conditions, Healed, MediumSetup, Orders, Parted
+from netem.messages import Changed, Healed, MediumSetup, Orders, Parted
 from netem.wire.frame import Outgoing, Transmission, WireError
 
 CHANGED, PARTED, HEALED = Changed(Conditions(loss_percent=100.0)), Parted(((0,),)), Healed()

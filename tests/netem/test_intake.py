@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netem.free_running import Intake
-from netem.messages import Conditions, MediumSetup
+from netem.link_keys import Conditions
+from netem.messages import MediumSetup
 from netem.wire.frame import (
     MAX_OUTGOING,
     MAX_PAYLOAD_B,

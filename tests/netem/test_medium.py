@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from netem.link_keys import Conditions, DirectedLink, LinkKeys
 from netem.medium import Medium
-from netem.messages import Conditions, DirectedLink, LinkKeys, MediumSetup
+from netem.messages import MediumSetup
 from netem.wire.frame import (
     LOCAL,
     MAX_BATCH_B,

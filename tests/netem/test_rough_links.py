@@ -6,8 +6,9 @@ from random import Random
 import pytest
 
 from netem.link import Cause, LinkModel, Memory, Verdict, edge_m, received, verdict
+from netem.link_keys import Conditions, DirectedLink, GilbertElliott, PathLoss
 from netem.medium import Medium
-from netem.messages import Conditions, DirectedLink, GilbertElliott, MediumSetup, PathLoss
+from netem.messages import MediumSetup
 from netem.random_draws import SHAPES, WIDEST, correlated
 from netem.range_index import LARGE, RangeIndex
 from netem.rate_queue import RateQueue

@@ -4,17 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netem.link import LinkModel
+from netem.link_keys import Conditions, DirectedLink, GilbertElliott, LinkKeys, PathLoss
 from netem.medium import Medium
-from netem.messages import (
-    Conditions,
-    DirectedLink,
-    GilbertElliott,
-    Healed,
-    LinkKeys,
-    MediumSetup,
-    Parted,
-    PathLoss,
-)
+from netem.messages import Healed, MediumSetup, Parted
 from netem.schedule import Schedule, overlaid
 from netem.wire.frame import LOCAL, MULTIHOP, Outgoing, Transmission
 

@@ -6,21 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netem.delivery_log import Digest, joined
+from netem.link_keys import Conditions, DirectedLink, GilbertElliott, LinkKeys, PathLoss
 from netem.medium import Medium
-from netem.messages import (
-    Conditions,
-    DirectedLink,
-    Flap,
-    Flapped,
-    GilbertElliott,
-    Healed,
-    Jam,
-    Jammed,
-    LinkKeys,
-    MediumSetup,
-    Parted,
-    PathLoss,
-)
+from netem.messages import Flap, Flapped, Healed, Jam, Jammed, MediumSetup, Parted
 from netem.wire.frame import Outgoing, Transmission
 
 AGENTS = 6

@@ -8,7 +8,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from netem.messages import Conditions, MediumSetup
+from netem.link_keys import Conditions
+from netem.messages import MediumSetup
 from netem.wire.bus import Bus, RefusedError
 from netem.wire.keys import Keys
 from netem.wire.session import SessionError, open_client, open_router

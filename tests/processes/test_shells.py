@@ -7,7 +7,8 @@ import pytest
 
 from agent.messages import Command, Telemetry
 from netem.free_running import Intake, Lateness
-from netem.messages import Conditions, MediumSetup
+from netem.link_keys import Conditions
+from netem.messages import MediumSetup
 from netem.wire.bus import RefusedError
 from netem.wire.frame import MAX_TRANSMISSION_B, Outgoing, Transmission, pack
 from worldsim.fleet import startup

@@ -4,7 +4,7 @@ from math import inf, pi
 
 import pytest
 
-from netem.messages import Conditions
+from netem.link_keys import Conditions
 from worldsim.scenario.file import parse
 from worldsim.scenario.start import BoxStart
 from worldsim.scenario.tables import Scenario

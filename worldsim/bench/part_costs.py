@@ -10,8 +10,8 @@ from agent.guidance.q_structure import QStructure
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation
 from agent.qstructure.target_frame import Frame
+from netem.link_keys import Conditions
 from netem.medium import Medium
-from netem.messages import Conditions
 from netem.wire.frame import LOCAL, Outgoing, Transmission
 from worldsim.bench.fleets import IN_RANGE_M, wedge
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from netem.barriers import Barriers
 from netem.link import mean_loss, stretch
-from netem.messages import Conditions, Flap, Jam
+from netem.link_keys import Conditions
+from netem.messages import Flap, Jam
 from netem.random_draws import WIDEST
 from netem.schedule import Schedule
 from netem.wire.frame import MULTIHOP

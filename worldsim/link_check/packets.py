@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from netem.delivery_log import entries
 from netem.link import Cause, LinkModel
+from netem.link_keys import Conditions, LinkKeys
 from netem.medium import Medium
-from netem.messages import Conditions, LinkKeys, MediumSetup
+from netem.messages import MediumSetup
 from netem.wire.frame import Outgoing, Transmission
 
 PACKETS = 100_000

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from netem.link import LinkModel
-from netem.messages import Conditions
+from netem.link_keys import Conditions
 from netem.schedule import Schedule, overlaid
 from netem.wire.frame import CHANNELS
 from worldsim.scenario.tables import Scenario

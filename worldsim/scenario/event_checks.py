@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from agent.codec import encode_formation
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
-from netem.messages import Conditions
+from netem.link_keys import Conditions
 from worldsim.scenario.events import ACTIONS, UNDONE, EventTable
 from worldsim.scenario.radio_faults import flap_faults, partition_faults
 from worldsim.scenario.rules import TARGET_FLOOR_M, Finding, tilts_where_asked

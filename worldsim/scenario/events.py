@@ -9,7 +9,8 @@ from msgspec import Meta
 
 from agent.config import Positive, Table
 from agent.qstructure.formation import FormationSpec
-from netem.messages import Conditions, Jam
+from netem.link_keys import Conditions
+from netem.messages import Jam
 from worldsim.scenario.radio_faults import FlapTable, Groups, PartitionTable
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.target_frame import FrameChange, Time

@@ -12,7 +12,8 @@ from msgspec import Meta
 from agent.config import AgentSetup, Comms, Control, Hertz, Positive, Sensors, Table, Vehicle
 from agent.messages import AgentId
 from agent.qstructure.formation import FormationSpec
-from netem.messages import Conditions, MediumSetup
+from netem.link_keys import Conditions
+from netem.messages import MediumSetup
 from worldsim.scenario.events import EventTable
 from worldsim.scenario.obstacle_tables import ObstacleField, Obstacles
 from worldsim.scenario.start import BoxStart, ListStart

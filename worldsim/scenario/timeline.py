@@ -10,9 +10,9 @@ from typing import Literal, NamedTuple
 
 from agent.messages import FramePath
 from agent.qstructure.formation import FormationSpec
+from netem.link_keys import Conditions
 from netem.messages import (
     Changed,
-    Conditions,
     Flap,
     Flapped,
     Groups,
