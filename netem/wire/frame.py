@@ -33,7 +33,7 @@ MAX_DELIVERY_B = MAX_BATCH_B + 5 * (MAX_FRAMES + 1)
 
 Count = Annotated[int, Meta(ge=0, lt=2**53)]
 AgentId = Annotated[int, Meta(ge=0, lt=2**16)]
-MessageSocket = Annotated[int, Meta(ge=0, lt=len(CHANNELS))]
+Channel = Annotated[int, Meta(ge=0, lt=len(CHANNELS))]
 Payload = Annotated[bytes, Meta(max_length=MAX_PAYLOAD_B)]
 
 
@@ -44,7 +44,7 @@ class WireError(ValueError):
 class Outgoing(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
     """A payload that an agent hands to its radio, for one channel."""
 
-    channel: MessageSocket
+    channel: Channel
     payload: Payload
 
 
@@ -63,7 +63,7 @@ class Frame(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unkno
 
     source: AgentId
     incarnation: Count
-    channel: MessageSocket
+    channel: Channel
     count: Count
     payload: Payload
 
