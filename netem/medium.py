@@ -13,8 +13,9 @@ from math import inf
 
 import msgspec
 
-from netem.barriers import Barriers
+from netem.conditions import NetworkConditions
 from netem.delivery_log import FATE, HEAD, DeliveryLog
+from netem.faults import FaultOrder, Position
 from netem.link import (
     LOST_TO_PARTITION,
     LOST_TO_QUEUE,
@@ -24,22 +25,9 @@ from netem.link import (
     Sending,
     Verdict,
 )
-from netem.link_keys import Conditions
-from netem.messages import (
-    Changed,
-    Flapped,
-    Healed,
-    Jammed,
-    MediumCounters,
-    MediumSetup,
-    Parted,
-    Position,
-    RadioOrder,
-    packets_of,
-)
+from netem.messages import MediumCounters, MediumSetup, packets_of
 from netem.range_index import Near, RangeIndex
 from netem.rate_queue import RateQueue
-from netem.schedule import Schedule
 from netem.wire.frame import (
     BATCH_HEAD_B,
     CHANNELS,
@@ -74,9 +62,8 @@ class Medium:
         own = tuple(sorted(range(setup.agents) if receivers is None else receivers))
         self._own = frozenset(own)
         self._links = Links(sha256(b"qswarm medium %d" % setup.seed).digest())
-        self._schedule = Schedule(setup.conditions)
-        self._barriers = Barriers()
-        self._near = RangeIndex(setup.agents, own)
+        self._conditions = NetworkConditions(setup.conditions)
+        self._range_index = RangeIndex(setup.agents, own)
         self._others = [len(own) - (agent in self._own) for agent in range(setup.agents)]
         self._queues: list[list[_InFlight]] = [[] for _ in range(setup.agents)]
         self._counts: dict[tuple[int, int, int], int] = {}
@@ -88,29 +75,15 @@ class Medium:
 
     def place(self, positions: tuple[Position | None, ...]) -> None:
         """Take the true positions, row i = agent i [m; world frame]; None where no radio is."""
-        self._near.place(positions)
+        self._range_index.place(positions)
         if None in positions:
             for receiver, where in enumerate(positions):
                 if where is None and self._queues[receiver]:
                     self.discard(receiver)
 
-    def obey(self, order: RadioOrder) -> None:
-        """Carry out an order, between slots: later frames meet it, those in flight do not."""
-        match order:
-            case Changed(conditions=conditions):
-                self.change(conditions)
-            case Parted():
-                self._barriers.partition(order.groups, order.kind, order.bridge)
-            case Healed():
-                self._barriers.heal()
-            case Jammed():
-                self._barriers.jam(order.number, order.jam)
-            case Flapped():
-                self._barriers.flap(order.number, order.flap)
-
-    def change(self, conditions: Conditions) -> None:
-        """Judge later frames under other conditions; what is in flight has its verdict."""
-        self._schedule.change(conditions)
+    def obey(self, order: FaultOrder) -> None:
+        """Begin or end a fault, between slots: it meets later frames, not those in flight."""
+        self._conditions.apply(order)
 
     def transmit(self, source: int, sent_s: float, transmission: Transmission) -> None:
         """Judge one agent's frames of one slot, sent at ``sent_s`` [s], on every link."""
@@ -186,19 +159,19 @@ class Medium:
 
     def _spread(self, frame: Frame, sent_s: float) -> None:
         """Judge one frame on its link to every other agent, in order of their ids."""
-        source, channel = frame.source, frame.channel
+        source, channel, models = frame.source, frame.channel, self._conditions.models
         key = (source, frame.incarnation, channel, frame.count)
         sending = Sending(frame, key, sent_s, 0.0)
-        sender = self._schedule.sender(channel)
+        sender = models.of_channel(channel)
         if sender.rate_kbit < inf:
             waited_s = self._queued(sending, sender)
             if waited_s is None:
                 return
             sending = Sending(frame, key, sent_s, waited_s)
-        near = self._near.of(source, self._schedule.reach_m(channel, source))
+        near = self._range_index.of(source, models.reach_m(channel, source))
         self._fates[Cause.DROPPED_RANGE] += self._others[source] - len(near)
-        alike = self._schedule.alike(channel, source)
-        if alike is None or not alike.plain or self._barriers.raised:
+        alike = models.common(channel, source)
+        if alike is None or not alike.plain or self._conditions.obstructed:
             self._cross(sending, near)
         elif alike.draws:
             self._cross_plain(sending, near, alike)
@@ -246,12 +219,13 @@ class Medium:
         self.in_flight += across
 
     def _cross(self, sending: Sending, near: Near) -> None:
-        """Judge a frame on each link to those who may hear it."""
+        """Judge a frame on each link to those in reach."""
         source, _, channel, _ = sending.key
-        head, links, barred = HEAD(*sending.key), self._links, self._barriers.raised
+        head, links, models = HEAD(*sending.key), self._links, self._conditions.models
+        obstructed = self._conditions.obstructed
         for receiver, distance_m in near:
-            link = self._schedule.model(channel, source, receiver)
-            if barred and self._bars(source, receiver, sending.sent_s):
+            link = models.of_link(channel, source, receiver)
+            if obstructed and self._is_cut(source, receiver, sending.sent_s):
                 self._note(sending, head, receiver, LOST_TO_PARTITION)
             elif link.plain:
                 fates = links.plain(link, sending, [(receiver, distance_m)])
@@ -284,11 +258,11 @@ class Medium:
         self._queues[receiver].append((sending.sent_s + delay_s, *sending.key, copy, frame))
         self.in_flight += 1
 
-    def _bars(self, source: int, receiver: int, now_s: float) -> bool:
-        """Whether anything stands between two radios that are there."""
-        ends = (self._near.positions[source], self._near.positions[receiver])
-        return self._barriers.cut(source, receiver, now_s) or any(
-            where is not None and self._barriers.jammed(where) for where in ends
+    def _is_cut(self, source: int, receiver: int, now_s: float) -> bool:
+        """Return whether a fault keeps two radios apart at a time [s]."""
+        ends = (self._range_index.positions[source], self._range_index.positions[receiver])
+        return self._conditions.cuts(source, receiver, now_s) or any(
+            where is not None and self._conditions.jammed(where) for where in ends
         )
 
 

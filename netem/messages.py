@@ -1,93 +1,27 @@
 """What the world tells the medium: the conditions, each slot the true positions, and orders."""
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta
 
-from netem.link_keys import Conditions, Table
+from netem.faults import FaultOrder, Position
+from netem.link_keys import Conditions
 from netem.wire.frame import AgentId, Count, unpack_typed
-
-Metres = Annotated[float, Meta(ge=-1e6, le=1e6)]
-Position = tuple[Metres, Metres, Metres]
 
 MAX_TRUTH_B = 256 * 1024
 MAX_CONDITIONS_B = 1024 * 1024
 MAX_ORDERS_B = 1024 * 1024
 MAX_TURN_B = MAX_TRUTH_B + MAX_ORDERS_B
 MAX_DONE_B = 4 * 1024 * 1024
-FlapPeriod = Annotated[float, Meta(ge=0.05, le=86_400)]
-"""How long a flap takes [s]; faster than slots it would be down by chance."""
 
 
-Groups = tuple[tuple[AgentId, ...], ...]
-"""Who hears whom in a partition; the agents that no group names form one more."""
-PartitionKind = Literal["clean", "one_way", "bridge", "ring"]
-"""clean: a group hears itself alone; one_way: a group hears all and is heard by itself alone;
-bridge: clean but for some agents that hear and are heard by all; ring: each agent of a group has
-the two beside it in its list, the last beside the first."""
-
-
-class Jam(Table, frozen=True):
-    """A sphere [m; world frame]: no frame gets to or from a radio in it."""
-
-    centre_m: Position
-    radius_m: Annotated[float, Meta(gt=0, le=1e6)]
-
-
-class Flap(Table, frozen=True):
-    """Links that go down and up again: down for the first half of each period, from ``from_s`` on.
-
-    links: directed, as (from, to); none: all.
-    """
-
-    period_s: FlapPeriod
-    from_s: Annotated[float, Meta(ge=0, le=1e9)] = 0.0
-    links: Annotated[tuple[tuple[AgentId, AgentId], ...], Meta(max_length=10_000)] = ()
-
-
-class Changed(msgspec.Struct, frozen=True, tag="change", forbid_unknown_fields=True):
-    """From now on the radio is under other conditions, all of them given anew."""
-
-    conditions: Conditions
-
-
-class Parted(msgspec.Struct, frozen=True, tag="partition", forbid_unknown_fields=True):
-    """From now on groups are parted, as ``kind`` says; ``bridge``: those whom all hear."""
-
-    groups: Groups
-    kind: PartitionKind = "clean"
-    bridge: tuple[AgentId, ...] = ()
-
-
-class Healed(msgspec.Struct, frozen=True, tag="heal", forbid_unknown_fields=True):
-    """From now on there are no groups."""
-
-
-class Jammed(msgspec.Struct, frozen=True, tag="jam", forbid_unknown_fields=True):
-    """From now on there is a jam under that number, or with None none."""
-
-    number: Count
-    jam: Jam | None = None
-
-
-class Flapped(msgspec.Struct, frozen=True, tag="flap", forbid_unknown_fields=True):
-    """From now on links flap, under that number, or with None they do not."""
-
-    number: Count
-    flap: Flap | None = None
-
-
-RadioOrder = Changed | Parted | Healed | Jammed | Flapped
-"""What the medium does between slots."""
-
-
-class Orders(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Orders to carry out, one after the other, before a slot."""
+class FaultOrders(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """FaultOrders to carry out, one after the other, before a slot."""
 
     slot: Count
-    orders: tuple[RadioOrder, ...]
+    orders: tuple[FaultOrder, ...]
 
 
 class MediumSetup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -179,7 +113,7 @@ class Turn(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknow
     truth: Truth
     participants: tuple[AgentId, ...]
     incarnations: tuple[Count, ...]
-    orders: tuple[RadioOrder, ...] = ()
+    orders: tuple[FaultOrder, ...] = ()
 
 
 class Done(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):

@@ -9,7 +9,7 @@ from math import nan, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from netem.messages import Position
+from netem.faults import Position
 
 LARGE = 40
 """From so many radios on, arrays are quicker."""

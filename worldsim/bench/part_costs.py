@@ -73,8 +73,8 @@ def frame_us(agents: int, link: Conditions = Conditions()) -> float:  # noqa: B0
         (LATTICE_M * (i % side), LATTICE_M * (i // side % side), LATTICE_M * (i // side**2))
         for i in range(agents)
     )
-    medium = Medium(setup)
-    medium.change(msgspec.structs.replace(link, range_m=1.5 * LATTICE_M))
+    conditions = msgspec.structs.replace(link, range_m=1.5 * LATTICE_M)
+    medium = Medium(msgspec.structs.replace(setup, conditions=conditions))
     said = Transmission(0, 0, (Outgoing(LOCAL, bytes(PAYLOAD_B)),))
 
     def tick(number: int) -> None:

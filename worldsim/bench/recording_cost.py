@@ -9,6 +9,7 @@ import numpy as np
 
 from agent.comms.hierarchy import MEMBER, SUB_VERTEX, VERTEX
 from worldsim.bench.fleets import IN_RANGE_M, wedge
+from worldsim.judge.run_events import SlotChanged
 from worldsim.judge.tick import Standings, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording.recorder import RunRecorder
@@ -41,7 +42,7 @@ def _recorded(agents: int) -> tuple[float, float]:
         recorder = RunRecorder(path, scenario, "bench", mode="virtual")
         begun_s = process_time()
         for tick, figures in rows:
-            recorder.event({"t_s": tick.time_s, "kind": "slot", "agent": 0, "place": [0, 1]})
+            recorder.event(SlotChanged(t_s=tick.time_s, agent=0, place=(0, 1), before=None))
             recorder.tick(tick, figures)
         recorder.close()
         spent_s = process_time() - begun_s

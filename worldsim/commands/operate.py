@@ -8,6 +8,7 @@ import typer
 from worldsim.commands.options import RunFolder, examples
 
 VERBS = ("kill", "leave", "restart", "pause", "resume", "join")
+UNSPOKEN = frozenset({"planned", "by", "tables", "conditions", "path", "number"})
 RADIO = ("show", "set", "partition", "heal", "jam", "flap")
 ForSeconds = Annotated[
     float | None, typer.Option("--for", metavar="S", help="Undo it after so many seconds.")
@@ -105,28 +106,36 @@ def _told(run: Path, event: dict[str, Any], **terms: Any) -> int:
     """Ask for an event, and print what came of it."""
     from worldsim.fleet.control import Request
     from worldsim.fleet.operator_client import ask
+    from worldsim.judge.run_events import as_row
 
     if (for_s := terms.pop("for_s", None)) is not None:
         event = {**event, "for_s": for_s}
-    for told in ask(run, Request(event, **terms)).events:
+    for told in map(as_row, ask(run, Request(event, **terms)).events):
         t_s, kind, agent = told.pop("t_s"), told.pop("kind"), told.pop("agent")
         whose = "" if agent is None else f" agent {agent}"
-        rest = ", ".join(f"{k} {v}" for k, v in told.items() if k not in {"planned", "by"})
+        rest = ", ".join(f"{k} {v}" for k, v in told.items() if k not in UNSPOKEN)
         print(f"{t_s:.2f} s: {kind}{whose}{': ' if rest else ''}{rest}")
     return 0
 
 
 def _shown(run: Path) -> int:
+    import msgspec
+
     from worldsim.fleet.control import Request
     from worldsim.fleet.operator_client import ask
     from worldsim.scenario.file import as_toml
 
     answer = ask(run, Request())
-    standing = {kind: each for kind, each in answer.barriers.items() if each}
+    standing: dict[str, list[dict[str, Any]]] = {}
+    for active in answer.faults:
+        for kind, keys in msgspec.to_builtins(active.fault).items():
+            if kind != "netem":
+                standing.setdefault(kind, []).append({"since_s": active.since_s, **keys})
     told = [_counted(kind, len(each)) for kind, each in standing.items() if kind != "partition"]
     parted = "parted" if "partition" in standing else "not parted"
     print(f"# at {answer.t_s:.2f} s, {', '.join([parted, *told])}")
-    conditions = {key: value for key, value in answer.conditions.items() if value != {}}
+    tables = msgspec.to_builtins(answer.conditions)
+    conditions = {key: value for key, value in tables.items() if value != {}}
     print(as_toml({"netem": conditions, **standing}), end="")
     return 0
 

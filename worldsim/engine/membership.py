@@ -1,317 +1,219 @@
-"""The team: who takes part, who is still booting, who is gone; and whom an action strikes.
+"""The team's membership: the state of each agent's process, and which agents an event means.
 
-A row belongs to one agent for the whole run. Rows of those who have not joined yet are the last.
+A row belongs to one agent for the whole run. The rows of agents that have not joined are the last.
 """
 
+from collections.abc import Set as AbstractSet
 from math import inf
-from typing import Literal, NamedTuple
+from typing import assert_never
 
 import numpy as np
 
-from agent.messages import Place, Vector
-from agent.qstructure.formation import Formation, FormationSpec
-from worldsim.scenario.start import BoxStart, ListStart
-from worldsim.scenario.tables import Scenario
-from worldsim.scenario.timeline import (
-    Action,
-    Failing,
-    Holding,
-    Joining,
-    Order,
-    Revival,
-    Strike,
-    UponRadio,
+from worldsim.engine.operations import (
+    AdmitAgents,
+    EndProcesses,
+    PauseProcesses,
+    ProcessOperation,
+    ResumeProcesses,
+    SetSensorMode,
+    StartProcesses,
 )
-from worldsim.truth.obstacles import Obstacles
-from worldsim.truth.start_positions import StartError, room_of, starts
+from worldsim.engine.placement import Placement
+from worldsim.engine.process_life import (
+    ALIVE,
+    ENDED,
+    KNOWN,
+    STARTED,
+    Cause,
+    State,
+    next_state,
+)
+from worldsim.engine.selection import Candidates, Claims, selected
+from worldsim.scenario.faults import (
+    Join,
+    Kill,
+    Leave,
+    Pause,
+    ProcessFault,
+    Restart,
+    Resume,
+    Selectors,
+    SensorFault,
+)
+from worldsim.scenario.tables import Scenario
+from worldsim.truth.start_positions import StartError
 from worldsim.truth.vehicle import Floats
-from worldsim.truth.world import World
 
-RANDOM_KEY = 0xFA17
-
-
-class Stop(NamedTuple):
-    """These agents' processes end now; kind kill or leave says what becomes of their vehicles."""
-
-    number: int
-    kind: str
-    agents: tuple[int, ...]
-    selectors: tuple[int | str, ...]
+SLACK_S = 1e-9
 
 
-class Fail(NamedTuple):
-    """Agents whose sensors, of a kind or all, fail in a mode; with none they work again."""
-
-    agents: tuple[int, ...]
-    sensor: str | None
-    mode: Literal["stuck", "silent", "wrong"] | None
-
-
-class Hold(NamedTuple):
-    """These agents' processes are stopped now (kind pause), or go on (resume)."""
-
-    number: int
-    kind: str
-    agents: tuple[int, ...]
-    selectors: tuple[int | str, ...]
-
-
-class Start(NamedTuple):
-    """These agents' processes start now, each with its incarnation; kind: restart or join.
-
-    stands: for those whose vehicle is not in the world where it is put, position [m; world frame]
-    and yaw [rad]. refused: why nobody starts, else None.
-    """
-
-    number: int
-    kind: str
-    incarnations: dict[int, int]
-    stands: dict[int, tuple[Vector, float]]
-    refused: str | None = None
-
-
-class Begin(NamedTuple):
-    """These agents have booted: they take part from now on."""
-
-    agents: tuple[int, ...]
-
-
-class Team:
-    """Everybody's part in a run, by row.
-
-    alive (N,): whose process takes part; awake (N,): who steps, too, for it is not paused.
-    """
+class Membership:
+    """The state of every agent's process, by row."""
 
     def __init__(self, scenario: Scenario) -> None:
         agents, rows = scenario.fleet.agents, scenario.rows
         self._scenario = scenario
-        self._obstacles = Obstacles(scenario.obstacle)
+        self._placement = Placement(scenario)
+        self._states = [State.RUNNING] * agents + [State.ABSENT] * (rows - agents)
+        self._boots_s: dict[int, float] = {}
+        self._struck: dict[int, tuple[int, ...]] = {}
         self.alive = np.arange(rows) < agents
+        """(N,): the process runs or is paused."""
         self.awake = self.alive.copy()
+        """(N,): the process runs, so the agent steps."""
         self.incarnations = [0] * rows
         self.known = agents
+        """How many ids are given."""
         self.whole = agents == rows
-        self._boots: dict[int, float] = {}
-        self._struck: dict[int, tuple[int, ...]] = {}
-        start = scenario.fleet.start
-        self._origin: list[tuple[BoxStart | ListStart, int]] = [(start, i) for i in range(agents)]
+        """Whether every row is alive."""
 
     @property
     def next_boot_s(self) -> float:
         """When the next agent has booted [s]; infinite when none is booting."""
-        return min(self._boots.values()) if self._boots else inf
+        return min(self._boots_s.values()) if self._boots_s else inf
 
     @property
     def first(self) -> int | None:
         """The lowest id that steps."""
         return int(np.argmax(self.awake)) if self.awake.any() else None
 
+    def state(self, agent: int) -> State:
+        """Return the state of an agent's process."""
+        return self._states[agent]
+
     def has(self, agent: int, incarnation: int | None) -> bool:
-        """Whether an agent takes part or boots, in its incarnation; None: in whichever."""
-        there = bool(self.alive[agent]) or agent in self._boots
-        return there and incarnation in {None, self.incarnations[agent]}
+        """Return whether an agent's process exists or boots, in its incarnation (None: in any)."""
+        started = self._states[agent] in STARTED
+        return started and incarnation in {None, self.incarnations[agent]}
 
-    def booted(self, time_s: float) -> Begin:
-        """Return those who have booted by a time [s]."""
-        return Begin(tuple(a for a, at_s in sorted(self._boots.items()) if at_s <= time_s + 1e-9))
+    def booted(self, time_s: float) -> AdmitAgents:
+        """Return the agents that have booted by a time [s]."""
+        return AdmitAgents(
+            tuple(a for a, at_s in sorted(self._boots_s.items()) if at_s <= time_s + SLACK_S)
+        )
 
-    def struck(
-        self, action: Strike, places: list[tuple[int, int] | None], formation: FormationSpec
-    ) -> Stop:
-        """Find whom a strike means; places: what each last claimed, in a formation."""
-        among = [a for a in range(self.known) if self.alive[a] or a in self._boots]
-        agents = self._selected(action.number, action.selectors, among, places, formation)
-        return Stop(action.number, action.kind, agents, action.selectors)
+    def begun(
+        self, number: int, fault: ProcessFault, claims: Claims, position: Floats, time_s: float
+    ) -> ProcessOperation:
+        """Return what a fault means that begins now.
 
-    def held(
-        self, action: Holding, places: list[tuple[int, int] | None], formation: FormationSpec
-    ) -> Hold:
-        """Find whose processes are to be stopped, or to go on."""
-        if action.kind == "pause":
-            among = np.flatnonzero(self.awake).tolist()
-        else:
-            among = np.flatnonzero(self.alive & ~self.awake).tolist()
-        agents = tuple(a for a in self._struck.get(action.number, ()) if a in among)
-        if action.selectors:
-            agents = self._selected(action.number, action.selectors, among, places, formation)
-        return Hold(action.number, action.kind, agents, action.selectors)
-
-    def failed(
-        self, action: Failing, places: list[tuple[int, int] | None], formation: FormationSpec
-    ) -> Fail:
-        """Find whose sensors fail, or work again."""
-        among = list(range(self.known))
-        agents = self._struck.get(action.number, ())
-        if action.selectors:
-            agents = self._selected(action.number, action.selectors, among, places, formation)
-        self._struck[action.number] = agents
-        return Fail(agents, action.sensor, action.mode)
-
-    def revived(self, action: Revival, position: Floats, time_s: float = 0.0) -> Start:
-        """Find who comes back at a time [s], and where.
-
-        position (N, 3): of all vehicles [m; world frame].
+        position: of all vehicles (N, 3) [m; world frame].
         """
-        among = [a for a in range(self.known) if not self.alive[a] and a not in self._boots]
-        agents: tuple[int, ...] = tuple(
-            a for a in self._struck.get(action.number, ()) if a in among
-        )
-        if action.selectors:
-            agents = self._selected(action.number, action.selectors, among, [], None)
-        incarnations = {agent: self.incarnations[agent] + 1 for agent in agents}
-        away = [agent for agent in agents if np.isnan(position[agent, 0])]
-        try:
-            stands = self._stands_again(action.number, away, position, time_s)
-        except StartError as error:
-            return Start(action.number, "restart", {}, {}, str(error))
-        return Start(action.number, "restart", incarnations, stands)
+        match fault:
+            case Kill() | Leave():
+                agents = self._selected(number, fault.selectors, STARTED, claims)
+                leaves = isinstance(fault, Leave)
+                return EndProcesses(number, agents, fault.selectors, leaves)
+            case Pause():
+                agents = self._selected(number, fault.selectors, {State.RUNNING}, claims)
+                return PauseProcesses(number, agents, fault.selectors)
+            case Resume():
+                agents = self._selected(number, fault.selectors, {State.PAUSED}, claims)
+                return ResumeProcesses(number, agents, fault.selectors)
+            case Restart():
+                agents = self._selected(number, fault.selectors, ENDED, claims)
+                return self._restarted(number, agents, position, time_s)
+            case Join():
+                return self._joined(number, fault, position, time_s)
+        assert_never(fault)
 
-    def joined(self, action: Joining, position: Floats, time_s: float = 0.0) -> Start:
-        """Return the next ids, and where they are put at a time [s]."""
-        agents = range(self.known, self.known + action.joiners)
-        try:
-            where = self._drawn(action.number, action.start, action.joiners, position, time_s)
-        except StartError as error:
-            return Start(action.number, "join", {}, {}, str(error))
-        self._origin += [(action.start, index) for index in range(action.joiners)]
-        return Start(
-            action.number, "join", dict.fromkeys(agents, 0), dict(zip(agents, where, strict=True))
-        )
+    def ended(
+        self, number: int, fault: ProcessFault, position: Floats, time_s: float
+    ) -> ProcessOperation | None:
+        """Return what the end of a fault means; None where it has nothing to undo."""
+        match fault:
+            case Kill() | Leave():
+                agents = self._still(number, ENDED)
+                return self._restarted(number, agents, position, time_s)
+            case Pause():
+                return ResumeProcesses(number, self._still(number, {State.PAUSED}), ())
+            case Resume() | Restart() | Join():
+                return None
+        assert_never(fault)
 
-    def take(self, deed: Stop | Hold | Start | Begin, time_s: float) -> None:
-        """Let a deed that was done count from a time [s] on."""
-        match deed:
-            case Stop(number=number, agents=agents):
+    def sensor_fault(
+        self, number: int, fault: SensorFault, ends: bool, claims: Claims
+    ) -> SetSensorMode:
+        """Return whose sensors fail now, or work again."""
+        if ends:
+            return SetSensorMode(number, self._struck.get(number, ()), fault.kind, None)
+        agents = self._selected(number, fault.agents, KNOWN, claims)
+        self._struck[number] = agents
+        return SetSensorMode(number, agents, fault.kind, fault.mode)
+
+    def apply(self, operation: ProcessOperation, time_s: float) -> None:
+        """Change the states as an operation did that was carried out at a time [s]."""
+        match operation:
+            case EndProcesses(number=number, agents=agents):
                 self._struck[number] = agents
-                for agent in agents:
-                    self.strike_out(agent)
-            case Hold(number=number, kind=kind, agents=agents):
-                if kind == "pause":
-                    self._struck[number] = agents
-                self.awake[list(agents)] = kind == "resume"
-            case Start(incarnations=incarnations):
-                for agent, incarnation in incarnations.items():
-                    self.incarnations[agent] = incarnation
-                    self._boots[agent] = time_s + self._scenario.fleet.boot_s
-                    self.known = max(self.known, agent + 1)
-            case Begin(agents=agents):
-                for agent in agents:
-                    del self._boots[agent]
-                    self.alive[agent] = self.awake[agent] = True
+                self._move(agents, "leave" if operation.leaves else "kill")
+            case PauseProcesses(number=number, agents=agents):
+                self._struck[number] = agents
+                self._move(agents, "pause")
+            case ResumeProcesses(agents=agents):
+                self._move(agents, "resume")
+            case StartProcesses(incarnations=incarnations):
+                self.incarnations = [
+                    incarnations.get(a, before) for a, before in enumerate(self.incarnations)
+                ]
+                self.known = max(self.known, *(agent + 1 for agent in incarnations), 0)
+                self._boots_s |= dict.fromkeys(incarnations, time_s + self._scenario.fleet.boot_s)
+                self._move(tuple(incarnations), operation.kind)
+            case AdmitAgents(agents=agents):
+                self._move(agents, "boot")
+            case _:
+                assert_never(operation)
+
+    def exited(self, agent: int) -> None:
+        """Note that an agent's process ended unplanned."""
+        self._move((agent,), "exit")
+
+    def _move(self, agents: tuple[int, ...], cause: Cause) -> None:
+        for agent in agents:
+            state = next_state(self._states[agent], cause)
+            self._states[agent] = state
+            self.alive[agent], self.awake[agent] = state in ALIVE, state is State.RUNNING
+            if state is not State.BOOTING:
+                self._boots_s.pop(agent, None)
         self.whole = bool(self.alive.all())
 
-    def strike_out(self, agent: int) -> None:
-        """Let an agent take part no more."""
-        self.alive[agent] = self.awake[agent] = self.whole = False
-        self._boots.pop(agent, None)
+    def _in(self, states: AbstractSet[State]) -> list[int]:
+        return [agent for agent in range(self.known) if self._states[agent] in states]
+
+    def _still(self, number: int, states: AbstractSet[State]) -> tuple[int, ...]:
+        """Return the agents that an event struck and that are still in a state."""
+        among = self._in(states)
+        return tuple(agent for agent in self._struck.get(number, ()) if agent in among)
 
     def _selected(
         self,
         number: int,
-        selectors: tuple[int | str, ...],
-        among: list[int],
-        places: list[tuple[int, int] | None],
-        spec: FormationSpec | None,
+        selectors: Selectors,
+        states: AbstractSet[State],
+        claims: Claims,
     ) -> tuple[int, ...]:
-        chosen: set[int] = set()
-        for selector in selectors:
-            if isinstance(selector, int):
-                chosen.add(selector)
-            elif selector == "all":
-                chosen.update(among)
-            elif selector.startswith("random:"):
-                chosen.update(self._random(number, int(selector.partition(":")[2]), among))
-            elif spec is not None:
-                awake = [agent for agent in among if self.awake[agent]]
-                chosen.update(_placed(selector, awake, places, self._formation(spec)))
-        return tuple(agent for agent in among if agent in chosen)
+        candidates = self._in(states)
+        running = [agent for agent in candidates if self.awake[agent]]
+        key = self._scenario.seed, number
+        return selected(selectors, Candidates(candidates, running), claims, key)
 
-    def _formation(self, spec: FormationSpec) -> Formation:
-        return Formation(spec, self._scenario.control.spacing_m)
+    def _restarted(
+        self, number: int, agents: tuple[int, ...], position: Floats, time_s: float
+    ) -> StartProcesses:
+        incarnations = {agent: self.incarnations[agent] + 1 for agent in agents}
+        away = [agent for agent in agents if np.isnan(position[agent, 0])]
+        try:
+            poses = self._placement.returning(number, away, position, time_s)
+        except StartError as error:
+            return StartProcesses(number, "restart", {}, {}, str(error))
+        return StartProcesses(number, "restart", incarnations, poses)
 
-    def _random(self, number: int, count: int, among: list[int]) -> list[int]:
-        key = [self._scenario.seed, number << 20 | RANDOM_KEY]
-        generator = np.random.Generator(np.random.Philox(key=key))
-        drawn: list[int] = generator.permutation(among)[:count].tolist()
-        return drawn
-
-    def _stands_again(
-        self, number: int, away: list[int], position: Floats, time_s: float
-    ) -> dict[int, tuple[Vector, float]]:
-        """Put those who had left where they came from: their listed place, or a new draw."""
-        stands: dict[int, tuple[Vector, float]] = {}
-        for agent in away:
-            start, index = self._origin[agent]
-            if isinstance(start, ListStart):
-                yaws = start.yaws_deg[index : index + 1] if start.yaws_deg is not None else None
-                start = ListStart(positions_m=start.positions_m[index : index + 1], yaws_deg=yaws)
-            taken = np.array([where for where, _ in stands.values()]).reshape(-1, 3)
-            there = np.concatenate((position, taken))
-            stands[agent] = self._drawn((number << 10) + agent, start, 1, there, time_s)[0]
-        return stands
-
-    def _drawn(
-        self,
-        number: int,
-        start: BoxStart | ListStart,
-        count: int,
-        position: Floats,
-        time_s: float,
-    ) -> list[tuple[Vector, float]]:
-        present = position[~np.isnan(position[:, 0])]
-        apart_m = self._scenario.control.separation_m
-        where, yaws = starts(
-            start,
-            count,
-            self._scenario.seed,
-            event=number + 1,
-            present=present,
-            apart_m=apart_m,
-            room=room_of(self._scenario, self._obstacles, time_s),
-        )
-        return [
-            ((x, y, z), yaw) for (x, y, z), yaw in zip(where.tolist(), yaws.tolist(), strict=True)
-        ]
-
-
-def _placed(
-    selector: str,
-    among: list[int],
-    places: list[tuple[int, int] | None],
-    formation: Formation,
-) -> list[int]:
-    """Return those who claim a vertex, or a place of a queue, by its name."""
-    word, _, name = selector.partition(":")
-    claims = [(agent, Place(*place)) for agent in among if (place := places[agent]) is not None]
-    if word == "vertex":
-        return [agent for agent, place in claims if place == formation.vertex_places[name]]
-    index = [queue.name for queue in formation.queues].index(name)
-    return [agent for agent, place in claims if index in formation.queues_of(place)]
-
-
-Deed = Stop | Hold | Fail | Start | Begin | UponRadio | Order
-"""What a clock carries out between slots."""
-Places = list[tuple[int, int] | None]
-
-
-def deed_of(
-    action: Action, team: Team, world: World, places: Places, formation: FormationSpec
-) -> Deed:
-    """Find out whom an action means now; places: what each last claimed, in a formation."""
-    match action:
-        case Strike():
-            return team.struck(action, places, formation)
-        case Holding():
-            return team.held(action, places, formation)
-        case Failing():
-            return team.failed(action, places, formation)
-        case Revival() | Joining():
-            return _come(action, team, world)
-    return action
-
-
-def _come(action: Revival | Joining, team: Team, world: World) -> Start:
-    position, time_s = world.fleet.position, world.time_s
-    if isinstance(action, Revival):
-        return team.revived(action, position, time_s)
-    return team.joined(action, position, time_s)
+    def _joined(self, number: int, join: Join, position: Floats, time_s: float) -> StartProcesses:
+        start = join.start or self._scenario.fleet.start
+        try:
+            poses = self._placement.joiners(number, start, join.count, position, time_s)
+        except StartError as error:
+            return StartProcesses(number, "join", {}, {}, str(error))
+        agents = range(self.known, self.known + join.count)
+        incarnations = dict.fromkeys(agents, 0)
+        return StartProcesses(number, "join", incarnations, dict(zip(agents, poses, strict=True)))

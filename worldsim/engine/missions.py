@@ -1,35 +1,59 @@
 """Missions on their way into the team: each goes to one agent, which spreads it by radio."""
 
+from typing import assert_never
+
 from agent.codec import encode_formation
 from agent.comms.mission import ORIGINS
 from agent.messages import Mission
-from worldsim.scenario.timeline import Order
+from agent.qstructure.formation import FormationSpec
+from worldsim.engine.operations import GiveMission
+from worldsim.scenario.faults import MissionChange
+from worldsim.scenario.tables import Scenario
+from worldsim.scenario.target_frame import FrameChange, changed, path_of
 
 
-class Orders:
-    """Keeps the newest mission until an agent says that it flies it.
+class Missions:
+    """What the team was last asked to form, and the mission that no agent has confirmed yet.
 
-    So an order outlives the agent that it was given to, and an observation that was lost.
+    A mission is pending until an agent reports that it flies it, so it outlives the agent that it
+    was given to, and an observation that was lost.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, scenario: Scenario) -> None:
+        self.formation = scenario.formation
+        self.frame = scenario.frame
         self.pending: Mission | None = None
         self.to: int | None = None
+        """The agent that the pending mission was given to; None: the lowest id."""
         self._issued = 0
+        self._flown = [0] * scenario.rows
 
-    def newest(self, newest_key: int) -> int:
-        """Return the version of the newest mission, issued or told of by an agent."""
-        return max(self._issued, newest_key // ORIGINS)
+    @property
+    def newest(self) -> int:
+        """The version of the newest mission, issued here or reported by an agent."""
+        return max(self._issued, max(self._flown) // ORIGINS)
 
-    def issue(self, order: Order, newest_key: int) -> int:
-        """Make a mission of an order, newer than any told so far; return its key."""
-        self._issued = order.version or self.newest(newest_key) + 1
-        self.to = order.to
+    def changed(self, change: MissionChange, at_s: float) -> GiveMission:
+        """Return the mission that changes the formation or the frame at a time [s]."""
+        match change:
+            case FormationSpec():
+                self.formation = change
+                return GiveMission("formation", self.formation, path_of(self.frame))
+            case FrameChange():
+                self.frame = changed(self.frame, change, at_s)
+                return GiveMission("frame", self.formation, path_of(self.frame))
+        assert_never(change)
+
+    def issue(self, mission: GiveMission) -> int:
+        """Make a mission pending, newer than any reported so far; return its key."""
+        self._issued = mission.version or self.newest + 1
+        self.to = mission.to
         key = self._issued * ORIGINS
-        self.pending = Mission(key, order.path, encode_formation(order.formation))
+        self.pending = Mission(key, mission.path, encode_formation(mission.formation))
         return key
 
-    def heard(self, key: int) -> None:
-        """Take note of the mission that an agent flies."""
+    def report(self, agent: int, key: int) -> None:
+        """Note the mission that an agent flies; 0 for an agent that starts."""
+        self._flown[agent] = key
         if self.pending is not None and key >= self.pending.key:
             self.pending = None

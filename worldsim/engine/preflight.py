@@ -8,7 +8,7 @@ from pathlib import Path
 
 from agent.controller import ControllerError
 from agent.controller import load as load_controller
-from worldsim.scenario.events import UPON_PROCESSES
+from worldsim.scenario.events import ON_PROCESSES
 from worldsim.scenario.rules import Finding, too_fast
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
@@ -38,7 +38,7 @@ def admit(scenario: Scenario, file: str | Path, command_ticks: int, by_hand: boo
 def _launcher(scenario: Scenario) -> Finding | None:
     """Say which event needs somebody who starts and ends processes."""
     for index, event in enumerate(scenario.event):
-        if event.kind in UPON_PROCESSES:
+        if event.kind in ON_PROCESSES:
             return Finding(
                 f"event[{index}].{event.kind}",
                 "needs the launcher (qswarm run): who is started by hand is ended by hand",

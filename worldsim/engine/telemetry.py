@@ -32,7 +32,7 @@ class TelemetryRow(msgspec.Struct, frozen=True, gc=False):
 NO_TELEMETRY = TelemetryRow((nan, nan, nan), (-1, -1), nan, nan, (), 0, -1, -1, -1, nan)
 
 
-def told_by(telemetry: Telemetry, heading: float) -> TelemetryRow:
+def telemetry_row(telemetry: Telemetry, heading: float) -> TelemetryRow:
     """Return an agent's telemetry as its row; heading: what it observed as its own [rad]."""
     return TelemetryRow(
         telemetry.target or NO_TELEMETRY.target,

@@ -9,9 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from time import perf_counter, process_time
+from typing import assert_never
 
 from agent.codec import decode_beacon, decode_command, decode_gossip, decode_observation, encode
 from agent.core import Agent, Decoders
+from netem.faults import FaultOrder
 from netem.medium import Medium
 from netem.messages import MediumCounters
 from netem.wire.frame import (
@@ -23,10 +25,19 @@ from netem.wire.frame import (
     unpack_batch,
     unpack_transmission,
 )
-from worldsim.engine.membership import Deed, Start, Stop
-from worldsim.engine.step import Event, Opened, Recorder, SlotLoop, world_of
+from worldsim.engine.operations import (
+    AdmitAgents,
+    EndProcesses,
+    GiveMission,
+    Operation,
+    PauseProcesses,
+    ResumeProcesses,
+    SetSensorMode,
+    StartProcesses,
+)
+from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
+from worldsim.judge.run_events import RunEvent
 from worldsim.scenario.tables import Scenario
-from worldsim.scenario.timeline import Change, Flapping, Heal, Jamming, Partition
 
 COMMAND_TICKS = 1
 """A command is valid for one tick: in virtual time none is ever late."""
@@ -70,9 +81,9 @@ class VirtualFleet:
 
     def slot(self) -> None:
         """Run one slot: what is due before it, truth, batches, steps, verdicts, flight."""
-        for deed in self.loop.due():
-            self.do(deed)
-            self.loop.take(deed)
+        for operation in self.loop.due():
+            self.carry_out(operation)
+            self.loop.apply(operation)
         opened = self.loop.open()
         self._medium.place(opened.positions)
         for agent, observation in opened.observations:
@@ -80,18 +91,25 @@ class VirtualFleet:
         self._deliver(opened.slot + 1)
         self.loop.close(self._medium.digest())
 
-    def do(self, deed: Deed) -> None:
+    def carry_out(self, operation: Operation) -> None:
         """Carry out what happens between slots."""
-        match deed:
-            case Stop(agents=agents):
+        match operation:
+            case EndProcesses(agents=agents):
                 for agent in agents:
+                    # An agent that still boots has its core already.
                     del self._agents[agent]
                     self._inboxes[agent].clear()
-            case Start(incarnations=incarnations):
+            case StartProcesses(incarnations=incarnations):
                 for agent, incarnation in incarnations.items():
                     self._agents[agent] = self._started(agent, incarnation)
-            case Change() | Partition() | Heal() | Jamming() | Flapping():
-                self._medium.obey(deed.order)
+            case FaultOrder():
+                self._medium.obey(operation)
+            case PauseProcesses() | ResumeProcesses() | AdmitAgents():
+                pass  # whether an agent steps is the loop's
+            case SetSensorMode() | GiveMission():
+                pass  # sensors and missions are the loop's
+            case _:
+                assert_never(operation)
 
     def _started(self, agent: int, incarnation: int) -> Agent:
         setup = self._scenario.agent_setup(agent, incarnation, COMMAND_TICKS)
@@ -114,7 +132,7 @@ class VirtualFleet:
     def _deliver(self, slot: int) -> None:
         """Hand what is due by a slot to the group that steps in it."""
         clock = self.loop.world.clock
-        alive, time_s = self.loop.team.alive.tolist(), clock.time_s(slot)
+        alive, time_s = self.loop.members.alive.tolist(), clock.time_s(slot)
         for agent in range(slot % clock.slots_per_tick, len(alive), clock.slots_per_tick):
             if alive[agent]:
                 batch = Batch(slot, self._medium.collect(agent, time_s))
@@ -124,7 +142,7 @@ class VirtualFleet:
 def fly(
     scenario: Scenario,
     recorder: Recorder | None = None,
-    on_event: Callable[[Event], None] | None = None,
+    on_event: Callable[[RunEvent], None] | None = None,
     on_progress: Callable[[SlotLoop], None] | None = None,
     unwanted: Callable[[], bool] = lambda: False,
 ) -> Flight:

@@ -1,7 +1,7 @@
-"""What an operator asks of a flying fleet: events of the timeline's kind, and how things stand.
+"""What an operator asks of a flying fleet: an event that happens now, or a report.
 
-Each request is checked against the fleet as it is. What is refused changes nothing; what is done
-is told in events as the timeline's own, by the operator.
+Each request is checked against the fleet as it is. A refused request changes nothing; one that is
+carried out is reported in events like the timeline's own, as ``by`` the operator.
 """
 
 from collections.abc import Callable
@@ -11,46 +11,63 @@ import msgspec
 import numpy as np
 import zenoh
 
+from netem.faults import RadioEvent
+from netem.link_keys import Conditions
 from netem.wire.bus import Bus, Waiting, drained
-from worldsim.engine.barriers import in_force
-from worldsim.engine.membership import Deed, Hold, Start, Stop
-from worldsim.engine.step import Event, SlotLoop
+from worldsim.engine.operations import (
+    EndProcesses,
+    GiveMission,
+    Operation,
+    PauseProcesses,
+    ResumeProcesses,
+    StartProcesses,
+)
+from worldsim.engine.step import SlotLoop
+from worldsim.judge.run_events import By, RunEvent
 from worldsim.scenario.decoding import decode
 from worldsim.scenario.event_checks import Present, broken_now
-from worldsim.scenario.events import UPON_PROCESSES, EventTable
+from worldsim.scenario.events import ON_PROCESSES, EventTable
 from worldsim.scenario.tables import Scenario
-from worldsim.scenario.timeline import Order
+from worldsim.scenario.timeline import Step
 from worldsim.scenario.toml import ScenarioError
 
 MAX_REQUEST_B = 64 * 1024
 MAX_VERSION = 2**31
 REQUESTS_A_SLOT = 4
 MISSIONS = ("formation", "frame")
-UNSPOKEN = frozenset({"tables", "conditions", "path"})
-Do = Callable[[Deed], None]
+CarryOut = Callable[[Operation, By], None]
 
 
 class Request(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """An event to happen now, its keys but ``at_s``; none: only tell how things stand.
-
-    to: the agent that a mission is given to; version: the mission's own.
-    """
+    """What an operator asks for: an event that happens now, or only a report."""
 
     event: dict[str, Any] | None = None
+    """The event's keys without ``at_s``; None: only report."""
     to: int | None = None
+    """The agent that a mission is given to; None: the lowest id."""
     version: int | None = None
+    """The mission's own; None: the next."""
+
+
+class ActiveFault(msgspec.Struct, frozen=True):
+    """A radio fault in force."""
+
+    number: int
+    since_s: float
+    """[s; simulated time]"""
+    fault: RadioEvent
 
 
 class Answer(msgspec.Struct, frozen=True):
-    """What came of a request: the time [s], the events, and the radio as it is since then.
-
-    barriers: what stands between radios, see ``in_force``.
-    """
+    """What a request led to, and the radio since then."""
 
     t_s: float
-    events: list[dict[str, Any]]
-    conditions: dict[str, Any]
-    barriers: dict[str, list[dict[str, Any]]]
+    """[s; simulated time]"""
+    events: tuple[RunEvent, ...]
+    conditions: Conditions
+    """The link conditions in force."""
+    faults: tuple[ActiveFault, ...]
+    """The radio faults in force, in the order of their beginning."""
 
 
 class RequestError(ValueError):
@@ -63,17 +80,18 @@ class Control:
     def __init__(self, scenario: Scenario, loop: SlotLoop, launcher: bool) -> None:
         self._scenario = scenario
         self._loop = loop
+        self._timeline = loop.effects.timeline
         self._launcher = launcher
 
-    def answer(self, asked: bytes, do: Do) -> Answer:
-        """Carry out a request by ``do``, or raise RequestError."""
+    def answer(self, asked: bytes, carry_out: CarryOut) -> Answer:
+        """Carry out a request, or raise RequestError."""
         request = _request(asked)
         before = len(self._loop.events)
         if request.event is not None:
-            event = self._event(request.event)
-            do(self._deed(event, request))
-            self._loop.timeline.undo_later(event)
-        return self._told(self._loop.events[before:])
+            step = self._timeline.begin_now(self._event(request.event))
+            carry_out(self._operation(step, request), "operator")
+            self._timeline.end_later(step)
+        return self._answer(self._loop.events[before:])
 
     def _event(self, keys: dict[str, Any]) -> EventTable:
         if (unsaid := _unsaid(keys)) is not None:
@@ -85,52 +103,60 @@ class Control:
         broken = broken_now(self._scenario, event, self._present())
         if broken is not None:
             raise RequestError(": ".join(part for part in broken if part))
-        if event.kind in UPON_PROCESSES and not self._launcher:
+        if event.kind in ON_PROCESSES and not self._launcher:
             raise RequestError(f"{event.kind}: this fleet has no launcher; do it by hand")
         return event
 
     def _present(self) -> Present:
-        timeline, team = self._loop.timeline, self._loop.team
-        living = frozenset(np.flatnonzero(team.awake).tolist())
-        room = self._scenario.rows - team.known - timeline.joiners
+        effects, members = self._loop.effects, self._loop.members
         return Present(
-            timeline.formation, timeline.frame, timeline.parted, team.known, living, room
+            formation=effects.missions.formation,
+            frame=effects.missions.frame,
+            partitioned=effects.network.partitioned,
+            known=members.known,
+            living=frozenset(np.flatnonzero(members.awake).tolist()),
+            room=self._scenario.rows - members.known - self._timeline.joiners,
         )
 
-    def _deed(self, event: EventTable, request: Request) -> Deed:
-        """Find whom an event means; whoever is not there cannot be meant."""
-        self._check_mission(event, request)
-        action = self._loop.timeline.sudden(event)
-        if action is None:
-            raise RequestError(f"{event.kind}: nothing to do")
-        deed = self._loop.deed(action)
-        if isinstance(deed, Stop | Hold) and not deed.agents:
-            raise RequestError(f"{deed.kind}: nobody there whom {list(deed.selectors)} means")
-        if isinstance(deed, Start) and not deed.incarnations:
-            raise RequestError(f"{deed.kind}: {deed.refused or 'nobody to come back'}")
-        if isinstance(deed, Order):
-            return deed._replace(to=request.to, version=request.version)
-        return deed
+    def _operation(self, step: Step, request: Request) -> Operation:
+        """Return what a step means now. Raises RequestError where it means no agent."""
+        self._check_mission(step.event, request)
+        operation, kind = self._loop.effects.operation(step), step.event.kind
+        match operation:
+            case None:
+                raise RequestError(f"{kind}: nothing to do")
+            case EndProcesses() | PauseProcesses() | ResumeProcesses() if not operation.agents:
+                selectors = list(operation.selectors)
+                raise RequestError(f"{kind}: no agent that {selectors} selects can do that now")
+            case StartProcesses() if not operation.incarnations:
+                raise RequestError(f"{kind}: {operation.refused or 'no agent to restart'}")
+            case GiveMission():
+                return operation._replace(to=request.to, version=request.version)
+        return operation
 
     def _check_mission(self, event: EventTable, request: Request) -> None:
-        if event.kind not in MISSIONS and (request.to, request.version) != (None, None):
-            raise RequestError(f"{event.kind}: is no mission, which alone goes to an agent")
-        team, newest = self._loop.team, self._loop.orders.newest(self._loop.newest)
-        if request.to is not None and not 0 <= request.to < team.known:
-            raise RequestError(f"to: no agent {request.to}; 0 to {team.known - 1}")
-        if request.to is not None and not team.awake[request.to]:
-            raise RequestError(f"to: agent {request.to} takes no part at present")
+        """Raise RequestError where a mission's addressee or version cannot be."""
+        if event.kind not in MISSIONS:
+            if (request.to, request.version) != (None, None):
+                raise RequestError(f"{event.kind}: only a mission goes to an agent")
+            return
+        members, newest = self._loop.members, self._loop.effects.missions.newest
+        if request.to is not None and not 0 <= request.to < members.known:
+            raise RequestError(f"to: no agent {request.to}; 0 to {members.known - 1}")
+        if request.to is not None and not members.awake[request.to]:
+            state = members.state(request.to).value
+            raise RequestError(f"to: agent {request.to} is not running ({state})")
         if request.version is not None and not newest < request.version < MAX_VERSION:
             raise RequestError(f"version: {request.version}; above {newest}, which flies already")
 
-    def _told(self, events: list[Event]) -> Answer:
-        timeline = self._loop.timeline
-        return Answer(
-            round(self._loop.world.time_s, 6),
-            [{k: v for k, v in event.items() if k not in UNSPOKEN} for event in events],
-            msgspec.to_builtins(timeline.conditions),
-            in_force(self._loop.events),
+    def _answer(self, events: list[RunEvent]) -> Answer:
+        network = self._loop.network
+        faults = tuple(
+            ActiveFault(number, since_s, RadioEvent.of(fault))
+            for number, (since_s, fault) in network.in_force.items()
         )
+        t_s = round(self._loop.world.time_s, 6)
+        return Answer(t_s, tuple(events), network.conditions, faults)
 
 
 def _request(asked: bytes) -> Request:
@@ -162,13 +188,13 @@ class Reception:
         self._control = control
         self._questions: Waiting[zenoh.Query] = bus.questions("control")
 
-    def attend(self, do: Do) -> None:
+    def attend(self, carry_out: CarryOut) -> None:
         """Answer what has come, a few a slot."""
         for query in drained(self._questions, REQUESTS_A_SLOT):
             with query:
                 asked = query.payload.to_bytes() if query.payload is not None else b""
                 try:
-                    answer = self._control.answer(asked, do)
+                    answer = self._control.answer(asked, carry_out)
                 except RequestError as refusal:
                     query.reply_err(str(refusal))
                 else:

@@ -8,26 +8,36 @@ vehicles.
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, assert_never
 
 import msgspec
 
 from agent.codec import RejectedError, decode_command, encode
-from netem.messages import MediumCounters, Orders, Truth
+from netem.faults import FaultOrder
+from netem.messages import FaultOrders, MediumCounters, Truth
 from netem.wire.bus import Bus
 from netem.wire.frame import WireError, pack, unpack
-from worldsim.engine.membership import Begin, Deed, Hold, Start, Stop
+from worldsim.engine.operations import (
+    AdmitAgents,
+    EndProcesses,
+    GiveMission,
+    Operation,
+    PauseProcesses,
+    ResumeProcesses,
+    SetSensorMode,
+    StartProcesses,
+)
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS
 from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
 from worldsim.fleet.control import Control, Reception
 from worldsim.fleet.delivery_latency import ArrivalBook
-from worldsim.fleet.launcher_link import LauncherLink, Loss
+from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.pacing import Pacer, Punctuality
 from worldsim.fleet.progress import ProgressReporter
 from worldsim.fleet.startup import Startup
+from worldsim.judge.run_events import By, LateStart
 from worldsim.judge.tick import Packets
 from worldsim.scenario.tables import Scenario
-from worldsim.scenario.timeline import Change, Flapping, Heal, Jamming, Partition
 
 START_WITHIN_S = 5.0
 """So long before the end of a long boot a process begins, which waits 30 s for word and no more."""
@@ -133,9 +143,9 @@ class FreeRunningFleet:
         slot = self.loop.world.slot
         self._pacer.begin(slot)
         self._startup.instruct_agents()
-        for deed in self.loop.due():
-            self._do(deed)
-        self._reception.attend(lambda deed: self._do(deed, by="operator"))
+        for operation in self.loop.due():
+            self._carry_out(operation)
+        self._reception.attend(self._carry_out)
         self._send(self.loop.open())
         self._strike_out()
         while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not unwanted():
@@ -152,17 +162,20 @@ class FreeRunningFleet:
         self.loop.close(b"")
         self._progress_reporter.tell(self._pacer.elapsed_s, self.late_fraction)
 
-    def _do(self, deed: Deed, **signed: str) -> None:
-        """Carry out what happens between slots, and let it count at once."""
-        late = self._actions.do(deed, self.loop.world.slot, self.loop.team.incarnations)
-        self.loop.take(deed, **signed)
-        if isinstance(deed, Stop | Hold | Begin):
-            self.punctuality.forget(deed.agents)
+    def _carry_out(self, operation: Operation, by: By = None) -> None:
+        """Carry out what happens between slots, and apply it at once."""
+        members = self.loop.members
+        late = self._actions.carry_out(operation, self.loop.world.slot, members.incarnations)
+        self.loop.apply(operation, by)
+        if isinstance(operation, EndProcesses | PauseProcesses | ResumeProcesses | AdmitAgents):
+            self.punctuality.forget(operation.agents)
         for agent in late:
-            self.loop.event("late", agent, detail="its process is not up by the end of boot_s")
+            t_s = round(self.loop.world.time_s, 6)
+            detail = "its process is not up by the end of boot_s"
+            self.loop.emit(LateStart(t_s=t_s, agent=agent, detail=detail))
 
     def _send(self, opened: Opened) -> None:
-        incarnations = tuple(self.loop.team.incarnations)
+        incarnations = tuple(self.loop.members.incarnations)
         self._truth(pack(Truth(opened.slot, opened.time_s, opened.positions, incarnations)))
         for agent, observation in opened.observations:
             self._observers[agent](encode(observation))
@@ -170,14 +183,14 @@ class FreeRunningFleet:
 
     def _obey(self, agent: int, data: bytes) -> None:
         """Take a command; what one who takes no part, or no more, had under way moves nothing."""
-        if not self.loop.team.awake[agent]:
+        if not self.loop.members.awake[agent]:
             return
         try:
             command = decode_command(data)
         except RejectedError as error:
             self._refused[error.cause] += 1
             return
-        if command.incarnation == self.loop.team.incarnations[agent]:
+        if command.incarnation == self.loop.members.incarnations[agent]:
             self.loop.obey(agent, command, data)
         else:
             self._refused["incarnation"] += 1
@@ -189,7 +202,7 @@ class FreeRunningFleet:
             self._refused["verdicts"] += 1
 
     def _read_arrivals(self, agent: int) -> None:
-        incarnation, now_s = self.loop.team.incarnations[agent], self.loop.world.time_s
+        incarnation, now_s = self.loop.members.incarnations[agent], self.loop.world.time_s
         for data in self._arrivals[agent].drain(1):
             try:
                 self._book.take(agent, incarnation, data, now_s)
@@ -198,45 +211,52 @@ class FreeRunningFleet:
 
     def _strike_out(self) -> None:
         for loss in self._launcher.losses():
-            if self.loop.team.has(loss.agent, loss.incarnation):
-                self.loop.lost(loss.agent, **_known(loss), planned=False)
+            if self.loop.members.has(loss.agent, loss.incarnation):
+                self.loop.effects.exited(loss.agent, loss.signal, loss.status)
 
     def _packets(self) -> Packets:
         return self.medium_counters.packets() if self.medium_counters is not None else {}
 
 
-def _known(loss: Loss) -> dict[str, int]:
-    return {key: value for key in ("signal", "status") if (value := getattr(loss, key)) is not None}
-
-
 class ProcessActions:
-    """What a flight reaches the other processes with; boot_s: on the wall clock."""
+    """Carries operations out on the other processes: signals and starts, and orders to the medium.
 
-    def __init__(self, bus: Bus, startup: Startup, launcher: LauncherLink, boot_s: float) -> None:
+    It waits for nothing: an operation is done within milliseconds, or reported as late.
+    """
+
+    def __init__(
+        self, bus: Bus, startup: Startup, launcher: LauncherLink, boot_wall_s: float
+    ) -> None:
         self._orders = bus.putter("orders")
         self._startup = startup
         self._launcher = launcher
-        self._after_s = max(0.0, boot_s - START_WITHIN_S)
+        self._after_s = max(0.0, boot_wall_s - START_WITHIN_S)
 
-    def do(self, deed: Deed, slot: int, incarnations: Sequence[int]) -> list[int]:
-        """Carry out a deed before a slot; return the agents that should be there, and are not.
+    def carry_out(self, operation: Operation, slot: int, incarnations: Sequence[int]) -> list[int]:
+        """Carry out an operation before a slot; return admitted agents that are not up.
 
-        incarnations: everybody's, as they were before the deed.
+        incarnations: of all agents, as they were before the operation.
         """
-        match deed:
-            case Stop(agents=agents):
-                self._launcher.act("kill", _named(agents, incarnations))
-            case Hold(kind=kind, agents=agents):
-                self._launcher.act(kind, _named(agents, incarnations))
-            case Start(incarnations=started):
+        match operation:
+            case EndProcesses(agents=agents):
+                self._launcher.act("kill", _with_incarnation(agents, incarnations))
+            case PauseProcesses(agents=agents):
+                self._launcher.act("pause", _with_incarnation(agents, incarnations))
+            case ResumeProcesses(agents=agents):
+                self._launcher.act("resume", _with_incarnation(agents, incarnations))
+            case StartProcesses(incarnations=started):
                 self._startup.expect(started)
                 self._launcher.act("start", list(started.items()), self._after_s)
-            case Begin(agents=agents):
+            case AdmitAgents(agents=agents):
                 return self._startup.absent(agents)
-            case Change() | Partition() | Heal() | Jamming() | Flapping():
-                self._orders(msgspec.json.encode(Orders(slot, (deed.order,))))
+            case FaultOrder():
+                self._orders(msgspec.json.encode(FaultOrders(slot, (operation,))))
+            case SetSensorMode() | GiveMission():
+                pass  # sensors and missions are the world's own
+            case _:
+                assert_never(operation)
         return []
 
 
-def _named(agents: Iterable[int], incarnations: Sequence[int]) -> list[tuple[int, int]]:
+def _with_incarnation(agents: Iterable[int], incarnations: Sequence[int]) -> list[tuple[int, int]]:
     return [(agent, incarnations[agent]) for agent in agents]

@@ -7,10 +7,12 @@ the host's speed or load, the run is the one of virtual time.
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import assert_never
 
 from agent.codec import RejectedError, decode_command, encode
 from netem.delivery_log import Digest, joined
-from netem.messages import Done, MediumCounters, RadioOrder, Truth, Turn, together, unpack_done
+from netem.faults import FaultOrder
+from netem.messages import Done, MediumCounters, Truth, Turn, together, unpack_done
 from netem.wire.barrier import (
     ANSWER_WITHIN_S,
     LOOK_EVERY_S,
@@ -23,15 +25,24 @@ from netem.wire.barrier import (
 from netem.wire.bus import Bus, Ring
 from netem.wire.frame import WireError, pack
 from netem.wire.keys import medium_name
-from worldsim.engine.membership import Begin, Deed, Hold, Stop
+from worldsim.engine.operations import (
+    AdmitAgents,
+    EndProcesses,
+    GiveMission,
+    Operation,
+    PauseProcesses,
+    ResumeProcesses,
+    SetSensorMode,
+    StartProcesses,
+)
 from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
 from worldsim.fleet.control import Control, Reception
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.progress import ProgressReporter, Standstill
 from worldsim.fleet.startup import Startup
+from worldsim.judge.run_events import By
 from worldsim.judge.tick import Packets
 from worldsim.scenario.tables import Scenario
-from worldsim.scenario.timeline import Change, Flapping, Heal, Jamming, Partition
 
 DONE_LOOK_EVERY_S = 0.02
 COMMAND_TICKS = 1
@@ -108,9 +119,9 @@ class LockstepFleet:
             self._over(b"")
 
     def _slot(self) -> None:
-        for deed in self.loop.due():
-            self._do(deed)
-        self._reception.attend(lambda deed: self._do(deed, by="operator"))
+        for operation in self.loop.due():
+            self._carry_out(operation)
+        self._reception.attend(self._carry_out)
         self._watch()
         opened = self.loop.open()
         self._open(opened)
@@ -118,16 +129,16 @@ class LockstepFleet:
             self._obey(agent, opened.slot)
         self.loop.close(self._played(opened.slot))
 
-    def _do(self, deed: Deed, **signed: str) -> None:
-        """Have a deed done, see that it is, and let it count."""
-        self._actions.do(deed, self.loop.team.incarnations)
-        self.loop.take(deed, **signed)
+    def _carry_out(self, operation: Operation, by: By = None) -> None:
+        """Carry out what happens between slots, wait until it has happened, and apply it."""
+        self._actions.carry_out(operation, self.loop.members.incarnations)
+        self.loop.apply(operation, by)
 
     def _open(self, opened: Opened) -> None:
         turn = Turn(
             Truth(opened.slot, opened.time_s, opened.positions),
             tuple(agent for agent, _ in opened.observations),
-            tuple(self.loop.team.incarnations),
+            tuple(self.loop.members.incarnations),
             self._actions.orders(),
         )
         self._truth(pack(turn))
@@ -142,7 +153,7 @@ class LockstepFleet:
         except RejectedError as error:
             raise LockstepError(f"{what}: {error}") from error
         same_slot(what, command.slot, slot)
-        if command.incarnation != self.loop.team.incarnations[agent]:
+        if command.incarnation != self.loop.members.incarnations[agent]:
             raise LockstepError(f"{what} is of its incarnation {command.incarnation}")
         self.loop.obey(agent, command, data)
 
@@ -179,7 +190,7 @@ class LockstepFleet:
     def _watch(self) -> None:
         """Raise LockstepError when somebody ended who takes part, and was not meant to."""
         for loss in self._launcher.losses():
-            if self.loop.team.has(loss.agent, loss.incarnation):
+            if self.loop.members.has(loss.agent, loss.incarnation):
                 raise LockstepError(str(loss))
 
     def _broken(self) -> str | None:
@@ -192,11 +203,7 @@ class LockstepFleet:
 
 
 class AwaitedActions:
-    """What lockstep reaches the other processes with, and waits for them.
-
-    watch: raises LockstepError when somebody is lost who should not be; unwanted: whether the run
-    is over.
-    """
+    """Carries operations out on the other processes, and waits until each has happened."""
 
     def __init__(
         self,
@@ -209,27 +216,33 @@ class AwaitedActions:
         self._launcher = launcher
         self._watch = watch
         self._unwanted = unwanted
-        self._orders: list[RadioOrder] = []
+        self._orders: list[FaultOrder] = []
 
-    def do(self, deed: Deed, incarnations: Sequence[int]) -> None:
-        """Carry out a deed; what is ordered of the medium waits for ``orders``.
+    def carry_out(self, operation: Operation, incarnations: Sequence[int]) -> None:
+        """Carry out an operation; orders to the medium wait for ``orders``.
 
         A process starts when its agent has booted: until then there is nothing for it to do.
-        incarnations: everybody's, as they were before the deed. Raises LockstepError when it does
-        not come to pass, UnwantedError when the run ends meanwhile.
+        incarnations: of all agents, as they were before the operation. Raises LockstepError when it
+        does not come to pass, UnwantedError when the run ends meanwhile.
         """
-        match deed:
-            case Stop(agents=agents):
+        match operation:
+            case EndProcesses(agents=agents):
                 self._act("kill", agents, incarnations)
                 self._until(lambda: not self._startup.present(agents), f"the end of {agents}")
-            case Hold(kind=kind, agents=agents):
-                self._act(kind, agents, incarnations)
-            case Begin(agents=agents):
+            case PauseProcesses(agents=agents):
+                self._act("pause", agents, incarnations)
+            case ResumeProcesses(agents=agents):
+                self._act("resume", agents, incarnations)
+            case AdmitAgents(agents=agents):
                 self._begin(agents, incarnations)
-            case Change() | Partition() | Heal() | Jamming() | Flapping():
-                self._orders.append(deed.order)
+            case FaultOrder():
+                self._orders.append(operation)
+            case StartProcesses() | SetSensorMode() | GiveMission():
+                pass  # nothing is to be done before the agents have booted
+            case _:
+                assert_never(operation)
 
-    def orders(self) -> tuple[RadioOrder, ...]:
+    def orders(self) -> tuple[FaultOrder, ...]:
         """Return, and forget, what the medium is to do before the next slot."""
         orders = tuple(self._orders)
         self._orders.clear()

@@ -31,7 +31,7 @@ class ProgressReporter:
         return Progress(
             self._loop.world.time_s,
             self._duration_s,
-            int(np.count_nonzero(self._loop.team.awake)),
+            int(np.count_nonzero(self._loop.members.awake)),
             in_place,
             self._loop.judge.min_separation_m,
             late,

@@ -6,19 +6,19 @@ where both hear the other. A round is one turn of the multihop channel.
 
 from functools import cache
 from math import comb, inf
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from netem.barriers import Barriers
+from netem.conditions import LinkModels, NetworkConditions
 from netem.link import mean_loss, stretch
 from netem.link_keys import Conditions
-from netem.messages import Flap, Jam
 from netem.random_draws import WIDEST
-from netem.schedule import Schedule
 from netem.wire.frame import MULTIHOP
+from worldsim.judge.radio_events import order_of
+from worldsim.judge.run_events import RadioRunEvent
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
 
@@ -41,24 +41,18 @@ class Components(NamedTuple):
 
 
 class Connectivity:
-    """The radio as the judge knows it."""
+    """Which living agents reach each other, from the truth and what is in force on the radio."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._round_s = 1.0 / scenario.comms.multihop_hz if scenario.comms.multihop_hz else inf
-        self._barriers = Barriers()
-        self._together = np.ones((scenario.rows, scenario.rows), dtype=np.bool_)
-        self._change(scenario.netem)
+        self._rows = range(scenario.rows)
+        self._network = NetworkConditions(scenario.netem)
+        self._refresh()
 
-    def note(self, event: dict[str, Any]) -> None:
-        """Take an event that may change the radio."""
-        if event["kind"] == "netem":
-            self._change(msgspec.convert(event["conditions"], Conditions))
-        elif event["kind"] in {"partition", "heal"}:
-            self._part(event)
-        elif event["kind"] == "jam":
-            self._barriers.jam(event["number"], msgspec.convert(event["jam"], Jam | None))
-        elif event["kind"] == "flap":
-            self._barriers.flap(event["number"], msgspec.convert(event["flap"], Flap | None))
+    def note(self, event: RadioRunEvent) -> None:
+        """Take an event of the radio."""
+        self._network.apply(order_of(event))
+        self._refresh()
 
     def components(self, tick: Tick) -> Components:
         """Return the connected components of the living at a tick."""
@@ -78,7 +72,7 @@ class Connectivity:
 
         Infinite while links flap: nobody can say.
         """
-        if self._barriers.flapping:
+        if self._network.flapping:
             return inf
         rounds = rounds_to_all(agents, hops, self.loss) * self._stretch
         return rounds * self._round_s + hops * self._delay_s
@@ -88,22 +82,17 @@ class Connectivity:
         rounds = (2 * hops + 10) / (1.0 - self.loss) if self.loss < 1.0 else inf
         return rounds * self._round_s + hops * self._delay_s
 
-    def _change(self, conditions: Conditions) -> None:
-        model = Schedule(msgspec.structs.replace(conditions, link=())).model(MULTIHOP, 0, 0)
+    def _refresh(self) -> None:
+        """Derive what follows from the conditions and partitions in force."""
+        conditions: Conditions = msgspec.structs.replace(self._network.conditions, link=())
+        model = LinkModels(conditions).of_channel(MULTIHOP)
         self.loss = mean_loss(model)
         self._stretch = max(1.0, stretch(model))
         self._range_m = model.range_m
         widest = 1.0 if model.distribution == "uniform" else WIDEST
         self._delay_s = (model.delay_ms + widest * model.jitter_ms) / 1000.0
-
-    def _part(self, event: dict[str, Any]) -> None:
-        if event["kind"] == "heal":
-            self._barriers.heal()
-        else:
-            told = (event["groups"], event.get("parted", "clean"), tuple(event.get("bridge", ())))
-            self._barriers.partition(*told)
-        rows = range(len(self._together))
-        hears = np.array([[not self._barriers.parts(a, b) for a in rows] for b in rows])
+        rows = self._rows
+        hears = np.array([[not self._network.partitions(a, b) for a in rows] for b in rows])
         self._together = hears & hears.T
 
     def _linked(self, tick: Tick) -> NDArray[np.bool_]:
@@ -111,8 +100,8 @@ class Connectivity:
         away = position[:, None] - position[None]
         near = np.sqrt(np.sum(away * away, axis=2)) <= self._range_m
         near &= self._together
-        if self._barriers.raised:
-            free = [not self._barriers.jammed((x, y, z)) for x, y, z in position.tolist()]
+        if self._network.obstructed:
+            free = [not self._network.jammed((x, y, z)) for x, y, z in position.tolist()]
             near &= np.outer(free, free)
         linked: NDArray[np.bool_] = near & tick.alive[:, None] & tick.alive[None]
         return linked

@@ -9,7 +9,7 @@ A fault is every event of the timeline, every death, and every change of who can
 
 from collections import Counter
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,30 @@ from agent.messages import Place
 from worldsim.judge.connectivity import Components, Connectivity
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.phase import CONVERGED_S, Phase
-from worldsim.judge.recovery import LOSSES, RETURNS
+from worldsim.judge.run_events import (
+    ConditionsChanged,
+    Flapped,
+    FormationGiven,
+    FrameGiven,
+    Healed,
+    Jammed,
+    Joined,
+    Killed,
+    LateStart,
+    Left,
+    Partitioned,
+    Paused,
+    QueueChanged,
+    Restarted,
+    Resumed,
+    RoleChanged,
+    RunEvent,
+    SensorChanged,
+    SlotChanged,
+)
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
 
-FAULTS = LOSSES | RETURNS | {"partition", "heal", "jam", "flap", "netem", "formation", "frame"}
 LOOK_EVERY_S = 1.0
 MAX_ROLE_CHANGES = 3
 Claims = list[tuple[int, int]]
@@ -64,17 +83,23 @@ class Invariants:
         self._quiet_since_s: float | None = None
         self._settled_s = self._twice_s = 0.0
 
-    def note(self, event: dict[str, Any]) -> None:
+    def note(self, event: RunEvent) -> None:
         """Take an event, in order."""
-        kind = event["kind"]
-        if kind == "role":
-            self._roles[event["agent"]] += 1
-            self._flips += self._roles[event["agent"]] > MAX_ROLE_CHANGES
-        elif kind in FAULTS:
-            self._reach.note(event)
-            booting_s = self._boot_s if kind in {"restart", "join"} else 0.0
-            self._fault(event["t_s"] + booting_s)
-            self._look_s = event["t_s"]
+        match event:
+            case RoleChanged(agent=int(agent)):
+                self._roles[agent] += 1
+                self._flips += self._roles[agent] > MAX_ROLE_CHANGES
+            case Restarted() | Joined():
+                self._fault(event.t_s, event.t_s + self._boot_s)
+            case Killed() | Left() | Paused() | Resumed() | FormationGiven() | FrameGiven():
+                self._fault(event.t_s, event.t_s)
+            case Partitioned() | Healed() | Jammed() | Flapped() | ConditionsChanged():
+                self._reach.note(event)
+                self._fault(event.t_s, event.t_s)
+            case RoleChanged() | SlotChanged() | QueueChanged() | SensorChanged() | LateStart():
+                pass
+            case _:
+                assert_never(event)
 
     def see(self, tick: Tick, phase: Phase, in_place: bool) -> None:
         """Judge a tick; in_place: whether all the living are in their places."""
@@ -90,7 +115,12 @@ class Invariants:
             self.tallies["I3"].count(self._broken[1])
         self._see_quiet(tick, before, in_place)
 
-    def _fault(self, time_s: float) -> None:
+    def _fault(self, look_s: float, over_s: float) -> None:
+        """Start anew after a fault at ``look_s`` that is over at ``over_s`` [s]."""
+        self._look_s = look_s
+        self._restart_quiet(over_s)
+
+    def _restart_quiet(self, time_s: float) -> None:
         self._fault_s = max(self._fault_s, time_s)
         self._quiet_since_s = None
         self._roles.clear()
@@ -102,7 +132,7 @@ class Invariants:
         found = self._reach.components(tick)
         before, self._components, self._members = self._components, found, found.members()
         if before is not None and not np.array_equal(before.label, found.label):
-            self._fault(tick.time_s)
+            self._restart_quiet(tick.time_s)
         team = int(np.count_nonzero(tick.alive))
         self._twice_s = 2.0 * self._reach.everybody_s(team, found.hops)
         self._settled_s = self._fault_s + self._reach.detection_s(found.hops) + self._twice_s

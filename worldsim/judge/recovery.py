@@ -11,10 +11,8 @@ import numpy as np
 from agent.messages import Place
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.phase import CONVERGED_S, Phase
+from worldsim.judge.run_events import LOSS_KINDS, LossEvent, ReturnEvent
 from worldsim.judge.tick import Tick
-
-RETURNS = frozenset({"restart", "join", "resume"})
-LOSSES = frozenset({"kill", "leave", "pause"})
 
 
 @dataclass(slots=True)
@@ -41,18 +39,18 @@ class Recoveries:
         self._seen: tuple[bytes, ...] = ()
         self._whole = False
 
-    def change(self, t_s: float, kind: str, agent: int | None) -> None:
-        """Note that an agent went or came; None that somebody should have come, and did not."""
+    def note(self, event: LossEvent | ReturnEvent) -> None:
+        """Note that an agent went or came; without an agent, that a start was refused."""
         self._since_s = None
         last = self.all[-1] if self.all else None
-        if last is None or (last.t_s, last.kind) != (t_s, kind):
-            last = Recovery(t_s, kind, [])
+        if last is None or (last.t_s, last.kind) != (event.t_s, event.kind):
+            last = Recovery(event.t_s, event.kind, [])
             self.all.append(last)
             self._open.append(last)
-        if agent is None:
+        if event.agent is None:
             self._open.remove(last)
         else:
-            last.agents.append(agent)
+            last.agents.append(event.agent)
 
     def see(self, tick: Tick, phase: Phase, in_place: bool) -> None:
         """Take a tick; in_place: whether all the living are in their places."""
@@ -72,7 +70,7 @@ class Recoveries:
         """Whether those who came, and did not go again, have booted."""
         gone: set[int] = set()
         for recovery in reversed(self.all):
-            if recovery.kind in LOSSES:
+            if recovery.kind in LOSS_KINDS:
                 gone.update(recovery.agents)
             elif any(agent not in gone and not tick.alive[agent] for agent in recovery.agents):
                 return False

@@ -8,19 +8,29 @@ from dataclasses import asdict, dataclass
 from math import inf
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from agent.guidance.cone import cone_of
-from agent.messages import FramePath
-from agent.qstructure.formation import Formation, FormationSpec
+from agent.qstructure.formation import Formation
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.invariants import Invariants
 from worldsim.judge.metrics import Floats, Separation, conserved
 from worldsim.judge.obstacle_clearance import Clearance
 from worldsim.judge.phase import Phase
 from worldsim.judge.queue_convergence import Queues
-from worldsim.judge.recovery import LOSSES, RETURNS, Recoveries, Recovery
+from worldsim.judge.recovery import Recoveries, Recovery
+from worldsim.judge.run_events import (
+    FormationGiven,
+    FrameGiven,
+    Joined,
+    Killed,
+    Left,
+    MissionRunEvent,
+    Paused,
+    Restarted,
+    Resumed,
+    RunEvent,
+)
 from worldsim.judge.tick import Packets, Tick
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.target_frame import path_of
@@ -78,15 +88,17 @@ class Judge:
         self._before: Tick | None = None
         self._separation = Separation()
 
-    def note(self, event: dict[str, Any]) -> None:
-        """Take an event of the run; of most kinds nothing follows for the judge."""
-        kind = event["kind"]
+    def note(self, event: RunEvent) -> None:
+        """Take an event of the run, in order; most kinds change nothing for the judge."""
         if self._allocation is not None:
             self._allocation.note(event)
-        if "tables" in event:
-            self._open_phase(event)
-        elif kind in LOSSES | RETURNS and "nobody" not in event:
-            self._recoveries.change(event["t_s"], kind, event["agent"])
+        match event:
+            case FormationGiven() | FrameGiven():
+                self._open_phase(event)
+            case Restarted() | Joined():
+                self._recoveries.note(event)
+            case Killed() | Left() | Paused() | Resumed() if event.nobody is None:
+                self._recoveries.note(event)
 
     def see(self, tick: Tick) -> Figures:
         """Judge one tick; ticks come in order."""
@@ -171,11 +183,9 @@ class Judge:
             "I8": {"ticks": self.packet_ticks, "violations": self.packet_violations},
         }
 
-    def _open_phase(self, event: dict[str, Any]) -> None:
-        spec = msgspec.convert(event["tables"], FormationSpec)
-        path = msgspec.convert(event["path"], FramePath)
-        formation = Formation(spec, self._scenario.control.spacing_m)
-        self.phases.append(Phase(formation, event["t_s"], path, event["mission"]))
+    def _open_phase(self, event: MissionRunEvent) -> None:
+        formation = Formation(event.tables, self._scenario.control.spacing_m)
+        self.phases.append(Phase(formation, event.t_s, event.path, event.mission))
         self.queues.append(Queues(self.phases[-1]))
 
     def _reformed(self, within_s: float) -> Expectation:

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from netem.conditions import LinkModels, overlaid
 from netem.link import LinkModel
 from netem.link_keys import Conditions
-from netem.schedule import Schedule, overlaid
 from netem.wire.frame import CHANNELS
 from worldsim.scenario.tables import Scenario
 
@@ -35,10 +35,10 @@ def _conditions(scenario: Scenario) -> Iterator[tuple[str, Conditions]]:
 
 
 def _links(when: str, conditions: Conditions) -> Iterator[ParameterSet]:
-    schedule = Schedule(conditions)
+    models = LinkModels(conditions)
     for channel, name in enumerate(CHANNELS):
-        yield ParameterSet(f"{name}{when}", channel, schedule.sender(channel))
+        yield ParameterSet(f"{name}{when}", channel, models.of_channel(channel))
     for link in conditions.link:
         for channel, name in enumerate(CHANNELS):
-            model = schedule.model(channel, link.source, link.to)
+            model = models.of_link(channel, link.source, link.to)
             yield ParameterSet(f"{link.source} to {link.to}, {name}{when}", channel, model)

@@ -18,6 +18,7 @@ from pyarrow.lib import FixedSizeListArray
 from rerun.chunk import Chunk, RrdReader
 from rerun.error_utils import RerunWarning
 
+from worldsim.judge.run_events import RunEvent, event_of
 from worldsim.judge.tick import Packets, Tick
 from worldsim.recording import layout
 from worldsim.recording.rrd_file import readable
@@ -38,7 +39,7 @@ class Readback:
 
     scenario: Scenario
     ticks: list[Tick]
-    events: list[dict[str, Any]]
+    events: list[RunEvent]
 
 
 def read_run(path: Path) -> Readback:
@@ -55,7 +56,7 @@ class _Columns:
 
     def __init__(self, chunks: Iterable[Chunk]) -> None:
         self._columns: dict[tuple[str, str], Column] = {}
-        self.events: list[dict[str, Any]] = []
+        self.events: list[RunEvent] = []
         self.scenario_text: str | None = None
         for chunk in chunks:
             self._take(chunk)
@@ -81,7 +82,7 @@ class _Columns:
             return
         elif chunk.entity_path == layout.EVENTS:
             told = batch.column(layout.EVENT).to_pylist()
-            self.events.extend(json.loads(row[0]) for row in told)
+            self.events.extend(event_of(json.loads(row[0])) for row in told)
         else:
             self._take_rows(chunk.entity_path, batch)
 

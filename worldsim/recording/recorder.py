@@ -18,6 +18,7 @@ import rerun as rr
 from agent.messages import FramePath
 from agent.qstructure.formation import Formation, FormationSpec
 from agent.qstructure.frame_path import Track
+from worldsim.judge.run_events import RunEvent, as_row
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout
@@ -86,9 +87,9 @@ class RunRecorder:
         if len(self._ticks) >= self._every:
             self._guarded(self._flush)
 
-    def event(self, event: Event) -> None:
+    def event(self, event: RunEvent) -> None:
         """Keep one event: ``t_s``, ``kind``, ``agent`` and what else belongs to the kind."""
-        self._events.append(event)
+        self._events.append(as_row(event))
 
     def close(self) -> None:
         """Keep what is left, and end the file."""

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from worldsim.judge.recovery import Recovery
+from worldsim.judge.run_events import RunEvent
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Expectation, Judge
 from worldsim.recording.readback import Readback, RecordingError, read_run
@@ -134,7 +135,7 @@ def _judged(run: Path, recording: Path) -> Verification:
 def _seen(readback: Readback) -> Judge:
     """Return a judge that saw the ticks, and heard before each of what had happened by then."""
     judge, heard = Judge(readback.scenario), 0
-    events = sorted(readback.events, key=lambda event: float(event["t_s"]))
+    events = sorted(readback.events, key=lambda event: event.t_s)
     for tick in readback.ticks:
         while heard < len(events) and _before(events[heard], tick):
             judge.note(events[heard])
@@ -143,13 +144,13 @@ def _seen(readback: Readback) -> Judge:
     return judge
 
 
-def _before(event: dict[str, Any], tick: Tick) -> bool:
+def _before(event: RunEvent, tick: Tick) -> bool:
     """Whether the run's judge was told of an event before it saw a tick.
 
     At one time, what was meant comes first; a process that died of itself is noticed after it.
     """
-    slack_s = -SAME_TIME_S if event.get("planned") is False else SAME_TIME_S
-    return bool(event["t_s"] <= tick.time_s + slack_s)
+    slack_s = -SAME_TIME_S if getattr(event, "planned", True) is False else SAME_TIME_S
+    return event.t_s <= tick.time_s + slack_s
 
 
 def _compared(judged: Verification, summary: Path) -> Verification:

@@ -2,7 +2,8 @@
 
 from typing import Protocol
 
-from worldsim.engine.step import Event, Recorder
+from worldsim.engine.step import Recorder
+from worldsim.judge.run_events import RunEvent, as_row
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
 from worldsim.results.run_folder import RunDirectory
@@ -29,9 +30,9 @@ class Sinks:
         if self._recorder is not None:
             self._recorder.tick(tick, figures)
 
-    def event(self, event: Event) -> None:
+    def event(self, event: RunEvent) -> None:
         """Keep one event."""
-        self._directory.event(event)
+        self._directory.event(as_row(event))
         if self._recorder is not None:
             self._recorder.event(event)
 

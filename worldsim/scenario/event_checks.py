@@ -13,19 +13,21 @@ from agent.codec import encode_formation
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from netem.link_keys import Conditions
 from worldsim.scenario.events import ACTIONS, UNDONE, EventTable
-from worldsim.scenario.radio_faults import flap_faults, partition_faults
+from worldsim.scenario.faults import Join
+from worldsim.scenario.radio_checks import radio_findings
 from worldsim.scenario.rules import TARGET_FLOOR_M, Finding, tilts_where_asked
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.tables import MAX_AGENTS, Scenario
 from worldsim.scenario.target_frame import FrameTable, broken_key, changed
+from worldsim.scenario.timeline import Step, steps
 from worldsim.scenario.toml import ScenarioError
 
 MAX_ORDER_B = 3000
 """What a Mission may hold of a formation [bytes]."""
 COME_BACK = frozenset({"restart", "resume"})
 """Who comes back holds no place by which to be found."""
-NOBODY = -1
-"""By whom a partition is whose event is not known."""
+UNKNOWN_NUMBER = -1
+"""Of a partition in force whose event is not known."""
 _SELECTOR = re.compile(r"all|random:[1-9]\d{0,3}|(vertex|queue):(.+)", re.DOTALL)
 
 
@@ -34,29 +36,6 @@ class Whose(NamedTuple):
 
     file: Path
     prefix: str
-
-
-class Step(NamedTuple):
-    """The ``number``-th event, counted from 0, at its time or at the time when it is undone."""
-
-    at_s: float
-    number: int
-    event: EventTable
-    undo: bool
-
-
-def steps(scenario: Scenario) -> list[Step]:
-    """Return the events in the order in which they happen, and are undone.
-
-    At one time what ends comes before what begins.
-    """
-    begun = [Step(event.at_s, i, event, False) for i, event in enumerate(scenario.event)]
-    ended = [
-        Step(event.at_s + event.for_s, i, event, True)
-        for i, event in enumerate(scenario.event)
-        if event.for_s is not None
-    ]
-    return sorted(begun + ended, key=lambda step: (step.at_s, not step.undo, step.number))
 
 
 def check_course(scenario: Scenario, file: Path, whose: dict[int, Whose]) -> None:
@@ -87,7 +66,7 @@ class Present(NamedTuple):
 
     formation: FormationSpec
     frame: FrameTable
-    parted: bool
+    partitioned: bool
     known: int
     living: frozenset[int]
     room: int
@@ -102,7 +81,7 @@ def broken_now(scenario: Scenario, event: EventTable, present: Present) -> Findi
         return Finding("join", f"{event.joiners}; fleet.spare leaves room for {present.room}")
     course = _Course(scenario, present)
     try:
-        return next(course.findings(Step(event.at_s, 0, event, False)), None)
+        return next(course.findings(Step(event.at_s, 0, event, ends=False)), None)
     except FormationError as error:
         return Finding(f"formation.{error.key}", error.detail)
 
@@ -113,9 +92,9 @@ def _error(file: Path, index: int, broken: Finding) -> ScenarioError:
 
 
 def _one_action(event: EventTable) -> Finding | None:
-    if not event.actions:
+    if not event.keys:
         return Finding("", f"no action; one of {', '.join(ACTIONS)}")
-    first, *others = event.actions
+    first, *others = event.keys
     if others:
         return Finding(others[0], f"not beside {first}; one action an event")
     if event.heal is False:
@@ -148,16 +127,15 @@ class _Course:
         self._known = now.known
         self._living = set(now.living)
         self._fewer = 0
-        self._parted_by = NOBODY if now.parted else None
+        self._partitions = {UNKNOWN_NUMBER} if now.partitioned else set()
 
     def findings(self, step: Step) -> Iterator[Finding]:
         """Return what is wrong with a step. Raises FormationError."""
         event = step.event
-        if step.undo:
+        if step.ends:
             return
         yield from self._selectors(event)
-        yield from self._barriers(event)
-        yield from self._links(event)
+        yield from self._radio(event)
         yield from self._join(event)
         yield from self._frame_change(event)
         if event.formation is not None:
@@ -166,13 +144,12 @@ class _Course:
     def take(self, step: Step) -> None:
         """Let a sound step happen."""
         event = step.event
-        if event.kind == "partition":
-            gone = None if self._parted_by == step.number else self._parted_by
-            self._parted_by = gone if step.undo else step.number
-        elif event.kind == "heal":
-            self._parted_by = None
+        if event.partition is not None:
+            (self._partitions.discard if step.ends else self._partitions.add)(step.number)
+        elif event.heal:
+            self._partitions.clear()
         elif event.selectors:
-            self._change_team(event, back=step.undo or event.kind in COME_BACK)
+            self._change_team(event, back=step.ends or event.kind in COME_BACK)
         elif event.frame is not None:
             self._frame = changed(self._frame, event.frame, event.at_s)
         elif event.formation is not None:
@@ -228,28 +205,16 @@ class _Course:
             return f"no {word} {name!r} in {self._spec.name!r}; there are {', '.join(names[word])}"
         return None
 
-    def _barriers(self, event: EventTable) -> Iterator[Finding]:
-        if event.heal and self._parted_by is None:
+    def _radio(self, event: EventTable) -> Iterator[Finding]:
+        if event.heal and not self._partitions:
             yield Finding("heal", "no partition to heal at that time")
-        agents = self._scenario.rows
-        if event.partition is not None:
-            yield from (Finding(*each) for each in partition_faults(event.partition, agents))
-        if event.flap is not None:
-            yield from (Finding(*each) for each in flap_faults(event.flap, agents))
-
-    def _links(self, event: EventTable) -> Iterator[Finding]:
-        last = self._scenario.rows - 1
-        for index, link in enumerate(event.netem.link if event.netem is not None else ()):
-            for name, agent in (("from", link.source), ("to", link.to)):
-                if agent > last:
-                    yield Finding(f"netem.link[{index}].{name}", f"no agent {agent}; 0 to {last}")
-            if link.source == link.to:
-                yield Finding(f"netem.link[{index}].to", "a link to itself")
+        yield from radio_findings(event, self._scenario.rows)
 
     def _join(self, event: EventTable) -> Iterator[Finding]:
         if not event.joiners:
             return
-        start, least_m = event.start, self._scenario.control.separation_m
+        start = event.join.start if isinstance(event.join, Join) else None
+        least_m = self._scenario.control.separation_m
         if start is None and isinstance(self._scenario.fleet.start, ListStart):
             yield Finding("join.start", "is missing; fleet.start lists no places for more agents")
         if isinstance(start, ListStart):

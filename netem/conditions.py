@@ -1,0 +1,235 @@
+"""What is in force on the radio: link conditions and faults, as they begin and end.
+
+:class:`NetworkConditions` is the only holder of it: the medium asks it for each frame, the judge
+for connectivity, the world for what an operator is shown. Faults in force together compose:
+conditions lie over each other in the order of their beginning, and a frame is cut where any fault
+cuts it. Each fault ends by its number, in any order.
+"""
+
+from collections.abc import Mapping
+from itertools import chain
+from typing import Any, NamedTuple, TypeVar, assert_never
+
+import msgspec
+
+from netem.faults import FaultOrder, Flap, Heal, Jam, LastingFault, Partition, Position
+from netem.link import LinkModel
+from netem.link_keys import Conditions, DirectedLink, LinkKeys
+from netem.wire.frame import CHANNELS
+
+_Keys = TypeVar("_Keys", bound=LinkKeys)
+RATE_KEYS = ("rate_kbit", "rate_overhead_b", "limit")
+"""Keys that belong to a sender's channel; a link with one of its own has its own queue."""
+UNNAMED = -1
+"""The group of the agents that a partition does not name."""
+
+
+class LinkModels:
+    """The model of each directed link on each channel under given conditions.
+
+    A link's own table wins over its channel's, and that over the one for both channels.
+    """
+
+    def __init__(self, conditions: Conditions) -> None:
+        self._channels = tuple(
+            _merged(conditions, getattr(conditions, channel)) for channel in CHANNELS
+        )
+        self._links: dict[tuple[int, int, int], LinkModel] = {}
+        self._reach_m: dict[tuple[int, int], float] = {}
+        for link in conditions.link:
+            for channel, name in enumerate(CHANNELS):
+                own = _merged(conditions, getattr(conditions, name), link)
+                self._links[channel, link.source, link.to] = own
+                before_m = self.reach_m(channel, link.source)
+                self._reach_m[channel, link.source] = max(before_m, own.reach_m)
+
+    def of_channel(self, channel: int) -> LinkModel:
+        """Return the model that holds on a channel where no link has its own."""
+        return self._channels[channel]
+
+    def common(self, channel: int, source: int) -> LinkModel | None:
+        """Return the one model of all links from a source, or None where one has its own."""
+        return self._channels[channel] if (channel, source) not in self._reach_m else None
+
+    def of_link(self, channel: int, source: int, destination: int) -> LinkModel:
+        """Return the model of one directed link on one channel."""
+        return self._links.get((channel, source, destination), self._channels[channel])
+
+    def reach_m(self, channel: int, source: int) -> float:
+        """Return the distance [m] beyond which no agent hears a source on a channel."""
+        return self._reach_m.get((channel, source), self._channels[channel].reach_m)
+
+
+class PartitionCut:
+    """Which directed links one partition cuts."""
+
+    def __init__(self, partition: Partition) -> None:
+        groups = partition.groups
+        self._group_of = {agent: at for at, group in enumerate(groups) for agent in group}
+        self._rank = {agent: rank for group in groups for rank, agent in enumerate(group)}
+        self._sizes = [len(group) for group in groups]
+        self._kind = partition.kind
+        self._bridge = frozenset(partition.bridge)
+
+    def cuts(self, source: int, destination: int) -> bool:
+        """Return whether the destination does not hear the source."""
+        group = self._group_of.get(source, UNNAMED)
+        if group == self._group_of.get(destination, UNNAMED):
+            return self._cuts_within(source, destination, group)
+        return self._cuts_between(source, destination, group)
+
+    def _cuts_within(self, source: int, destination: int, group: int) -> bool:
+        if self._kind != "ring" or group == UNNAMED:
+            return False
+        apart = (self._rank[source] - self._rank[destination]) % self._sizes[group]
+        return apart not in (1, self._sizes[group] - 1)
+
+    def _cuts_between(self, source: int, destination: int, group: int) -> bool:
+        match self._kind:
+            case "one_way":
+                return group != UNNAMED
+            case "bridge":
+                return source not in self._bridge and destination not in self._bridge
+            case "clean" | "ring":
+                return True
+        assert_never(self._kind)
+
+
+class InForce(NamedTuple):
+    """A fault in force, and since when."""
+
+    since_s: float
+    """[s; simulated time]"""
+    fault: LastingFault
+
+
+class NetworkConditions:
+    """Link models and faults in force; a frame is judged by what holds when it is sent."""
+
+    def __init__(self, base: Conditions) -> None:
+        self._base = base
+        self._in_force: dict[int, InForce] = {}
+        self._partitions: list[PartitionCut] = []
+        self._jams: list[Jam] = []
+        self._flaps: list[tuple[float, Flap]] = []
+        self.conditions = base
+        """The base under all changes in force."""
+        self.models = LinkModels(base)
+        self.obstructed = False
+        """Whether any partition, jam or flap is in force."""
+
+    @property
+    def in_force(self) -> Mapping[int, InForce]:
+        """The faults in force by number, in the order of their beginning."""
+        return self._in_force
+
+    @property
+    def partitioned(self) -> bool:
+        """Whether a partition is in force."""
+        return bool(self._partitions)
+
+    @property
+    def flapping(self) -> bool:
+        """Whether any links flap."""
+        return bool(self._flaps)
+
+    def apply(self, order: FaultOrder) -> None:
+        """Begin or end a fault. An end of what is not in force changes nothing."""
+        fault = order.fault
+        if fault is None:
+            self._in_force.pop(order.number, None)
+        elif isinstance(fault, Heal):
+            self._end_partitions()
+        else:
+            self._in_force[order.number] = InForce(order.at_s, fault)
+        self._refresh()
+
+    def ends(self, order: FaultOrder) -> bool:
+        """Return whether an order would end anything that is in force."""
+        if isinstance(order.fault, Heal):
+            return self.partitioned
+        return order.fault is None and order.number in self._in_force
+
+    def partitions(self, source: int, destination: int) -> bool:
+        """Return whether a partition keeps a destination from hearing a source."""
+        return any(partition.cuts(source, destination) for partition in self._partitions)
+
+    def cuts(self, source: int, destination: int, now_s: float) -> bool:
+        """Return whether a partition or a flap cuts a directed link at a time [s]."""
+        if self.partitions(source, destination):
+            return True
+        return any(
+            _is_down(flap, since_s, now_s)
+            for since_s, flap in self._flaps
+            if not flap.links or (source, destination) in flap.links
+        )
+
+    def jammed(self, where: Position) -> bool:
+        """Return whether a radio at a point [m; world frame] is within a jam."""
+        return any(_is_within(jam, where) for jam in self._jams)
+
+    def _end_partitions(self) -> None:
+        self._in_force = {
+            number: held
+            for number, held in self._in_force.items()
+            if not isinstance(held.fault, Partition)
+        }
+
+    def _refresh(self) -> None:
+        """Sort what is in force by its effect."""
+        self._partitions, self._jams, self._flaps = [], [], []
+        conditions = self._base
+        for held in self._in_force.values():
+            match held.fault:
+                case Conditions():
+                    conditions = overlaid(conditions, held.fault)
+                case Partition():
+                    self._partitions.append(PartitionCut(held.fault))
+                case Jam():
+                    self._jams.append(held.fault)
+                case Flap():
+                    self._flaps.append((held.since_s, held.fault))
+                case _:
+                    assert_never(held.fault)
+        if conditions != self.conditions:
+            self.conditions, self.models = conditions, LinkModels(conditions)
+        self.obstructed = bool(self._partitions or self._jams or self._flaps)
+
+
+def overlaid(conditions: Conditions, change: Conditions) -> Conditions:
+    """Return conditions with a change over them, table by table and key by key."""
+    links = {(link.source, link.to): link for link in conditions.link}
+    for link in change.link:
+        ends = (link.source, link.to)
+        links[ends] = _over(links[ends], link) if ends in links else link
+    channels = {name: _over(getattr(conditions, name), getattr(change, name)) for name in CHANNELS}
+    return msgspec.structs.replace(
+        _over(conditions, change), **channels, link=tuple(links.values())
+    )
+
+
+def _is_down(flap: Flap, since_s: float, now_s: float) -> bool:
+    return (now_s - since_s) % flap.period_s < 0.5 * flap.period_s
+
+
+def _is_within(jam: Jam, where: Position) -> bool:
+    dx, dy, dz = (a - b for a, b in zip(where, jam.centre_m, strict=True))
+    return dx * dx + dy * dy + dz * dz <= jam.radius_m * jam.radius_m
+
+
+def _over(table: _Keys, change: LinkKeys) -> _Keys:
+    """Return a table with the link keys that a change gives."""
+    return msgspec.structs.replace(table, **_given(change))
+
+
+def _given(table: LinkKeys) -> dict[str, Any]:
+    values = ((key, getattr(table, key)) for key in LinkKeys.__struct_fields__)
+    return {key: value for key, value in values if value is not None}
+
+
+def _merged(*tables: LinkKeys | Conditions | DirectedLink) -> LinkModel:
+    own_rate = (
+        any(getattr(tables[2], key) is not None for key in RATE_KEYS) if tables[2:] else False
+    )
+    given = dict(chain.from_iterable(_given(table).items() for table in tables))
+    return LinkModel(**given, own_rate=own_rate)

@@ -1,0 +1,70 @@
+"""Where vehicles are put that enter the world after its start."""
+
+import numpy as np
+
+from worldsim.engine.operations import StartPose
+from worldsim.scenario.start import BoxStart, ListStart
+from worldsim.scenario.tables import Scenario
+from worldsim.truth.obstacles import Obstacles
+from worldsim.truth.start_positions import room_of, starts
+from worldsim.truth.vehicle import Floats
+
+
+class Placement:
+    """Draws places from the seed, clear of obstacles and of the vehicles that are present.
+
+    Every method takes the positions of all vehicles (N, 3) [m; world frame], NaN for none, and the
+    time [s], and raises StartError where there is no room.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._obstacles = Obstacles(scenario.obstacle)
+        start = scenario.fleet.start
+        self._origins = [(start, index) for index in range(scenario.fleet.agents)]
+
+    def joiners(
+        self, number: int, start: BoxStart | ListStart, count: int, position: Floats, time_s: float
+    ) -> list[StartPose]:
+        """Return where so many new vehicles are put by the event of that number."""
+        poses = self._drawn(number, start, count, position, time_s)
+        self._origins += [(start, index) for index in range(count)]
+        return poses
+
+    def returning(
+        self, number: int, agents: list[int], position: Floats, time_s: float
+    ) -> dict[int, StartPose]:
+        """Return where vehicles that left are put: in their listed place, or a new draw."""
+        poses: dict[int, StartPose] = {}
+        for agent in agents:
+            taken = np.array([pose.position for pose in poses.values()]).reshape(-1, 3)
+            present = np.concatenate((position, taken))
+            start = self._start_of(agent)
+            key = (number << 10) + agent
+            poses[agent] = self._drawn(key, start, 1, present, time_s)[0]
+        return poses
+
+    def _start_of(self, agent: int) -> BoxStart | ListStart:
+        start, index = self._origins[agent]
+        if isinstance(start, BoxStart):
+            return start
+        own = slice(index, index + 1)
+        yaws_deg = start.yaws_deg[own] if start.yaws_deg is not None else None
+        return ListStart(positions_m=start.positions_m[own], yaws_deg=yaws_deg)
+
+    def _drawn(
+        self, key: int, start: BoxStart | ListStart, count: int, position: Floats, time_s: float
+    ) -> list[StartPose]:
+        where, yaws = starts(
+            start,
+            count,
+            self._scenario.seed,
+            event=key + 1,
+            present=position[~np.isnan(position[:, 0])],
+            apart_m=self._scenario.control.separation_m,
+            room=room_of(self._scenario, self._obstacles, time_s),
+        )
+        return [
+            StartPose((x, y, z), yaw)
+            for (x, y, z), yaw in zip(where.tolist(), yaws.tolist(), strict=True)
+        ]

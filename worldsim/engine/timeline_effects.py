@@ -1,0 +1,217 @@
+"""From a step of the timeline to an operation, and from an operation to its effects and events.
+
+A clock asks for the operations that are due, carries each out on its processes and its medium, and
+then has it applied here: to the members, the radio's conditions, the sensors and the missions.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import assert_never
+
+from agent.qstructure.formation import Formation, FormationSpec
+from netem.conditions import NetworkConditions
+from netem.faults import FaultOrder, Flap, Heal, Jam, Partition, RadioEvent, RadioFault
+from netem.link_keys import Conditions
+from worldsim.engine.membership import Membership
+from worldsim.engine.missions import Missions
+from worldsim.engine.operations import (
+    AdmitAgents,
+    EndProcesses,
+    GiveMission,
+    Operation,
+    PauseProcesses,
+    ResumeProcesses,
+    SetSensorMode,
+    StartProcesses,
+)
+from worldsim.engine.selection import Claims
+from worldsim.judge.radio_events import applied
+from worldsim.judge.run_events import (
+    By,
+    FormationGiven,
+    FrameGiven,
+    Joined,
+    Killed,
+    Left,
+    Paused,
+    Restarted,
+    Resumed,
+    RunEvent,
+    SensorChanged,
+)
+from worldsim.scenario.faults import (
+    Join,
+    Kill,
+    Leave,
+    Pause,
+    ProcessFault,
+    Restart,
+    Resume,
+    SensorFault,
+)
+from worldsim.scenario.tables import Scenario
+from worldsim.scenario.target_frame import FrameChange
+from worldsim.scenario.timeline import SLACK_S, Step, Timeline
+from worldsim.truth.world import World
+
+Emit = Callable[[RunEvent], None]
+
+
+class TimelineEffects:
+    """What the timeline and an operator have done to a fleet so far."""
+
+    def __init__(self, scenario: Scenario, world: World, emit: Emit) -> None:
+        self.timeline = Timeline(scenario)
+        self.members = Membership(scenario)
+        self.network = NetworkConditions(scenario.netem)
+        self.missions = Missions(scenario)
+        self.places: list[tuple[int, int] | None] = [None] * scenario.rows
+        """What each agent claims, as it last reported; row i = agent i."""
+        self._spacing_m = scenario.control.spacing_m
+        self._formation = Formation(scenario.formation, self._spacing_m)
+        self._world = world
+        self._emit = emit
+
+    @property
+    def addressee(self) -> int | None:
+        """The agent that gets the pending mission: the one it is for, else the lowest id."""
+        to = self.missions.to
+        return to if to is not None and self.members.awake[to] else self.members.first
+
+    def due(self) -> Iterator[Operation]:
+        """Yield what is to happen before the present slot; apply each before taking the next."""
+        time_s = self._world.time_s
+        for step in self.timeline.due(time_s):
+            operation = self.operation(step)
+            if operation is not None:
+                yield operation
+        if self.members.next_boot_s <= time_s + SLACK_S:
+            yield self.members.booted(time_s)
+
+    def nothing_due(self) -> bool:
+        """Return whether nothing is to happen before the present slot."""
+        next_s = min(self.timeline.next_s, self.members.next_boot_s)
+        return next_s > self._world.time_s + SLACK_S
+
+    def operation(self, step: Step) -> Operation | None:
+        """Return what a step means now; None where it has nothing to do or to undo."""
+        action, number = step.event.action, step.number
+        match action:
+            case Conditions() | Partition() | Jam() | Flap() | Heal():
+                return self._order(step, action)
+            case Kill() | Leave() | Restart() | Pause() | Resume() | Join():
+                return self._process_operation(step, action)
+            case SensorFault():
+                return self.members.sensor_fault(number, action, step.ends, self._claims)
+            case FormationSpec() | FrameChange():
+                return None if step.ends else self.missions.changed(action, step.at_s)
+        assert_never(action)
+
+    def apply(self, operation: Operation, by: By = None) -> None:
+        """Apply an operation that was carried out, and emit its events."""
+        match operation:
+            case EndProcesses():
+                self._end(operation, by)
+            case PauseProcesses():
+                self.members.apply(operation, self._world.time_s)
+                self._report(Paused, operation, by)
+            case ResumeProcesses():
+                self.members.apply(operation, self._world.time_s)
+                self._report(Resumed, operation, by)
+            case StartProcesses():
+                self._start(operation, by)
+            case AdmitAgents():
+                self.members.apply(operation, self._world.time_s)
+            case SetSensorMode():
+                self._set_sensors(operation, by)
+            case FaultOrder():
+                self._emit(applied(operation, self.network, self._t_s, by))
+            case GiveMission():
+                self._give(operation, by)
+            case _:
+                assert_never(operation)
+
+    def exited(self, agent: int, signal: int | None, status: int | None) -> None:
+        """Note that an agent's process ended unplanned, by a signal or with a status."""
+        self.members.exited(agent)
+        self._emit(Killed(t_s=self._t_s, agent=agent, planned=False, signal=signal, status=status))
+
+    @property
+    def _t_s(self) -> float:
+        return round(self._world.time_s, 6)
+
+    @property
+    def _claims(self) -> Claims:
+        return Claims(self.places, self._formation)
+
+    def _order(self, step: Step, fault: RadioFault) -> FaultOrder | None:
+        event = None if step.ends else RadioEvent.of(fault)
+        order = FaultOrder(step.number, step.at_s, event)
+        return None if step.ends and not self.network.ends(order) else order
+
+    def _process_operation(self, step: Step, fault: ProcessFault) -> Operation | None:
+        position, time_s = self._world.fleet.position, self._world.time_s
+        if step.ends:
+            return self.members.ended(step.number, fault, position, time_s)
+        return self.members.begun(step.number, fault, self._claims, position, time_s)
+
+    def _end(self, operation: EndProcesses, by: By) -> None:
+        self.members.apply(operation, self._world.time_s)
+        if operation.leaves:
+            for agent in operation.agents:
+                self._world.leave(agent)
+        self._report(Left if operation.leaves else Killed, operation, by)
+
+    def _report(
+        self,
+        event: type[Killed | Left | Paused | Resumed],
+        operation: EndProcesses | PauseProcesses | ResumeProcesses,
+        by: By,
+    ) -> None:
+        """Emit an event for each agent, or one that says that the selectors meant none."""
+        for agent in operation.agents:
+            self._emit(event(t_s=self._t_s, agent=agent, planned=True, by=by))
+        if not operation.agents:
+            nobody = operation.selectors
+            self._emit(event(t_s=self._t_s, agent=None, planned=True, by=by, nobody=nobody))
+
+    def _start(self, operation: StartProcesses, by: By) -> None:
+        self.members.apply(operation, self._world.time_s)
+        for agent, pose in operation.poses.items():
+            self._world.enter(agent, pose.position, pose.yaw)
+        event = Restarted if operation.kind == "restart" else Joined
+        for agent, incarnation in operation.incarnations.items():
+            self.places[agent] = None
+            self.missions.report(agent, 0)
+            self._emit(
+                event(t_s=self._t_s, agent=agent, planned=True, by=by, incarnation=incarnation)
+            )
+        if not operation.incarnations:
+            refused = operation.refused or "no agent to restart"
+            self._emit(event(t_s=self._t_s, agent=None, planned=True, by=by, refused=refused))
+
+    def _set_sensors(self, operation: SetSensorMode, by: By) -> None:
+        sensor, mode = operation.sensor or "all", operation.mode or "works again"
+        for agent in operation.agents:
+            self._world.failures.set(agent, operation.sensor, operation.mode)
+            self._emit(
+                SensorChanged(
+                    t_s=self._t_s, agent=agent, planned=True, by=by, sensor=sensor, mode=mode
+                )
+            )
+
+    def _give(self, mission: GiveMission, by: By) -> None:
+        key = self.missions.issue(mission)
+        self._formation = Formation(mission.formation, self._spacing_m)
+        event = FormationGiven if mission.kind == "formation" else FrameGiven
+        self._emit(
+            event(
+                t_s=self._t_s,
+                agent=self.addressee,
+                planned=True,
+                by=by,
+                formation=mission.formation.name,
+                mission=key,
+                path=mission.path,
+                tables=mission.formation,
+            )
+        )
