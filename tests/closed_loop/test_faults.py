@@ -7,8 +7,8 @@ from random import Random
 import numpy as np
 import pytest
 
-from worldsim.engine.step import Event
 from worldsim.engine.virtual import Flight, fly
+from worldsim.judge.run_events import RunEvent
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
 from worldsim.scenario.file import load
@@ -33,7 +33,7 @@ class Watcher:
     def tick(self, tick: Tick, figures: Figures) -> None:
         self.ticks.append(tick)
 
-    def event(self, event: Event) -> None:
+    def event(self, event: RunEvent) -> None:
         """Events are kept by the loop itself."""
 
 
@@ -65,7 +65,7 @@ def violated(flight: Flight) -> list[str]:
 
 def kinds(flight: Flight, *wanted: str) -> list[tuple[float, str, int | None]]:
     events = flight.loop.events
-    return [(e["t_s"], e["kind"], e["agent"]) for e in events if e["kind"] in wanted]
+    return [(e.t_s, e.kind, e.agent) for e in events if e.kind in wanted]
 
 
 def reformed_s(flight: Flight) -> list[float]:

@@ -87,7 +87,7 @@ def wedge_without(place, seed, **overrides):
     fleet = VirtualFleet(load(WEDGE, {"seed": str(seed), "duration_s": "40", **overrides}))
     fly(fleet, 10.0)
     dead = [tuple(each.place) for each in told(fleet)].index(place)
-    fleet.loop.lost(dead, planned=True)
+    fleet.loop.effects.exited(dead, signal=9, status=None)
     fly(fleet, 30.0)
     living = [agent for agent in range(9) if agent != dead]
     return fleet, living
@@ -105,7 +105,7 @@ def test_a_dead_apex_is_left_alone(seed, lossy):
     assert sorted(tuple(telemetry[agent].place) for agent in heads) == [(q, 1) for q in range(4)]
     assert fleet.loop.judge.min_separation_m >= 0.25
     assert max(fleet.loop.figures.slot_error[living]) < 0.01
-    changes = [event["t_s"] for event in fleet.loop.events if event["kind"] == "slot"]
+    changes = [event.t_s for event in fleet.loop.events if event.kind == "slot"]
     assert max(changes) <= 25.0, "quiet within 15 s"
 
 

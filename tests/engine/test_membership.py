@@ -1,18 +1,29 @@
-"""Who is struck, who comes back, who joins: found when it happens, from the seed and the claims."""
+"""The team's membership: which agents an event means when it happens, and what becomes of them."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from worldsim.engine.membership import Team
+from agent.qstructure.formation import Formation
+from worldsim.engine.membership import Membership
+from worldsim.engine.operations import (
+    EndProcesses,
+    PauseProcesses,
+    ProcessOperation,
+    ResumeProcesses,
+    StartProcesses,
+)
+from worldsim.engine.process_life import State
+from worldsim.engine.selection import Claims
+from worldsim.scenario.faults import Join, Kill, Leave, Pause, ProcessFault, Restart, Resume
 from worldsim.scenario.file import load
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.tables import Scenario
-from worldsim.scenario.timeline import Holding, Joining, Revival, Strike
+from worldsim.truth.vehicle import Floats
 
 WEDGE = Path("deploy/scenarios/wedge-9.toml")
-PLACES = [(0, 0), (0, 1), (1, 1), (1, 2), (2, 1), (3, 1), (0, 2), None, (9, 9)]
+PLACES = [(0, 0), (0, 1), (1, 1), (1, 2), (2, 1), (3, 1), (0, 2), None, (9, 9), None, None, None]
 
 
 def scenario(**overrides: str) -> Scenario:
@@ -20,9 +31,32 @@ def scenario(**overrides: str) -> Scenario:
     return load(WEDGE, {"event": events, **{k.replace("__", "."): v for k, v in overrides.items()}})
 
 
-def struck(team: Team, *selectors: int | str) -> tuple[int, ...]:
-    strike = Strike(0, "kill", selectors)
-    return team.struck(strike, [*PLACES, None, None, None], scenario().formation).agents
+CLAIMS = Claims(PLACES, Formation(scenario().formation, 1.0))
+NO_CLAIMS = Claims([None] * 12, CLAIMS.formation)
+
+
+def positions() -> Floats:
+    """Return nine vehicles along a diagonal, and three rows without one."""
+    position = np.full((12, 3), np.nan)
+    position[:9] = np.arange(27).reshape(9, 3)
+    return position
+
+
+def begun(
+    members: Membership, number: int, fault: ProcessFault, claims: Claims = CLAIMS
+) -> ProcessOperation:
+    return members.begun(number, fault, claims, positions(), 0.0)
+
+
+def killed(members: Membership, *selectors: int | str) -> tuple[int, ...]:
+    """Return the agents that a kill would strike."""
+    operation = begun(members, 0, Kill(selectors))
+    assert isinstance(operation, EndProcesses)
+    return operation.agents
+
+
+def states(members: Membership) -> list[State]:
+    return [members.state(agent) for agent in range(12)]
 
 
 @pytest.mark.parametrize(
@@ -35,88 +69,81 @@ def struck(team: Team, *selectors: int | str) -> tuple[int, ...]:
     ],
 )
 def test_selectors(selectors: tuple[int | str, ...], agents: tuple[int, ...]) -> None:
-    assert struck(Team(scenario()), *selectors) == agents
+    assert killed(Membership(scenario()), *selectors) == agents
 
 
 def test_random_ones_belong_to_the_seed_and_the_event() -> None:
-    first = struck(Team(scenario()), "random:3")
+    first = killed(Membership(scenario()), "random:3")
     assert len(set(first)) == 3
-    assert struck(Team(scenario()), "random:3") == first
-    others = {
-        Team(scenario(seed=str(seed))).struck(
-            Strike(0, "kill", ("random:3",)), [*PLACES, None, None, None], scenario().formation
-        )
-        for seed in range(8)
-    }
+    assert killed(Membership(scenario()), "random:3") == first
+    others = {killed(Membership(scenario(seed=str(seed))), "random:3") for seed in range(8)}
     assert len(others) > 1
 
 
 def test_the_dead_are_not_struck_again_and_come_back_with_a_higher_incarnation() -> None:
-    team = Team(scenario())
-    position = np.zeros((12, 3))
-    stop = team.struck(Strike(4, "kill", (2, 5)), [None] * 12, scenario().formation)
-    team.take(stop, 10.0)
-    assert not team.whole
-    assert struck(team, 2, 5) == ()
-    back = team.revived(Revival(4, ()), position)
-    assert (back.incarnations, back.stands) == ({2: 1, 5: 1}, {})
-    team.take(back, 20.0)
-    assert not team.alive[2]
-    assert team.next_boot_s == 21.0
-    assert team.booted(20.9).agents == ()
-    team.take(team.booted(21.0), 21.0)
-    assert team.alive[[2, 5]].all()
-    assert team.incarnations[2] == 1
+    members = Membership(scenario())
+    members.apply(begun(members, 4, Kill((2, 5))), 10.0)
+    assert not members.whole
+    assert killed(members, 2, 5) == ()
+    back = members.ended(4, Kill((2, 5)), np.zeros((12, 3)), 20.0)
+    assert isinstance(back, StartProcesses)
+    assert (back.incarnations, back.poses) == ({2: 1, 5: 1}, {})
+    members.apply(back, 20.0)
+    assert not members.alive[2]
+    assert members.next_boot_s == 21.0
+    assert members.booted(20.9).agents == ()
+    members.apply(members.booted(21.0), 21.0)
+    assert members.alive[[2, 5]].all()
+    assert members.incarnations[2] == 1
 
 
-def test_the_paused_take_part_but_do_not_step_until_they_resume() -> None:
-    team = Team(scenario())
-    places = [*PLACES, None, None, None]
-    formation = scenario().formation
-    team.take(team.held(Holding(0, "pause", ("vertex:V1", 4)), places, formation), 10.0)
-    assert team.alive[[0, 4]].all()
-    assert not team.awake[[0, 4]].any()
-    assert team.first == 1
-    assert struck(team, "vertex:V1") == ()  # it is not where it was found last
-    assert struck(team, 4) == (4,)
-    assert team.held(Holding(0, "pause", (4,)), places, formation).agents == ()
-    team.take(team.held(Holding(1, "resume", (4,)), places, formation), 11.0)
-    assert team.held(Holding(0, "resume", ()), places, formation).agents == (0,)
-    team.take(team.struck(Strike(2, "kill", (0,)), places, formation), 12.0)
-    assert team.held(Holding(0, "resume", ()), places, formation).agents == ()
+def test_a_paused_agent_is_alive_but_does_not_step_until_it_resumes() -> None:
+    members = Membership(scenario())
+    members.apply(begun(members, 0, Pause(("vertex:V1", 4))), 10.0)
+    assert members.alive[[0, 4]].all()
+    assert not members.awake[[0, 4]].any()
+    assert members.first == 1
+    assert killed(members, "vertex:V1") == ()  # a paused agent no longer holds its place
+    assert killed(members, 4) == (4,)
+    again = begun(members, 0, Pause((4,)))
+    assert isinstance(again, PauseProcesses)
+    assert again.agents == ()
+    members.apply(begun(members, 1, Resume((4,))), 11.0)
+    assert members.ended(0, Pause((4,)), positions(), 12.0) == ResumeProcesses(0, (0,), ())
+    members.apply(begun(members, 2, Kill((0,))), 12.0)
+    assert members.ended(0, Pause((4,)), positions(), 12.0) == ResumeProcesses(0, (), ())
 
 
-def test_joiners_get_the_next_ids_and_keep_clear_of_who_is_there() -> None:
-    team = Team(scenario())
-    position = np.full((12, 3), np.nan)
-    position[:9] = np.arange(27).reshape(9, 3)
+def test_joiners_get_the_next_ids_and_keep_clear_of_present_vehicles() -> None:
+    members = Membership(scenario())
     start = BoxStart(size_m=(3.0, 3.0, 3.0), spacing_m=0.6)
-    joining = team.joined(Joining(0, 3, start), position)
+    joining = begun(members, 0, Join(count=3, start=start))
+    assert isinstance(joining, StartProcesses)
     assert list(joining.incarnations) == [9, 10, 11]
-    stands = np.array([where for where, _ in joining.stands.values()])
-    everybody = np.concatenate((position[:9], stands))
-    apart = np.linalg.norm(everybody[:, None] - stands, axis=2)
+    put = np.array([pose.position for pose in joining.poses.values()])
+    everybody = np.concatenate((positions()[:9], put))
+    apart = np.linalg.norm(everybody[:, None] - put, axis=2)
     apart[range(9, 12), range(3)] = np.inf
     assert apart.min() >= 0.6
 
 
-def test_a_place_that_is_taken_refuses_all_who_would_join() -> None:
-    team = Team(scenario())
-    position = np.full((12, 3), np.nan)
-    position[0] = (1.0, 0.0, 0.0)
-    start = ListStart(positions_m=((5.0, 0.0, 0.0), (1.1, 0.0, 0.0)))
-    refused = team.joined(Joining(0, 2, start), position)
+def test_a_place_that_is_taken_refuses_all_joiners() -> None:
+    members = Membership(scenario())
+    start = ListStart(positions_m=((50.0, 0.0, 0.0), (0.1, 1.0, 2.0)))
+    refused = begun(members, 0, Join(count=2, start=start))
+    assert isinstance(refused, StartProcesses)
     assert refused.incarnations == {}
-    assert refused.refused == "a vehicle is within 0.25 m of [1.1, 0, 0]"
+    assert refused.refused == "a vehicle is within 0.25 m of [0.1, 1, 2]"
 
 
-def test_who_left_comes_back_somewhere_clear() -> None:
-    team = Team(scenario())
+def test_an_agent_that_left_comes_back_clear_of_present_vehicles() -> None:
+    members = Membership(scenario())
+    members.apply(begun(members, 4, Leave((2,)), NO_CLAIMS), 10.0)
+    assert members.state(2) is State.GONE
     position = np.zeros((12, 3)) + np.arange(12)[:, None]
-    stop = team.struck(Strike(4, "leave", (2,)), [None] * 12, scenario().formation)
-    team.take(stop, 10.0)
     position[2] = np.nan
-    back = team.revived(Revival(7, (2,)), position)
-    (where, _) = back.stands[2]
+    back = members.begun(7, Restart((2,)), NO_CLAIMS, position, 11.0)
+    assert isinstance(back, StartProcesses)
+    where = back.poses[2].position
     away = np.linalg.norm(np.delete(position, 2, axis=0) - where, axis=1)
     assert away.min() >= 0.6

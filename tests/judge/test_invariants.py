@@ -1,29 +1,45 @@
 """The judge of allocation: times by the formulas, and each planted breach is seen."""
 
 from dataclasses import replace
-from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
+from netem.link_keys import Conditions
 from tests.recording.flights import straight_flight, wedge
 from worldsim.judge.connectivity import Connectivity, rounds_to_all
+from worldsim.judge.run_events import (
+    ConditionsChanged,
+    Healed,
+    Partitioned,
+    RoleChanged,
+    RunEvent,
+)
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge
 
 AGENTS = 9
 DURATION_S = 30.0
+HEALED = Healed(t_s=0.0, agent=None, planned=True)
+
+
+def changed(number: int, change: Conditions) -> ConditionsChanged:
+    keys = msgspec.structs.asdict(change)
+    return ConditionsChanged(
+        t_s=0.0, agent=None, planned=True, number=number, conditions=change, **keys
+    )
 
 
 def flight(agents: int = AGENTS) -> list[Tick]:
     return list(straight_flight(wedge(agents, DURATION_S)))
 
 
-def judged(ticks: list[Tick], *events: dict[str, Any]) -> dict[str, tuple[int, int]]:
+def judged(ticks: list[Tick], *events: RunEvent) -> dict[str, tuple[int, int]]:
     judge = Judge(wedge(AGENTS, DURATION_S))
     waiting = list(events)
     for tick in ticks:
-        while waiting and waiting[0]["t_s"] <= tick.time_s:
+        while waiting and waiting[0].t_s <= tick.time_s:
             judge.note(waiting.pop(0))
         judge.see(tick)
     return {name: (row["ticks"], row["violations"]) for name, row in judge.invariants().items()}
@@ -47,7 +63,7 @@ def test_how_long_it_takes_until_a_team_must_have_settled(
     loss_percent: float, horizon_s: float
 ) -> None:
     reach = Connectivity(wedge(AGENTS))
-    reach.note({"kind": "netem", "conditions": {"loss_percent": loss_percent}})
+    reach.note(changed(1, Conditions(loss_percent=loss_percent)))
     settled_s = reach.detection_s(2) + 2.0 * reach.everybody_s(AGENTS, 2)
     assert settled_s == pytest.approx(horizon_s, abs=0.6)
 
@@ -62,12 +78,16 @@ def test_components_follow_range_and_partition() -> None:
     line = replace(tick, position=np.array([[k, 0, 0] for k in (0, 1, 2, 9)], dtype=np.float32))
     reach = Connectivity(wedge(4))
     assert reach.components(line).members() == [[0, 1, 2, 3]]
-    reach.note({"kind": "netem", "conditions": {"range_m": 1.5}})
+    reach.note(changed(1, Conditions(range_m=1.5)))
     assert reach.components(line).members() == [[0, 1, 2], [3]]
     assert reach.components(line).hops == 2
-    reach.note({"kind": "partition", "groups": [[1]]})
+    reach.note(
+        Partitioned(
+            t_s=0.0, agent=None, planned=True, number=2, groups=((1,),), parted="clean", bridge=()
+        )
+    )
     assert reach.components(line).members() == [[0], [1], [2], [3]]
-    reach.note({"kind": "heal"})
+    reach.note(HEALED)
     assert reach.components(line).hops == 2
 
 
@@ -108,12 +128,12 @@ def test_a_place_changed_in_a_quiet_team_breaks_i7_and_after_a_fault_does_not() 
         claimed(ticks, 4, tuple(ticks[0].place[5]), 25.0), 5, tuple(ticks[0].place[4]), 25.0
     )
     assert judged(swapped)["I7"][1] == 1
-    assert judged(swapped, {"t_s": 24.0, "kind": "heal", "agent": None})["I7"][1] == 0
+    assert judged(swapped, msgspec.structs.replace(HEALED, t_s=24.0))["I7"][1] == 0
 
 
 def test_a_fourth_change_of_role_without_a_fault_breaks_i6() -> None:
-    flips = [{"t_s": 10.0 + k, "kind": "role", "agent": 3} for k in range(4)]
+    flips = [RoleChanged(t_s=10.0 + k, agent=3, role="member") for k in range(4)]
     assert judged(flight(), *flips[:3])["I6"][1] == 0
     assert judged(flight(), *flips)["I6"][1] == 1
-    fault = {"t_s": 12.5, "kind": "heal", "agent": None}
+    fault = msgspec.structs.replace(HEALED, t_s=12.5)
     assert judged(flight(), *flips[:3], fault, flips[3])["I6"][1] == 0

@@ -6,10 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netem.delivery_log import Digest, joined
+from netem.faults import Flap, Heal, Jam, Partition
 from netem.link_keys import Conditions, DirectedLink, GilbertElliott, LinkKeys, PathLoss
 from netem.medium import Medium
-from netem.messages import Flap, Flapped, Healed, Jam, Jammed, MediumSetup, Parted
+from netem.messages import MediumSetup
 from netem.wire.frame import Outgoing, Transmission
+from tests.netem.ordering import begin, end
 
 AGENTS = 6
 SLOT_S = 0.0125
@@ -33,12 +35,12 @@ ROUGH = Conditions(
 )
 LOSSY = Conditions(range_m=4.0, delay_ms=20.0, jitter_ms=10.0, loss_percent=20.0)
 ORDERS = (
-    Parted(((0, 1), (2,)), "one_way"),
-    Jammed(1, Jam((1.0, 1.0, 0.0), 1.5)),
-    Flapped(2, Flap(0.3, 0.1)),
-    Healed(),
-    Jammed(1, None),
-    Flapped(2, None),
+    begin(0, Partition(((0, 1), (2,)), "one_way")),
+    begin(1, Jam((1.0, 1.0, 0.0), 1.5)),
+    begin(2, Flap(0.3), at_s=0.1),
+    begin(3, Heal()),
+    end(1),
+    end(2),
 )
 shares = st.lists(st.integers(0, AGENTS - 1), min_size=AGENTS, max_size=AGENTS).map(
     lambda owner: [[who for who in range(AGENTS) if owner[who] == shard] for shard in set(owner)]

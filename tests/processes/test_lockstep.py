@@ -109,7 +109,7 @@ def test_whatever_befalls_a_fleet_befalls_it_as_in_virtual_time(
         str(shard) for shard in range(1, shards)
     }
     kinds = [event["kind"] for event in events_of(run)]
-    assert kinds == [event["kind"] for event in flight.loop.events]
+    assert kinds == [event.kind for event in flight.loop.events]
 
 
 def test_an_agent_that_dies_ends_the_run_with_a_line(

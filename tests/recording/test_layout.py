@@ -4,6 +4,7 @@ import pytest
 from rerun.chunk import Chunk, RrdReader
 
 from tests.recording.flights import record, straight_flight, wedge
+from worldsim.judge.run_events import Killed
 from worldsim.recording.recorder import RunRecorder
 
 AGENTS = 9
@@ -14,7 +15,7 @@ def chunks(tmp_path_factory: pytest.TempPathFactory) -> list[Chunk]:
     path = tmp_path_factory.mktemp("layout") / "run.rrd"
     scenario = wedge(AGENTS, duration_s=2.0)
     recorder = RunRecorder(path, scenario, "layout", mode="virtual")
-    recorder.event({"t_s": 0.5, "kind": "kill", "agent": 4})
+    recorder.event(Killed(t_s=0.5, agent=4, planned=True))
     record(recorder, scenario, list(straight_flight(scenario)))
     return list(RrdReader(path).stream())
 
@@ -73,6 +74,6 @@ def test_series_are_named_after_their_agents(chunks: list[Chunk]) -> None:
 
 def test_events_warn_of_a_kill(chunks: list[Chunk]) -> None:
     (log,) = [chunk.to_record_batch() for chunk in chunks if chunk.entity_path == "/log/events"]
-    assert log.column("TextLog:text").to_pylist() == [["kill a4"]]
+    assert log.column("TextLog:text").to_pylist() == [["kill a4: planned True"]]
     assert log.column("TextLog:level").to_pylist() == [["WARN"]]
     assert log.column("tick").to_pylist() == [10]

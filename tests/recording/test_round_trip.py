@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.recording.flights import record, straight_flight, told, wedge
+from worldsim.judge.run_events import Healed, Killed, SlotChanged
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge
 from worldsim.recording.readback import read_run
@@ -82,9 +83,9 @@ def test_scenario_and_events_come_back(tmp_path: Path) -> None:
     scenario = wedge(9, duration_s=1.0)
     recorder = RunRecorder(tmp_path / "run.rrd", scenario, "events", mode="virtual")
     events = [
-        {"t_s": 0.0125, "kind": "slot", "agent": 3, "place": [1, 2], "before": None},
-        {"t_s": 0.5, "kind": "kill", "agent": 4},
-        {"t_s": 0.75, "kind": "heal", "agent": None},
+        SlotChanged(t_s=0.0125, agent=3, place=(1, 2), before=None),
+        Killed(t_s=0.5, agent=4, planned=True),
+        Healed(t_s=0.75, agent=None, planned=True),
     ]
     for event in events:
         recorder.event(event)

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from worldsim.engine.virtual import fly
+from worldsim.judge.run_events import SensorChanged
 from worldsim.scenario.file import load
 from worldsim.scenario.toml import ScenarioError
 
@@ -36,9 +37,7 @@ def test_nobody_collides_and_it_is_told(mode: str, sensors: str) -> None:
     scenario = load(WEDGE, {"event": event, "vehicle.sensors": sensors, "duration_s": "6"})
     loop = fly(scenario).loop
     told = [
-        (each["t_s"], each["agent"], each["mode"])
-        for each in loop.events
-        if each["kind"] == "sensor"
+        (each.t_s, each.agent, each.mode) for each in loop.events if isinstance(each, SensorChanged)
     ]
     assert told == [(1.5, 0, mode), (3.5, 0, "works again")]
     assert loop.judge.min_separation_m is not None

@@ -88,7 +88,10 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
         return self.kill or self.leave or self.restart or self.pause or self.resume or ()
 
 
-ACTIONS = tuple(name for name in EventTable.__struct_fields__ if name not in {"at_s", "for_s"})
+_TIMES = ("at_s", "for_s")
+_RADIO = RadioEvent.__struct_fields__
+_OTHERS = (key for key in EventTable.__struct_fields__ if key not in (*_TIMES, *_RADIO))
+ACTIONS = (*_OTHERS, *_RADIO)
 UNDONE = ("kill", "leave", "pause", "partition", "jam", "flap", "netem", "sensor")
 """Actions that ``for_s`` can undo."""
 ON_PROCESSES = ("kill", "leave", "restart", "join", "pause", "resume")

@@ -1,0 +1,92 @@
+"""Run events: each comes back from its row as it was, and the judge recovers the radio's faults."""
+
+import json
+from typing import get_args
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netem.conditions import NetworkConditions
+from netem.faults import FaultOrder, Flap, Heal, Jam, Partition, RadioEvent
+from netem.link_keys import Conditions, LinkKeys
+from worldsim.judge.radio_events import applied, order_of
+from worldsim.judge.run_events import (
+    Joined,
+    Killed,
+    LateStart,
+    Left,
+    Paused,
+    QueueChanged,
+    RoleChanged,
+    RunEvent,
+    SensorChanged,
+    SlotChanged,
+    as_row,
+    event_of,
+)
+
+FAULTS = [
+    Partition(((0, 1), (2,)), "bridge", (4,)),
+    Jam((1.0, 2.0, 3.0), 2.0),
+    Flap(0.5, ((0, 1),)),
+    Conditions(loss_percent=50.0, multihop=LinkKeys(delay_ms=9.0)),
+]
+EVENTS: list[RunEvent] = [
+    Killed(t_s=1.0, agent=2, planned=True),
+    Killed(t_s=1.0, agent=2, planned=False, signal=9),
+    Left(t_s=1.0, agent=None, planned=True, nobody=("vertex:V1",)),
+    Paused(t_s=1.0, agent=3, planned=True, by="operator"),
+    Joined(t_s=1.0, agent=None, planned=True, refused="no room"),
+    SensorChanged(t_s=2.0, agent=1, planned=True, sensor="all", mode="stuck"),
+    SlotChanged(t_s=0.5, agent=1, place=(2, 1), before=None),
+    QueueChanged(t_s=0.5, agent=1, queue=2),
+    RoleChanged(t_s=0.5, agent=1, role="vertex"),
+    LateStart(t_s=3.0, agent=1, detail="its process is not up"),
+]
+
+
+@pytest.mark.parametrize("event", EVENTS, ids=lambda event: event.kind)
+def test_an_event_comes_back_from_its_line(event: RunEvent) -> None:
+    row = as_row(event)
+    assert list(row)[:3] == ["t_s", "kind", "agent"]
+    assert event_of(json.loads(json.dumps(row))) == event
+
+
+def test_every_kind_has_its_own_name() -> None:
+    kinds = [event.__struct_config__.tag for event in get_args(RunEvent)]
+    assert len(set(kinds)) == len(kinds)
+
+
+@pytest.mark.parametrize(
+    "row", [{}, {"kind": "explode", "t_s": 0, "agent": None}, {"kind": "kill"}]
+)
+def test_a_row_that_is_no_event_is_refused(row: dict[str, object]) -> None:
+    with pytest.raises(msgspec.ValidationError):
+        event_of(row)
+
+
+orders = st.one_of(
+    st.tuples(st.integers(0, 5), st.sampled_from(FAULTS)).map(
+        lambda each: FaultOrder(each[0], 1.5, RadioEvent.of(each[1]))
+    ),
+    st.integers(0, 5).map(lambda number: FaultOrder(number, 2.5)),
+    st.just(FaultOrder(0, 3.5, RadioEvent.of(Heal()))),
+)
+
+
+@settings(derandomize=True, deadline=None, max_examples=80)
+@given(st.lists(orders, max_size=12))
+def test_from_its_events_the_judge_knows_what_is_in_force(given_orders: list[FaultOrder]) -> None:
+    world, judge = NetworkConditions(Conditions()), NetworkConditions(Conditions())
+    for order in given_orders:
+        if order.fault is None and not world.ends(order):
+            continue
+        event = event_of(json.loads(json.dumps(as_row(applied(order, world, 1.5, None)))))
+        judge.apply(order_of(event))
+        assert [held.fault for held in judge.in_force.values()] == [
+            held.fault for held in world.in_force.values()
+        ]
+        assert list(judge.in_force) == list(world.in_force)
+        assert judge.conditions == world.conditions
