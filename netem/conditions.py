@@ -14,12 +14,10 @@ import msgspec
 
 from netem.faults import FaultOrder, Flap, Heal, Jam, LastingFault, Partition, Position
 from netem.link import LinkModel
-from netem.link_keys import Conditions, DirectedLink, LinkKeys
+from netem.link_keys import RATE_KEYS, Conditions, DirectedLink, LinkKeys
 from netem.wire.frame import CHANNELS
 
 _Keys = TypeVar("_Keys", bound=LinkKeys)
-RATE_KEYS = ("rate_kbit", "rate_overhead_b", "limit")
-"""Keys that belong to a sender's channel; a link with one of its own has its own queue."""
 UNNAMED = -1
 """The group of the agents that a partition does not name."""
 

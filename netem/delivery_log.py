@@ -1,8 +1,8 @@
-"""The journal: what became of every frame, receiver by receiver, and one digest of it all.
+"""The delivery log: the verdict on every frame, receiver by receiver, and a digest of them all.
 
-A page for each receiver, so that shards of the medium, each with some of the receivers, have
-together the pages of one medium with all of them: whoever has all pages of a slot has its digest.
-Frames for whom their receiver was out of reach are not noted: that follows from the positions.
+The log has a page for each receiver. Shards of the medium, each with some of the receivers,
+together write the pages of one medium, so all pages of a slot give the same digest. A frame whose
+receiver is out of reach has no entry: that follows from the positions.
 """
 
 from collections.abc import Iterable, Mapping
@@ -13,61 +13,62 @@ import numpy as np
 from numpy.typing import NDArray
 
 HEAD = Layout("<4q").pack
-"""A frame's key: source, incarnation, channel, count."""
+"""Packs a frame's key: source, incarnation, channel, count."""
 FATE = Layout("<BBdd").pack
-"""Its fate: copy (0, or 1 for a duplicate), cause, delay [s], and the share of the bit turned."""
+"""Packs a verdict: copy (1 for a duplicate, else 0), cause, delay [s], place of the flipped bit."""
 ENTRY = np.dtype(
     [(name, "<i8") for name in ("source", "incarnation", "channel", "count")]
-    + [("copy", "u1"), ("cause", "u1"), ("delay_s", "<f8"), ("turned", "<f8")]
+    + [("copy", "u1"), ("cause", "u1"), ("delay_s", "<f8"), ("flipped_at", "<f8")]
 )
+"""One entry of a page: HEAD and FATE."""
 
 
 class Digest:
-    """One digest over slot after slot of pages."""
+    """One digest over the pages of all slots."""
 
     def __init__(self) -> None:
         self._hash = sha256()
 
-    def take(self, pages: Iterable[bytes | bytearray]) -> None:
-        """Take the pages of a slot, in order of the receivers' ids."""
+    def update(self, pages: Iterable[bytes | bytearray]) -> None:
+        """Add the pages of a slot, in order of the receivers' ids."""
         self._hash.update(b"".join(pages))
 
     @property
     def value(self) -> bytes:
-        """The digest so far."""
+        """The digest of all that was added."""
         return self._hash.digest()
 
 
 class DeliveryLog:
-    """``pages``: what was noted for each agent since the last slot's end; whoever notes adds."""
+    """The pages of the present slot, row i = receiver i; the medium appends entries to them."""
 
     def __init__(self, agents: int) -> None:
         self.pages = [bytearray() for _ in range(agents)]
         self._digest = Digest()
 
     def digest(self) -> bytes:
-        """End a slot: return the digest of all that was noted by now."""
-        self._digest.take(self.pages)
+        """End a slot: return the digest of all slots so far."""
+        self._digest.update(self.pages)
         self._clear()
         return self._digest.value
 
-    def torn_out(self) -> Mapping[int, bytes]:
-        """End a slot of a shard: return its pages by receiver, those left out that are empty."""
-        torn = {receiver: bytes(page) for receiver, page in enumerate(self.pages) if page}
+    def take_pages(self) -> Mapping[int, bytes]:
+        """End a slot of a shard: return its pages by receiver, without the empty ones."""
+        taken = {receiver: bytes(page) for receiver, page in enumerate(self.pages) if page}
         self._clear()
-        return torn
+        return taken
 
     def _clear(self) -> None:
         for page in self.pages:
             page.clear()
 
 
-def joined(shards: Iterable[Mapping[int, bytes]]) -> list[bytes]:
+def joined_pages(shards: Iterable[Mapping[int, bytes]]) -> list[bytes]:
     """Return the pages of a slot from all shards, in order of the receivers' ids."""
     pages = {receiver: page for shard in shards for receiver, page in shard.items()}
     return [pages[receiver] for receiver in sorted(pages)]
 
 
 def entries(page: bytes) -> NDArray[np.void]:
-    """Return what a page holds as a structured array, an ENTRY each, in order."""
+    """Return the entries of a page as a structured array (n,) of ENTRY, in order."""
     return np.frombuffer(page, dtype=ENTRY)

@@ -1,25 +1,36 @@
-"""One directed link: whether a frame gets across, when, and whole or not.
+"""One directed link: whether a frame gets across, when, and with which damage.
 
-``verdict`` is the whole law of a link: a function of the link's model, the distance, numbers drawn
-for this very frame, and what the link remembers. So the same frame always meets the same fate.
+``plain_verdict`` and ``full_verdict`` are the whole law of a link: functions of its model, the
+distance, the numbers drawn for this frame, and the link's state. The same frame always gets the
+same verdict.
 """
 
-from dataclasses import dataclass, field
 from enum import IntEnum
 from math import inf, log10
+from typing import Never
 
 import msgspec
+from msgspec.structs import force_setattr
 
-from netem.link_keys import GilbertElliott, PathLoss
-from netem.random_draws import SHAPES, SHARING, Numbers, below, correlated, draw, draw_shared, pair
-from netem.range_index import Near
+from netem.link_keys import DEFAULTS, GilbertElliott, LinkParameters, PathLoss
+from netem.random_draws import (
+    GROUP_SIZE,
+    SHAPES,
+    FrameDraws,
+    PlainDraws,
+    Purpose,
+    correlated_share,
+    draw,
+    draw_group,
+    normal_cdf,
+    plain_draws,
+)
+from netem.range_index import InRange
 from netem.rate_queue import RateQueue
 from netem.wire.frame import Frame
 
-DEFAULT_LIMIT = 1000
-"""tc-netem's own [frames]."""
 EDGE_SIGMAS = 6.0
-"""So far over the budget, in shadowing_db, nothing is received: one frame in 10^9 would be."""
+"""A frame whose loss is this many shadowing_db over the budget is never received (1 in 10^9)."""
 
 
 class Cause(IntEnum):
@@ -34,88 +45,65 @@ class Cause(IntEnum):
 
 
 class Verdict(msgspec.Struct, frozen=True, gc=False):
-    """What a link decides: the cause, and the delay [s] of a frame that gets across.
-
-    turned: which share of its bits along a frame one is that arrives wrong, in [0, 1); negative
-    where the frame is whole.
-    """
+    """What a link decides about one frame."""
 
     cause: Cause
     delay_s: float = 0.0
-    turned: float = -1.0
+    """Delay of a frame that is delivered, with its wait in the sender's queue [s]."""
+    flipped_at: float = -1.0
+    """Place of the flipped bit, as a share of the payload's bits in [0, 1); -1 for none."""
 
 
-class Memory:
-    """What one directed link remembers on one channel, from one of its frames to the next.
+class LinkState:
+    """What one directed link keeps on one channel from one of its frames to the next."""
 
-    bad: Gilbert-Elliott's state. score: the last delay's, a standard normal number; None before the
-    first. air: what waits, where the link has a rate of its own.
-    """
-
-    __slots__ = ("air", "bad", "score")
+    __slots__ = ("bad", "jitter_score", "queue")
 
     def __init__(self) -> None:
         self.bad = False
-        self.score: float | None = None
-        self.air = RateQueue()
+        """The Gilbert-Elliott state."""
+        self.jitter_score: float | None = None
+        """Normal score of the last frame's jitter; None before the first frame."""
+        self.queue = RateQueue()
+        """Frames that wait, where the link has a rate of its own."""
 
 
-@dataclass(frozen=True, slots=True)
-class LinkModel:
-    """A link in tc-netem's and ns-3's terms.
+class LinkModel(LinkParameters[Never], frozen=True):
+    """A link with a value for every parameter, and what follows from the values."""
 
-    range_m: hard disc, d_c [m]; infinite without a limit. path_loss: a soft edge within it.
-    delay_ms, jitter_ms, distribution: the delay is delay + jitter * a number of that shape, never
-    under 0 [ms]; delay_correlation_percent: how much it remembers of the frame before.
-    loss_percent, gemodel: independent losses, and losses in bursts; a frame must pass both.
-    duplicate_percent, corrupt_percent: come twice, come with a bit turned. reorder_percent: skip
-    the delay, and so overtake.
-    rate_kbit, rate_overhead_b, limit: how fast frames go out, with so many bytes more for each, and
-    how many may wait [frames]. They are the sender's; ``own_air``: the link has its own.
-    draws: whether a verdict on this link needs random numbers at all, ``plain``: for no more than
-    loss and uniform jitter; ``clean``: the verdict in range if it needs none. remembers: whether it
-    needs a Memory. reach_m: beyond it nothing is ever received.
-    """
-
-    range_m: float = inf
-    delay_ms: float = 0.0
-    jitter_ms: float = 0.0
-    loss_percent: float = 0.0
-    path_loss: PathLoss | None = None
-    delay_correlation_percent: float = 0.0
-    distribution: str = "uniform"
-    gemodel: GilbertElliott | None = None
-    duplicate_percent: float = 0.0
-    corrupt_percent: float = 0.0
-    reorder_percent: float = 0.0
-    rate_kbit: float = inf
-    rate_overhead_b: int = 0
-    limit: int = DEFAULT_LIMIT
     own_rate: bool = False
+    """Whether the link has a queue of its own instead of the sender's."""
 
-    draws: bool = field(init=False)
-    plain: bool = field(init=False)
-    clean: Verdict = field(init=False)
-    remembers: bool = field(init=False)
-    reach_m: float = field(init=False)
+    draws: bool = False
+    """Whether a verdict needs random numbers."""
+    plain: bool = False
+    """Whether the link has no more than loss and uniform jitter, and no state."""
+    remembers: bool = False
+    """Whether the link needs a LinkState."""
+    reach_m: float = inf
+    """Distance beyond which no frame is received [m]."""
+    clean: Verdict = Verdict(Cause.DELIVERED)
+    """The verdict within range where no numbers are needed."""
 
     def __post_init__(self) -> None:
+        for key, default in DEFAULTS.items():
+            if getattr(self, key) is None:
+                force_setattr(self, key, default)
         rare = self.duplicate_percent + self.corrupt_percent + self.reorder_percent > 0.0
         shaped = self.delay_correlation_percent > 0.0 or self.distribution != "uniform"
         jittery = self.jitter_ms > 0.0
         bursts, soft = self.gemodel is not None, self.path_loss is not None
         plain = not (rare or bursts or soft or self.own_rate or (jittery and shaped))
-        draws = jittery or self.loss_percent > 0.0 or not plain
-        remembers = bursts or self.own_rate or (jittery and self.delay_correlation_percent > 0.0)
-        object.__setattr__(self, "draws", draws)
-        object.__setattr__(self, "plain", plain)
-        object.__setattr__(self, "clean", Verdict(Cause.DELIVERED, self.delay_ms / 1000.0))
-        object.__setattr__(self, "remembers", remembers)
-        object.__setattr__(self, "reach_m", min(self.range_m, edge_m(self.path_loss)))
+        force_setattr(self, "plain", plain)
+        force_setattr(self, "draws", jittery or self.loss_percent > 0.0 or not plain)
+        correlated = jittery and self.delay_correlation_percent > 0.0
+        force_setattr(self, "remembers", bursts or self.own_rate or correlated)
+        force_setattr(self, "reach_m", min(self.range_m, path_loss_reach_m(self.path_loss)))
+        force_setattr(self, "clean", Verdict(Cause.DELIVERED, self.delay_ms / 1000.0))
 
 
 def mean_loss(link: LinkModel) -> float:
-    """Return the share of frames that a link loses in the long run, in range."""
+    """Return the share of frames that a link loses in the long run, within range."""
     kept = 1.0 - link.loss_percent / 100.0
     model = link.gemodel
     if model is not None:
@@ -125,11 +113,11 @@ def mean_loss(link: LinkModel) -> float:
     return 1.0 - kept
 
 
-def stretch(link: LinkModel) -> float:
-    """Return by how much bursts widen what is lost: (1 + rho) / (1 - rho), rho = 1 - p - r.
+def burst_variance_factor(link: LinkModel) -> float:
+    """Return by how much bursts raise the variance of the mean loss over independent losses.
 
-    The variance of the mean of a two-state chain against independent draws; 1 without bursts. With
-    p + r = 0 the chain never moves: infinite.
+    (1 + rho) / (1 - rho) with rho = 1 - p - r, for a two-state chain; 1 without bursts; infinite
+    for p + r = 0, where the state never changes.
     """
     if link.gemodel is None:
         return 1.0
@@ -137,83 +125,79 @@ def stretch(link: LinkModel) -> float:
     return (1.0 + rho) / (1.0 - rho) if rho < 1.0 else inf
 
 
-FRESH = Memory()
-"""For links that remember nothing; never written to."""
+NO_STATE = LinkState()
+"""For links that keep no state; never written to."""
 LOST_TO_RANGE = Verdict(Cause.DROPPED_RANGE)
 LOST = Verdict(Cause.DROPPED_LOSS)
 LOST_TO_PARTITION = Verdict(Cause.DROPPED_PARTITION)
 LOST_TO_QUEUE = Verdict(Cause.DROPPED_QUEUE)
 
 
-def verdict(
-    link: LinkModel, distance_m: float, draws: Numbers | None, memory: Memory = FRESH
-) -> Verdict:
-    """Decide one frame on one link.
-
-    draws: numbers for loss and delay; unless ``link.plain`` also for edge, reorder, the step
-    between good and bad, the loss in bursts, duplicate and corruption; None where ``link.draws`` is
-    False. memory: the link's own, which changes, where ``link.remembers``.
-    """
+def plain_verdict(link: LinkModel, distance_m: float, draws: PlainDraws | None) -> Verdict:
+    """Decide one frame on a ``plain`` link; draws: None where ``link.draws`` is False."""
     if not distance_m <= link.range_m:
         return LOST_TO_RANGE
     if draws is None:
         return link.clean
-    if not link.plain:
-        return _rough(link, distance_m, draws, memory)
-    if draws[0] * 100.0 < link.loss_percent:
+    if draws.loss * 100.0 < link.loss_percent:
         return LOST
-    delay_ms = link.delay_ms + link.jitter_ms * (2.0 * draws[1] - 1.0)
+    delay_ms = link.delay_ms + link.jitter_ms * (2.0 * draws.delay - 1.0)
     return Verdict(Cause.DELIVERED, delay_ms / 1000.0 if delay_ms > 0.0 else 0.0)
 
 
-def _rough(link: LinkModel, distance_m: float, draws: Numbers, memory: Memory) -> Verdict:
-    """Decide by all that a link may have beyond loss and jitter."""
-    loss, delay, edge, reorder, step, burst, _, corrupt = draws
-    if link.path_loss is not None and not edge < received(link.path_loss, distance_m):
+def full_verdict(
+    link: LinkModel, distance_m: float, draws: FrameDraws, state: LinkState = NO_STATE
+) -> Verdict:
+    """Decide one frame on any link; state: the link's own, which is updated."""
+    if not distance_m <= link.range_m:
         return LOST_TO_RANGE
-    in_burst = link.gemodel is not None and _lost_in_burst(link.gemodel, step, burst, memory)
-    if in_burst or loss * 100.0 < link.loss_percent:
+    edge = link.path_loss
+    if edge is not None and not draws.path_loss < reception_probability(edge, distance_m):
+        return LOST_TO_RANGE
+    in_burst = link.gemodel is not None and _lost_in_burst(link.gemodel, draws, state)
+    if in_burst or draws.loss * 100.0 < link.loss_percent:
         return LOST
-    delay_s = _delay_ms(link, delay, memory) / 1000.0
-    if reorder * 100.0 < link.reorder_percent:
+    delay_s = _delay_ms(link, draws.delay, state) / 1000.0
+    if draws.reorder * 100.0 < link.reorder_percent:
         delay_s = 0.0
-    if corrupt * 100.0 < link.corrupt_percent:
-        return Verdict(Cause.DELIVERED, delay_s, corrupt * 100.0 / link.corrupt_percent)
+    if draws.corruption * 100.0 < link.corrupt_percent:
+        flipped_at = draws.corruption * 100.0 / link.corrupt_percent
+        return Verdict(Cause.DELIVERED, delay_s, flipped_at)
     return Verdict(Cause.DELIVERED, delay_s)
 
 
-def twice(link: LinkModel, draws: Numbers) -> bool:
-    """Whether a frame is duplicated on a link."""
-    return draws[6] * 100.0 < link.duplicate_percent
+def is_duplicated(link: LinkModel, draws: FrameDraws) -> bool:
+    """Whether a link delivers a copy of a frame besides the frame."""
+    return draws.duplicate * 100.0 < link.duplicate_percent
 
 
-def _lost_in_burst(model: GilbertElliott, step: float, burst: float, memory: Memory) -> bool:
-    """Decide by Gilbert and Elliott: the state a frame finds loses it, or not; then it steps."""
-    if memory.bad:
-        memory.bad = not step * 100.0 < model.r_percent
-        return burst * 100.0 < model.loss_bad_percent
-    memory.bad = step * 100.0 < model.p_percent
-    return burst * 100.0 < model.loss_good_percent
+def _lost_in_burst(model: GilbertElliott, draws: FrameDraws, state: LinkState) -> bool:
+    """Decide by the state that the frame finds; then step the state (Gilbert and Elliott)."""
+    if state.bad:
+        state.bad = not draws.state_step * 100.0 < model.r_percent
+        return draws.burst_loss * 100.0 < model.loss_bad_percent
+    state.bad = draws.state_step * 100.0 < model.p_percent
+    return draws.burst_loss * 100.0 < model.loss_good_percent
 
 
-def _delay_ms(link: LinkModel, share: float, memory: Memory) -> float:
+def _delay_ms(link: LinkModel, share: float, state: LinkState) -> float:
     if link.jitter_ms <= 0.0:
         return link.delay_ms
     if link.delay_correlation_percent > 0.0:
         correlation = link.delay_correlation_percent / 100.0
-        share, memory.score = correlated(share, memory.score, correlation)
+        share, state.jitter_score = correlated_share(share, state.jitter_score, correlation)
     return max(0.0, link.delay_ms + link.jitter_ms * SHAPES[link.distribution](share))
 
 
-def received(edge: PathLoss, distance_m: float) -> float:
+def reception_probability(edge: PathLoss, distance_m: float) -> float:
     """Return the probability that a frame is received over a distance [m]."""
     far = max(1.0, distance_m / edge.reference_distance_m)
     loss_db = edge.reference_loss_db + 10.0 * edge.exponent * log10(far)
-    return below((edge.budget_db - loss_db) / edge.shadowing_db)
+    return normal_cdf((edge.budget_db - loss_db) / edge.shadowing_db)
 
 
-def edge_m(edge: PathLoss | None) -> float:
-    """Return the distance [m] beyond which a soft edge lets nothing through."""
+def path_loss_reach_m(edge: PathLoss | None) -> float:
+    """Return the distance [m] beyond which a soft edge lets no frame through."""
     if edge is None:
         return inf
     room_db = edge.budget_db + EDGE_SIGMAS * edge.shadowing_db - edge.reference_loss_db
@@ -222,68 +206,72 @@ def edge_m(edge: PathLoss | None) -> float:
 
 
 class Sending(msgspec.Struct, frozen=True, gc=False):
-    """A frame on its way: its key, when it was sent, how long its sender's queue took [s]."""
+    """A frame that its sender has sent."""
 
     frame: Frame
     key: tuple[int, int, int, int]
+    """The frame's source, incarnation, channel and count."""
     sent_s: float
+    """Simulated time at which it was sent [s]."""
     waited_s: float
+    """Time in its sender's queue and on the air [s]."""
 
 
 class Links:
-    """Verdicts link by link; ``seed``: 32 bytes."""
+    """All links of a medium, with their states; seed: 32 bytes."""
 
     def __init__(self, seed: bytes) -> None:
         self._seed = seed
-        self._memories: dict[tuple[int, int, int], Memory] = {}
+        self._states: dict[tuple[int, int, int], LinkState] = {}
 
-    def plain(self, link: LinkModel, sending: Sending, near: Near) -> list[Verdict]:
-        """Decide on links that are no more than late and lossy, all alike, in order of near."""
+    def plain(self, link: LinkModel, sending: Sending, in_range: InRange) -> list[Verdict]:
+        """Decide a frame for all receivers in range, whose links are alike and plain; in order."""
         if not link.draws:
             return [
-                _later(verdict(link, distance_m, None), sending.waited_s) for _, distance_m in near
+                _delayed(plain_verdict(link, distance_m, None), sending.waited_s)
+                for _, distance_m in in_range
             ]
-        source, incarnation, channel, count = sending.key
-        fates: list[Verdict] = []
-        shared, group = b"", -1
-        for receiver, distance_m in near:
-            if receiver // SHARING != group:
-                group = receiver // SHARING
-                shared = draw_shared(self._seed, source, incarnation, group, channel, count)
-            fates.append(verdict(link, distance_m, pair(shared, receiver)))
+        verdicts: list[Verdict] = []
+        group_draw, group = b"", -1
+        for receiver, distance_m in in_range:
+            if receiver // GROUP_SIZE != group:
+                group = receiver // GROUP_SIZE
+                group_draw = draw_group(self._seed, sending.frame, group)
+            draws = plain_draws(group_draw, receiver)
+            verdicts.append(plain_verdict(link, distance_m, draws))
         waited_s = sending.waited_s
-        return [_later(fate, waited_s) for fate in fates] if waited_s else fates
+        return [_delayed(verdict, waited_s) for verdict in verdicts] if waited_s else verdicts
 
-    def rough(
+    def full(
         self, link: LinkModel, sending: Sending, receiver: int, distance_m: float
     ) -> list[Verdict]:
-        """Decide on any link: for the frame, and for its copy where it is duplicated."""
-        source, incarnation, channel, count = sending.key
-        memory = FRESH
+        """Decide a frame on any link; the second verdict, if there is one, is for its copy."""
+        source, _, channel, _ = sending.key
+        state = NO_STATE
         if link.remembers:
-            memory = self._memories.setdefault((source, receiver, channel), Memory())
-        fates: list[Verdict] = []
-        copies = 1
-        while len(fates) < copies:
-            purpose = 1 + len(fates)
-            draws = draw(self._seed, source, incarnation, receiver, channel, count, purpose)
-            copies = 2 if twice(link, draws) or fates else 1
-            fate = verdict(link, distance_m, draws, memory)
-            fates.append(_through(link, memory, sending, fate))
-        return fates
+            state = self._states.setdefault((source, receiver, channel), LinkState())
+        draws = draw(self._seed, sending.frame, receiver, Purpose.FRAME)
+        verdicts = [_queued(link, state, sending, full_verdict(link, distance_m, draws, state))]
+        if is_duplicated(link, draws):
+            draws = draw(self._seed, sending.frame, receiver, Purpose.COPY)
+            copy = full_verdict(link, distance_m, draws, state)
+            verdicts.append(_queued(link, state, sending, copy))
+        return verdicts
 
 
-def _through(link: LinkModel, memory: Memory, sending: Sending, fate: Verdict) -> Verdict:
-    """Let a frame that gets across wait as long as it must."""
-    if fate.cause:
-        return fate
+def _queued(link: LinkModel, state: LinkState, sending: Sending, verdict: Verdict) -> Verdict:
+    """Return a verdict with the wait in the link's own queue, or in the sender's, added."""
+    if verdict.cause:
+        return verdict
     if not link.own_rate:
-        return _later(fate, sending.waited_s)
+        return _delayed(verdict, sending.waited_s)
     size_b = len(sending.frame.payload) + link.rate_overhead_b
-    waited_s = memory.air.enter(sending.sent_s, size_b, link.rate_kbit, link.limit)
-    return LOST_TO_QUEUE if waited_s is None else _later(fate, waited_s)
+    waited_s = state.queue.enter(sending.sent_s, size_b, link.rate_kbit, link.limit)
+    return LOST_TO_QUEUE if waited_s is None else _delayed(verdict, waited_s)
 
 
-def _later(fate: Verdict, waited_s: float) -> Verdict:
-    """Return what happens to a frame that waits first [s]."""
-    return Verdict(fate.cause, waited_s + fate.delay_s, fate.turned) if not fate.cause else fate
+def _delayed(verdict: Verdict, waited_s: float) -> Verdict:
+    """Return a verdict with a wait [s] added where the frame is delivered."""
+    if verdict.cause:
+        return verdict
+    return Verdict(verdict.cause, waited_s + verdict.delay_s, verdict.flipped_at)

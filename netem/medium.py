@@ -26,7 +26,7 @@ from netem.link import (
     Verdict,
 )
 from netem.messages import MediumCounters, MediumSetup, packets_of
-from netem.range_index import Near, RangeIndex
+from netem.range_index import InRange, RangeIndex
 from netem.rate_queue import RateQueue
 from netem.wire.frame import (
     BATCH_HEAD_B,
@@ -132,8 +132,8 @@ class Medium:
         return self._delivery_log.digest()
 
     def pages(self) -> Mapping[int, bytes]:
-        """Return, at the end of a slot, what a shard noted in it; see ``journal.joined``."""
-        return self._delivery_log.torn_out()
+        """Return, at the end of a slot, what a shard noted in it; see ``joined_pages``."""
+        return self._delivery_log.take_pages()
 
     def packets(self) -> dict[str, int]:
         """Return the counters of packets under their names in summary.json."""
@@ -168,7 +168,7 @@ class Medium:
             if waited_s is None:
                 return
             sending = Sending(frame, key, sent_s, waited_s)
-        near = self._range_index.of(source, models.reach_m(channel, source))
+        near = self._range_index.in_range(source, models.reach_m(channel, source))
         self._fates[Cause.DROPPED_RANGE] += self._others[source] - len(near)
         alike = models.common(channel, source)
         if alike is None or not alike.plain or self._conditions.obstructed:
@@ -192,7 +192,7 @@ class Medium:
                 )
         return waited_s
 
-    def _cross_clean(self, sending: Sending, near: Near, delay_s: float) -> None:
+    def _cross_clean(self, sending: Sending, near: InRange, delay_s: float) -> None:
         """Deliver a frame to all who are near, after the same delay [s]."""
         frame, key, sent_s = sending.frame, sending.key, sending.sent_s
         noted = HEAD(*key) + FATE(0, DELIVERED, delay_s, -1.0)
@@ -203,14 +203,14 @@ class Medium:
             pages[receiver] += noted
         self.in_flight += len(near)
 
-    def _cross_plain(self, sending: Sending, near: Near, link: LinkModel) -> None:
+    def _cross_plain(self, sending: Sending, near: InRange, link: LinkModel) -> None:
         """Judge a frame on links that are all alike, and no more than late and lossy."""
         frame, key, sent_s = sending.frame, sending.key, sending.sent_s
         head, queues, pages = HEAD(*key), self._queues, self._delivery_log.pages
         lost = self._fates
         across = 0
         for (receiver, _), fate in zip(near, self._links.plain(link, sending, near), strict=True):
-            pages[receiver] += head + FATE(0, fate.cause, fate.delay_s, fate.turned)
+            pages[receiver] += head + FATE(0, fate.cause, fate.delay_s, fate.flipped_at)
             if fate.cause:
                 lost[fate.cause] += 1
             else:
@@ -218,7 +218,7 @@ class Medium:
                 across += 1
         self.in_flight += across
 
-    def _cross(self, sending: Sending, near: Near) -> None:
+    def _cross(self, sending: Sending, near: InRange) -> None:
         """Judge a frame on each link to those in reach."""
         source, _, channel, _ = sending.key
         head, links, models = HEAD(*sending.key), self._links, self._conditions.models
@@ -232,7 +232,7 @@ class Medium:
                 self._note(sending, head, receiver, fates[0])
             else:
                 self._note_all(
-                    sending, head, receiver, links.rough(link, sending, receiver, distance_m)
+                    sending, head, receiver, links.full(link, sending, receiver, distance_m)
                 )
 
     def _note_all(self, sending: Sending, head: bytes, receiver: int, fates: list[Verdict]) -> None:
@@ -246,7 +246,7 @@ class Medium:
         self, sending: Sending, head: bytes, receiver: int, fate: Verdict, copy: int = 0
     ) -> None:
         """Enter a verdict in the books, and a frame that gets across in its receiver's queue."""
-        delay_s, turned = fate.delay_s, fate.turned
+        delay_s, turned = fate.delay_s, fate.flipped_at
         self._delivery_log.pages[receiver] += head + FATE(copy, fate.cause, delay_s, turned)
         if fate.cause:
             self._fates[fate.cause] += 1

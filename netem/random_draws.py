@@ -1,65 +1,91 @@
-"""Chance on a link: numbers that belong to one frame, and the shapes that delays have.
+"""Random numbers for frames, and the shapes of delay distributions.
+
+Numbers are keyed, not drawn in sequence: each belongs to one frame, link and purpose, so the order
+of frames, the process and the shard do not matter. Each number has a name (``FrameDraws``).
 
 A shape is the quantile function of tc-netem's table of the same name, in standard deviations, as
-iproute2 computes the table: jitter_ms times its value is what is added to delay_ms. The uniform
-shape is netem's own default, from -1 to 1.
+iproute2 computes the table: jitter_ms times its value is added to delay_ms. The uniform shape is
+netem's own default, from -1 to 1.
 """
 
 from collections.abc import Callable
+from enum import IntEnum
 from hashlib import blake2b, shake_128
 from math import erfc, pow, sqrt
 from statistics import NormalDist
 from struct import Struct as Layout
 
-Numbers = tuple[float, ...]
-WIDEST = 32767.0 / 8192.0
+import msgspec
+
+from netem.wire.frame import Frame
+
+MAX_QUANTILE = 32767.0 / 8192.0
 """Where netem's tables end, in standard deviations."""
-SHARING = 32
-"""So many destinations share one draw where each needs no more than two numbers."""
+GROUP_SIZE = 32
+"""Number of destinations that share one hash where each link needs only ``PlainDraws``."""
 
 _KEY = Layout("<6q").pack
-_NUMBERS = Layout("<8Q").unpack
+_EIGHT = Layout("<8Q").unpack
 _PAIR = Layout("<2Q").unpack_from
 _PAIR_B = 16
 _UNIT = 1.0 / 2**53
-_LEAST = 2.0**-54
-_MOST = 1.0 - 2.0**-53
+_MIN_SHARE = 2.0**-54
+_MAX_SHARE = 1.0 - 2.0**-53
 _ROOT_2 = sqrt(2.0)
 _normal = NormalDist()
 
 
-def draw(
-    seed: bytes,
-    source: int,
-    incarnation: int,
-    destination: int,
-    channel: int,
-    count: int,
-    purpose: int,
-) -> Numbers:
-    """Return eight numbers in [0, 1) that belong to one frame on one link and to nothing else.
+class Purpose(IntEnum):
+    """What the numbers of one hash are for; a part of their key.
 
-    purpose: over 0, what several draws for one frame and link differ in.
-
-    They are keyed, not drawn in sequence: order, process and shard do not matter.
+    When a frame needs a ninth number, add a purpose here and a type with the names of its numbers:
+    it gives eight more, and all existing numbers stay as they are.
     """
-    key = _KEY(source, incarnation, destination, channel, count, purpose)
-    drawn = _NUMBERS(blake2b(key, key=seed).digest())
-    return tuple([(number >> 11) * _UNIT for number in drawn])
+
+    PLAIN = 0
+    FRAME = 1
+    COPY = 2
 
 
-def draw_shared(
-    seed: bytes, source: int, incarnation: int, group: int, channel: int, count: int
-) -> bytes:
-    """Return what one frame draws for a group of ``SHARING`` destinations; see ``pair``."""
-    key = _KEY(source, incarnation, group, channel, count, 0)
-    return shake_128(seed + key).digest(SHARING * _PAIR_B)
+class PlainDraws(msgspec.Struct, frozen=True, gc=False):
+    """The numbers in [0, 1) of a frame on a link that has only loss and uniform jitter."""
+
+    loss: float
+    delay: float
 
 
-def pair(shared: bytes, destination: int) -> tuple[float, float]:
-    """Return one destination's two numbers in [0, 1) of what its group drew."""
-    first, second = _PAIR(shared, destination % SHARING * _PAIR_B)
-    return (first >> 11) * _UNIT, (second >> 11) * _UNIT
+class FrameDraws(PlainDraws, frozen=True, gc=False):
+    """The numbers in [0, 1) of a frame, or of its copy, on any link."""
+
+    path_loss: float
+    reorder: float
+    state_step: float
+    """Whether the Gilbert-Elliott state changes."""
+    burst_loss: float
+    duplicate: float
+    corruption: float
+
+
+def draw(seed: bytes, frame: Frame, destination: int, purpose: Purpose) -> FrameDraws:
+    """Return the numbers of a frame on its link to a destination.
+
+    The key is (seed, source, incarnation, destination, channel, count, purpose); seed: 32 bytes.
+    """
+    key = _KEY(frame.source, frame.incarnation, destination, frame.channel, frame.count, purpose)
+    drawn = _EIGHT(blake2b(key, key=seed).digest())
+    return FrameDraws(*[(number >> 11) * _UNIT for number in drawn])
+
+
+def draw_group(seed: bytes, frame: Frame, group: int) -> bytes:
+    """Return the numbers of a frame for ``GROUP_SIZE`` destinations; see ``plain_draws``."""
+    key = _KEY(frame.source, frame.incarnation, group, frame.channel, frame.count, Purpose.PLAIN)
+    return shake_128(seed + key).digest(GROUP_SIZE * _PAIR_B)
+
+
+def plain_draws(group_draw: bytes, destination: int) -> PlainDraws:
+    """Return one destination's numbers from those of its group (destination // GROUP_SIZE)."""
+    loss, delay = _PAIR(group_draw, destination % GROUP_SIZE * _PAIR_B)
+    return PlainDraws((loss >> 11) * _UNIT, (delay >> 11) * _UNIT)
 
 
 def uniform(share: float) -> float:
@@ -69,16 +95,16 @@ def uniform(share: float) -> float:
 
 def normal(share: float) -> float:
     """Return the quantile of the normal distribution, cut at the tables' ends."""
-    return max(-WIDEST, min(WIDEST, _normal.inv_cdf(max(share, _LEAST))))
+    return max(-MAX_QUANTILE, min(MAX_QUANTILE, _normal.inv_cdf(max(share, _MIN_SHARE))))
 
 
 def pareto(share: float) -> float:
     """Return the quantile of netem's Pareto distribution: a = 3, shifted, cut above."""
-    return min(WIDEST, (pow(1.0 - share, -1.0 / 3.0) - 1.5) * (4.0 / 3.0))
+    return min(MAX_QUANTILE, (pow(1.0 - share, -1.0 / 3.0) - 1.5) * (4.0 / 3.0))
 
 
 def paretonormal(share: float) -> float:
-    """Return the quantile of netem's mixture, a quarter normal and three quarters Pareto."""
+    """Return the quantile of netem's mixture: a quarter normal, three quarters Pareto."""
     return 0.25 * normal(share) + 0.75 * pareto(share)
 
 
@@ -90,18 +116,21 @@ SHAPES: dict[str, Callable[[float], float]] = {
 }
 
 
-def below(value: float) -> float:
-    """Return the share of a standard normal distribution below a value."""
+def normal_cdf(value: float) -> float:
+    """Return the probability that a standard normal number is below a value."""
     return 0.5 * erfc(-value / _ROOT_2)
 
 
-def correlated(share: float, last: float | None, correlation: float) -> tuple[float, float]:
-    """Return a share that remembers the one before, and what to remember of it.
+def correlated_share(
+    share: float, last_score: float | None, correlation: float
+) -> tuple[float, float]:
+    """Return a share in [0, 1) correlated with the one before, and its score for the next call.
 
-    An autoregression of normal scores (correlation from one to the next), so that any shape stays
-    what it is; netem's own, a weighted mean of shares, narrows it. ``last`` is None at first.
+    An autoregression of normal scores keeps the distribution of any shape; netem's own method, a
+    weighted mean of shares, narrows it. last_score: None for the first frame. correlation: of one
+    score with the next, in [0, 1).
     """
-    score = _normal.inv_cdf(max(share, _LEAST))
-    if last is not None:
-        score = correlation * last + sqrt(1.0 - correlation * correlation) * score
-    return min(below(score), _MOST), score
+    score = _normal.inv_cdf(max(share, _MIN_SHARE))
+    if last_score is not None:
+        score = correlation * last_score + sqrt(1.0 - correlation * correlation) * score
+    return min(normal_cdf(score), _MAX_SHARE), score

@@ -10,8 +10,9 @@ def test_every_link_is_told_and_drawn(small: Path, qswarm: Command) -> None:
         "netem", "check", "small.toml", "--set", "netem.loss_percent=20", "--plot", "p.png"
     )
     assert (told.status, told.err) == (0, "")
-    assert "held   loss [%]" in told.out
-    assert told.out.endswith("held  p.png\n")
+    assert "  ok       loss [%]   " in told.out
+    assert "OUTSIDE: " in told.out
+    assert told.out.endswith("\nok: all within tolerance; drawn in p.png\n")
     assert (small.parent / "p.png").read_bytes().startswith(b"\x89PNG")
 
 

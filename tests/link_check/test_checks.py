@@ -9,7 +9,7 @@ import pytest
 from netem.link import LinkModel, mean_loss
 from netem.link_keys import GilbertElliott, PathLoss
 from worldsim.link_check.checks import Finding, findings
-from worldsim.link_check.intervals import farthest, loss_bound
+from worldsim.link_check.intervals import kolmogorov_smirnov, loss_bound
 from worldsim.link_check.packets import Flight, conditions_of
 from worldsim.link_check.parameter_sets import parameter_sets
 from worldsim.scenario.file import load
@@ -35,14 +35,14 @@ LINKS = {
 
 
 @pytest.mark.parametrize("link", LINKS.values(), ids=LINKS)
-def test_a_link_does_what_it_is_told(link):
+def test_every_parameter_is_within_its_interval(link):
     found = list(findings(link, seed=1))
     assert found
-    assert [finding for finding in found if not finding.held] == []
+    assert [finding for finding in found if not finding.ok] == []
 
 
 @pytest.mark.parametrize(
-    ("flown", "said"),
+    ("actual", "configured"),
     [
         (LinkModel(loss_percent=49.0), LinkModel(loss_percent=50.0)),
         (
@@ -57,14 +57,14 @@ def test_a_link_does_what_it_is_told(link):
         (LinkModel(range_m=5.9), LinkModel(range_m=6.0)),
     ],
 )
-def test_a_link_that_does_something_else_is_found_out(monkeypatch, flown, said):
-    told = conditions_of(said)
+def test_a_link_with_another_value_is_detected(monkeypatch, actual, configured):
+    conditions = conditions_of(configured)
 
     def other(model):
-        return conditions_of(flown) if conditions_of(model) == told else conditions_of(model)
+        return conditions_of(actual if conditions_of(model) == conditions else model)
 
     monkeypatch.setattr("worldsim.link_check.packets.conditions_of", other)
-    assert [finding for finding in findings(said, 1) if not finding.held]
+    assert [finding for finding in findings(configured, 1) if not finding.ok]
 
 
 def test_two_links_and_two_channels_lose_independently():
@@ -82,15 +82,15 @@ def test_the_interval_of_bursts_is_the_correlated_one():
     assert loss_bound(bursty, 1000) / loss_bound(plain, 1000) == pytest.approx((1.78 / 0.22) ** 0.5)
 
 
-def test_equal_distributions_are_not_far_apart_steps_or_not():
+def test_equal_distributions_have_no_distance_with_steps_or_without():
     steps = np.array([0.0] * 30 + [1.0] * 70)
-    assert farthest(steps, steps) == 0.0
-    assert farthest(steps, np.array([0.0] * 40 + [1.0] * 60)) == pytest.approx(0.1)
+    assert kolmogorov_smirnov(steps, steps) == 0.0
+    assert kolmogorov_smirnov(steps, np.array([0.0] * 40 + [1.0] * 60)) == pytest.approx(0.1)
 
 
-def test_a_finding_holds_within_its_bound():
-    assert Finding("x", 1.0, 1.1, 0.11).held
-    assert not Finding("x", 1.0, 1.2, 0.11).held
+def test_a_finding_is_ok_within_its_tolerance():
+    assert Finding("x", 1.0, 1.1, 0.11).ok
+    assert not Finding("x", 1.0, 1.2, 0.11).ok
 
 
 def test_the_parameter_sets_of_a_scenario_are_its_different_links():

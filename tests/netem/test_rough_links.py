@@ -1,20 +1,40 @@
-"""Links with all that they may have: rates, copies, turned bits, overtaking, bursts, soft edges."""
+"""Links with rates, duplicates, flipped bits, reordering, bursts and soft edges."""
 
 from math import inf, sqrt
 from random import Random
 
+import msgspec
 import pytest
 
-from netem.link import Cause, LinkModel, Memory, Verdict, edge_m, received, verdict
+from netem.link import (
+    Cause,
+    LinkModel,
+    LinkState,
+    Verdict,
+    full_verdict,
+    path_loss_reach_m,
+    plain_verdict,
+    reception_probability,
+)
 from netem.link_keys import Conditions, DirectedLink, GilbertElliott, PathLoss
 from netem.medium import Medium
 from netem.messages import MediumSetup
-from netem.random_draws import SHAPES, WIDEST, correlated
-from netem.range_index import LARGE, RangeIndex
+from netem.random_draws import MAX_QUANTILE, SHAPES, FrameDraws, correlated_share
+from netem.range_index import ARRAYS_FROM, RangeIndex
 from netem.rate_queue import RateQueue
 from netem.wire.frame import LOCAL, MULTIHOP, Outgoing, Transmission
 
 EDGE = PathLoss(3.0, 40.0, 70.0)
+NOTHING_RARE = FrameDraws(
+    loss=0.9,
+    delay=0.5,
+    path_loss=0.5,
+    reorder=0.9,
+    state_step=0.5,
+    burst_loss=0.5,
+    duplicate=0.9,
+    corruption=0.9,
+)
 
 
 def radio(agents=3, **keys):
@@ -49,7 +69,7 @@ def test_a_rate_is_the_senders_and_each_channel_has_its_own():
     assert len(made.collect(2, 0.1001)) == 3
 
 
-def test_what_finds_the_queue_full_is_dropped_for_all():
+def test_a_full_queue_drops_a_frame_for_all_receivers():
     made = radio(rate_kbit=10.0, limit=2)
     say(made, 0.0, *[bytes(125)] * 5)
     assert made.counters(0).fates["dropped_queue"] == 3 * 2
@@ -66,52 +86,52 @@ def test_a_link_with_a_rate_of_its_own_has_a_queue_of_its_own():
     assert made.counters(0).fates["dropped_queue"] == 1
 
 
-def test_a_backlog_goes_out_at_the_rate_that_holds_by_then():
-    air = RateQueue()
+def test_a_backlog_is_sent_at_the_new_rate():
+    queue = RateQueue()
     for _ in range(10):
-        air.enter(0.0, 1000, rate_kbit=1.0, limit=100)  # 8 s each
-    assert air.enter(1.0, 1000, rate_kbit=800.0, limit=100) == pytest.approx(11 * 0.01)
-    assert air.enter(2.0, 1000, rate_kbit=800.0, limit=100) == pytest.approx(0.01)
+        queue.enter(0.0, 1000, rate_kbit=1.0, limit=100)  # 8 s each
+    assert queue.enter(1.0, 1000, rate_kbit=800.0, limit=100) == pytest.approx(11 * 0.01)
+    assert queue.enter(2.0, 1000, rate_kbit=800.0, limit=100) == pytest.approx(0.01)
 
 
-def test_a_rate_next_to_nothing_is_got_over():
-    air = RateQueue()
-    assert air.enter(0.0, 1000, rate_kbit=5e-324, limit=2) == inf
-    assert air.enter(1.0, 1000, rate_kbit=800.0, limit=2) == pytest.approx(0.02)
+def test_a_queue_recovers_from_a_tiny_rate():
+    queue = RateQueue()
+    assert queue.enter(0.0, 1000, rate_kbit=5e-324, limit=2) == inf
+    assert queue.enter(1.0, 1000, rate_kbit=800.0, limit=2) == pytest.approx(0.02)
 
 
-def test_an_idle_queue_starts_anew():
-    air = RateQueue()
-    assert air.enter(1.0, 125, 10.0, 9) == pytest.approx(0.1)
-    assert air.enter(1.05, 125, 10.0, 9) == pytest.approx(0.15)
-    assert air.enter(7.0, 125, 10.0, 9) == pytest.approx(0.1)
+def test_an_idle_queue_starts_empty():
+    queue = RateQueue()
+    assert queue.enter(1.0, 125, 10.0, 9) == pytest.approx(0.1)
+    assert queue.enter(1.05, 125, 10.0, 9) == pytest.approx(0.15)
+    assert queue.enter(7.0, 125, 10.0, 9) == pytest.approx(0.1)
 
 
-def test_a_duplicate_is_one_more_and_comes_like_the_first():
+def test_a_duplicate_is_counted_and_delivered_like_the_first():
     made = radio(duplicate_percent=100.0, delay_ms=10.0)
     say(made, 0.0, b"a", b"b")
     assert [frame.payload for frame in made.collect(1, 1.0)] == [b"a", b"a", b"b", b"b"]
-    told = made.counters(0)
-    assert (told.sent, told.addressed, told.duplicated) == (2, 8, 4)
+    counters = made.counters(0)
+    assert (counters.sent, counters.addressed, counters.duplicated) == (2, 8, 4)
 
 
-def test_a_corrupted_frame_has_one_bit_turned_and_is_delivered():
+def test_a_corrupted_frame_is_delivered_with_one_bit_flipped():
     made = radio(corrupt_percent=100.0)
     whole = bytes(range(100))
     bits = set()
     for at in range(500):
         say(made, at * 1.0, whole)
         (frame,) = made.collect(1, at * 1.0)
-        turned = int.from_bytes(frame.payload, "big") ^ int.from_bytes(whole, "big")
-        assert turned.bit_count() == 1
-        bits.add(turned)
+        flipped = int.from_bytes(frame.payload, "big") ^ int.from_bytes(whole, "big")
+        assert flipped.bit_count() == 1
+        bits.add(flipped)
     assert len(bits) > 300
     say(made, 600.0, b"")
     assert made.collect(1, 600.0)[0].payload == b""
     assert made.counters(0).corrupted == 2 * 500
 
 
-def test_what_is_reordered_skips_the_delay():
+def test_a_reordered_frame_skips_the_delay():
     made = radio(delay_ms=100.0, reorder_percent=50.0)
     say(made, 0.0, *[bytes([at]) for at in range(100)])
     soon, late = made.collect(1, 0.0), made.collect(1, 0.1)
@@ -120,9 +140,9 @@ def test_what_is_reordered_skips_the_delay():
 
 
 def lost(model, steps):
-    memory, link = Memory(), LinkModel(gemodel=model)
-    draws = [(0.9, 0.5, 0.5, 0.9, step, 0.5, 0.9, 0.9) for step in steps]
-    return [verdict(link, 0.0, each, memory).cause is Cause.DROPPED_LOSS for each in draws]
+    state, link = LinkState(), LinkModel(gemodel=model)
+    draws = [msgspec.structs.replace(NOTHING_RARE, state_step=step) for step in steps]
+    return [full_verdict(link, 0.0, each, state).cause is Cause.DROPPED_LOSS for each in draws]
 
 
 def test_bursts_begin_and_end_by_their_own_steps():
@@ -136,57 +156,69 @@ def test_a_good_link_may_lose_and_a_bad_one_may_not():
 
 
 def test_a_soft_edge_is_half_at_the_budget_and_nothing_beyond_its_reach():
-    assert received(EDGE, 10.0) == pytest.approx(0.5)
-    assert received(EDGE, 0.0) == received(EDGE, 1.0) > 0.999999
-    assert received(EDGE, edge_m(EDGE)) == pytest.approx(1e-9, rel=0.02)
+    assert reception_probability(EDGE, 10.0) == pytest.approx(0.5)
+    assert reception_probability(EDGE, 0.0) == reception_probability(EDGE, 1.0) > 0.999999
+    assert reception_probability(EDGE, path_loss_reach_m(EDGE)) == pytest.approx(1e-9, rel=0.02)
     assert LinkModel(path_loss=EDGE, range_m=8.0).reach_m == 8.0
-    assert LinkModel(path_loss=EDGE, range_m=800.0).reach_m == edge_m(EDGE)
-    assert edge_m(PathLoss(3.0, 40.0, 1.0)) == 0.0
+    assert LinkModel(path_loss=EDGE, range_m=800.0).reach_m == path_loss_reach_m(EDGE)
+    assert path_loss_reach_m(PathLoss(3.0, 40.0, 1.0)) == 0.0
 
 
-def test_what_the_edge_loses_is_out_of_range():
-    link, draws = LinkModel(path_loss=EDGE), (0.9, 0.5, 0.5001, 0.9, 0.5, 0.5, 0.9, 0.9)
-    assert verdict(link, 10.0, draws) == Verdict(Cause.DROPPED_RANGE)
-    assert verdict(link, 9.9, draws).cause is Cause.DELIVERED
+def test_a_frame_lost_to_the_soft_edge_counts_as_out_of_range():
+    link, draws = LinkModel(path_loss=EDGE), msgspec.structs.replace(NOTHING_RARE, path_loss=0.5001)
+    assert full_verdict(link, 10.0, draws) == Verdict(Cause.DROPPED_RANGE)
+    assert full_verdict(link, 9.9, draws).cause is Cause.DELIVERED
+
+
+SHARES = [0.0, 0.01, 0.3, 0.5, 0.7, 0.99]
+
+
+@pytest.mark.parametrize("loss", SHARES)
+@pytest.mark.parametrize("delay", SHARES)
+@pytest.mark.parametrize("distance_m", [1.0, 7.0])
+def test_both_laws_agree_on_a_plain_link(loss, delay, distance_m):
+    link = LinkModel(loss_percent=30.0, delay_ms=10.0, jitter_ms=15.0, range_m=6.0)
+    draws = msgspec.structs.replace(NOTHING_RARE, loss=loss, delay=delay)
+    assert full_verdict(link, distance_m, draws) == plain_verdict(link, distance_m, draws)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_a_shape_rises_within_the_tables_of_netem(shape):
+def test_a_shape_is_monotonic_and_within_netems_tables(shape):
     values = [SHAPES[shape](at / 1000.0) for at in range(1000)]
     assert values == sorted(values)
-    assert max(map(abs, values)) <= WIDEST
+    assert max(map(abs, values)) <= MAX_QUANTILE
 
 
-def test_netems_own_tables_agree():
+def test_shapes_agree_with_netems_tables():
     """Some entries of iproute2's pareto.dist and paretonormal.dist, in 1/8192."""
     assert round(8192 * SHAPES["pareto"](0.0)) == -5461
     assert round(8192 * SHAPES["pareto"](1.0 - 1.0 / 8.0)) == 5461
-    assert SHAPES["pareto"](0.99) == WIDEST
+    assert SHAPES["pareto"](0.99) == MAX_QUANTILE
     assert round(8192 * SHAPES["paretonormal"](0.875)) == round(0.75 * 5461 + 0.25 * 9423.6)
 
 
 def test_correlated_shares_stay_shares():
     random, last, shares = Random(1), None, []
     for _ in range(20_000):
-        share, last = correlated(random.random(), last, 0.9)
+        share, last = correlated_share(random.random(), last, 0.9)
         shares.append(share)
     assert 0.0 <= min(shares) < 0.01
     assert 0.99 < max(shares) < 1.0
-    assert correlated(0.999, 40.0, 0.9)[0] < 1.0
+    assert correlated_share(0.999, 40.0, 0.9)[0] < 1.0
     mean = sum(shares) / len(shares)
     assert abs(mean - 0.5) < 3.29 * sqrt(1.0 / 12.0 * 19.0 / len(shares))
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_walking_and_arrays_find_the_same_neighbours(seed):
-    random, radios = Random(seed), LARGE + 20
+def test_loop_and_arrays_find_the_same_receivers(seed):
+    random, radios = Random(seed), ARRAYS_FROM + 20
     places = [tuple(random.uniform(-3.0, 3.0) for _ in range(3)) for _ in range(radios)]
     places[random.randrange(radios)] = None
-    few, many = tuple(range(LARGE - 1)), tuple(range(radios))
-    by_hand, by_array = RangeIndex(radios, few), RangeIndex(radios, many)
-    for made in (by_hand, by_array):
+    few, many = tuple(range(ARRAYS_FROM - 1)), tuple(range(radios))
+    by_loop, by_array = RangeIndex(radios, few), RangeIndex(radios, many)
+    for made in (by_loop, by_array):
         made.place(tuple(places))
     for source in range(radios):
         for reach_m in (2.0, float("inf")):
-            near = by_array.of(source, reach_m)
-            assert [each for each in near if each[0] in few] == by_hand.of(source, reach_m)
+            near = by_array.in_range(source, reach_m)
+            assert [each for each in near if each[0] in few] == by_loop.in_range(source, reach_m)

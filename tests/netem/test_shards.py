@@ -1,11 +1,11 @@
-"""Several mediums that share the receivers out decide together what one would."""
+"""Shards of the medium, each with some of the receivers, together decide what one medium would."""
 
 from random import Random
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netem.delivery_log import Digest, joined
+from netem.delivery_log import Digest, joined_pages
 from netem.faults import Flap, Heal, Jam, Partition
 from netem.link_keys import Conditions, DirectedLink, GilbertElliott, LinkKeys, PathLoss
 from netem.medium import Medium
@@ -43,12 +43,14 @@ ORDERS = (
     end(2),
 )
 shares = st.lists(st.integers(0, AGENTS - 1), min_size=AGENTS, max_size=AGENTS).map(
-    lambda owner: [[who for who in range(AGENTS) if owner[who] == shard] for shard in set(owner)]
+    lambda owner: [
+        [agent for agent in range(AGENTS) if owner[agent] == shard] for shard in set(owner)
+    ]
 )
 
 
 def played(mediums, seed, shuffled=None, slots=60):
-    """Play the same conversation on some mediums; yield after each slot what each handed out."""
+    """Send the same frames through some mediums; yield the time [s] after each slot."""
     random = Random(seed)
     for slot in range(slots):
         places = [tuple(random.uniform(-2.0, 2.0) for _ in range(3)) for _ in range(AGENTS)]
@@ -62,9 +64,11 @@ def played(mediums, seed, shuffled=None, slots=60):
             if slot % 8 == 4:
                 medium.obey(ORDERS[slot // 8 % len(ORDERS)])
             medium.place(tuple(places))
-            for who in order:
-                said = tuple(Outgoing(at % 2, bytes(size)) for at, size in enumerate(sizes[who]))
-                medium.transmit(who, slot * SLOT_S, Transmission(slot, 0, said))
+            for agent in order:
+                frames = tuple(
+                    Outgoing(at % 2, bytes(size)) for at, size in enumerate(sizes[agent])
+                )
+                medium.transmit(agent, slot * SLOT_S, Transmission(slot, 0, frames))
         yield (slot + 1) * SLOT_S
 
 
@@ -80,28 +84,28 @@ def test_shards_have_the_verdicts_the_frames_and_the_digest_of_one_medium(owners
     digest = Digest()
     for now_s in played([whole, *shards], seed):
         for shard, receivers in zip(shards, owners, strict=True):
-            for who in receivers:
-                assert shard.collect(who, now_s) == whole.collect(who, now_s)
-        digest.take(joined(shard.pages() for shard in shards))
+            for agent in receivers:
+                assert shard.collect(agent, now_s) == whole.collect(agent, now_s)
+        digest.update(joined_pages(shard.pages() for shard in shards))
         assert digest.value == whole.digest()
-    told = whole.counters(0)
+    counters = whole.counters(0)
     parts = [shard.counters(0) for shard in shards]
-    assert all((part.sent, part.spoken_b) == (told.sent, told.spoken_b) for part in parts)
+    assert all((part.sent, part.spoken_b) == (counters.sent, counters.spoken_b) for part in parts)
     for name in ("addressed", "in_flight", "duplicated", "corrupted"):
-        assert sum(getattr(part, name) for part in parts) == getattr(told, name)
-    for fate, count in told.fates.items():
+        assert sum(getattr(part, name) for part in parts) == getattr(counters, name)
+    for fate, count in counters.fates.items():
         assert sum(part.fates[fate] for part in parts) == count
 
 
 @settings(derandomize=True, deadline=None, max_examples=25)
 @given(st.integers(0, 99), st.integers(0, 99))
-def test_verdicts_do_not_depend_on_the_order_in_which_agents_speak(seed, shuffle_seed):
+def test_verdicts_do_not_depend_on_the_order_in_which_agents_send(seed, shuffle_seed):
     plain, mixed = Medium(setup()), Medium(setup())
     heard = []
     for medium, shuffled in ((plain, None), (mixed, Random(shuffle_seed))):
         heard.append(
             [
-                [medium.collect(who, now_s) for who in range(AGENTS)]
+                [medium.collect(agent, now_s) for agent in range(AGENTS)]
                 for now_s in played([medium], seed, shuffled)
             ]
         )
@@ -117,15 +121,15 @@ def test_verdicts_do_not_depend_on_the_order_in_which_agents_speak(seed, shuffle
 @settings(derandomize=True, deadline=None, max_examples=25)
 @given(st.integers(0, 99))
 def test_under_all_conditions_every_frame_has_one_fate_or_is_in_flight(seed):
-    medium, came, books = Medium(setup()), 0, []
+    medium, came, history = Medium(setup()), 0, []
     for now_s in played([medium], seed, slots=100):
-        came += sum(len(medium.collect(who, now_s)) for who in range(AGENTS))
-        told = medium.counters(0)
-        books.append(told)
-        assert told.addressed == sum(told.fates.values()) + told.in_flight
-        assert told.addressed == told.sent * (AGENTS - 1) + told.duplicated
-        assert told.fates["delivered"] == came
-    met = {fate for told in books for fate, count in told.fates.items() if count}
-    assert met == set(books[0].fates)
-    assert books[-1].duplicated > 0
-    assert books[-1].corrupted > 0
+        came += sum(len(medium.collect(agent, now_s)) for agent in range(AGENTS))
+        counters = medium.counters(0)
+        history.append(counters)
+        assert counters.addressed == sum(counters.fates.values()) + counters.in_flight
+        assert counters.addressed == counters.sent * (AGENTS - 1) + counters.duplicated
+        assert counters.fates["delivered"] == came
+    occurred = {fate for each in history for fate, count in each.fates.items() if count}
+    assert occurred == set(history[0].fates)
+    assert history[-1].duplicated > 0
+    assert history[-1].corrupted > 0

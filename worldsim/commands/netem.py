@@ -45,7 +45,7 @@ def netem(
 
 
 def _check(file: Path, overrides: dict[str, str], plot: Path | None) -> int:
-    from worldsim.link_check.report import survey
+    from worldsim.link_check.report import report
     from worldsim.scenario.file import load
     from worldsim.scenario.toml import ScenarioError
 
@@ -56,8 +56,9 @@ def _check(file: Path, overrides: dict[str, str], plot: Path | None) -> int:
     if picture.exists():
         raise ScenarioError(picture, "", "exists; nothing is overwritten")
     try:
-        held = survey(scenario, picture)
+        all_ok = report(scenario, picture)
     except OSError as error:
         raise ScenarioError(picture, "", f"cannot be written: {error.strerror}") from error
-    print(f"{'held' if held else 'BROKEN'}  {picture}")
-    return 0 if held else 1
+    result = "ok: all within" if all_ok else "OUTSIDE: not all within"
+    print(f"\n{result} tolerance; drawn in {picture}")
+    return 0 if all_ok else 1

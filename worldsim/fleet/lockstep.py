@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import assert_never
 
 from agent.codec import RejectedError, decode_command, encode
-from netem.delivery_log import Digest, joined
+from netem.delivery_log import Digest, joined_pages
 from netem.faults import FaultOrder
 from netem.messages import Done, MediumCounters, Truth, Turn, together, unpack_done
 from netem.wire.barrier import (
@@ -161,7 +161,7 @@ class LockstepFleet:
         """Wait until all mediums have played a slot; return the digest of all fates so far."""
         parts = [self._part(shard, slot) for shard in range(len(self._done))]
         self.medium_counters = together([part.medium_counters for part in parts])
-        self._digest.take(joined(dict(part.pages) for part in parts))
+        self._digest.update(joined_pages(dict(part.pages) for part in parts))
         return self._digest.value
 
     def _part(self, shard: int, slot: int) -> Done:

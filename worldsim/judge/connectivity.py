@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from netem.conditions import LinkModels, NetworkConditions
-from netem.link import mean_loss, stretch
+from netem.link import burst_variance_factor, mean_loss
 from netem.link_keys import Conditions
-from netem.random_draws import WIDEST
+from netem.random_draws import MAX_QUANTILE
 from netem.wire.frame import MULTIHOP
 from worldsim.judge.radio_events import order_of
 from worldsim.judge.run_events import RadioRunEvent
@@ -87,9 +87,9 @@ class Connectivity:
         conditions: Conditions = msgspec.structs.replace(self._network.conditions, link=())
         model = LinkModels(conditions).of_channel(MULTIHOP)
         self.loss = mean_loss(model)
-        self._stretch = max(1.0, stretch(model))
+        self._stretch = max(1.0, burst_variance_factor(model))
         self._range_m = model.range_m
-        widest = 1.0 if model.distribution == "uniform" else WIDEST
+        widest = 1.0 if model.distribution == "uniform" else MAX_QUANTILE
         self._delay_s = (model.delay_ms + widest * model.jitter_ms) / 1000.0
         rows = self._rows
         hears = np.array([[not self._network.partitions(a, b) for a in rows] for b in rows])

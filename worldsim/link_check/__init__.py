@@ -1,1 +1,1 @@
-"""What a link does, measured: packets through the medium, against what its conditions say."""
+"""Measures what links do: packets through the medium, compared with the configured parameters."""

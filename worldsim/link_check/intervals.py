@@ -1,4 +1,4 @@
-"""How far a measurement may be from what is configured, and still be chance: 99.9 % intervals."""
+"""99.9 % intervals: how far a correct measurement may differ from the configured value."""
 
 from collections.abc import Callable
 from math import asin, pi, sqrt
@@ -9,20 +9,20 @@ from numpy.typing import NDArray
 from netem.link import LinkModel, mean_loss
 
 Z = 3.2905
-"""Of 1 000 normal numbers one is farther off, in standard deviations."""
+"""Half width of the 99.9 % interval of a normal number, in standard deviations."""
 KOLMOGOROV = 1.9495
-"""The same for the largest distance between two distributions, times sqrt(n)."""
+"""99.9 % bound of the Kolmogorov-Smirnov distance, times sqrt(n)."""
 GRID = 400_000
 Floats = NDArray[np.float64]
 
 
 def share_bound(share: float, count: int) -> float:
-    """Return how far a share of independent draws may be off."""
+    """Return the half width for the mean of ``count`` independent draws of a share in [0, 1]."""
     return Z * sqrt(share * (1.0 - share) / max(1, count))
 
 
 def loss_bound(link: LinkModel, count: int) -> float:
-    """Return how far a link's mean loss may be off, its bursts counted in.
+    """Return the half width for a link's mean loss, correlated where it has bursts.
 
     Var = (p (1-p) + 2 sum of covariances) / n. Over k frames the covariance of a two-state chain is
     (b-g)^2 pi_b pi_g rho^k, rho = 1-p-r; with b = 1 and g = 0 all of it is
@@ -39,8 +39,8 @@ def loss_bound(link: LinkModel, count: int) -> float:
     return Z * sqrt(max(0.0, variance) / count)
 
 
-def delays_s(link: LinkModel, shape: Callable[[float], float]) -> Floats:
-    """Return the quantiles of a link's delays [s], GRID of them at equal steps, in order."""
+def delay_quantiles_s(link: LinkModel, shape: Callable[[float], float]) -> Floats:
+    """Return GRID quantiles of a link's delay distribution, at equal steps, ascending [s]."""
     overtaking = link.reorder_percent / 100.0
     shares = ((np.arange(GRID) + 0.5) / GRID).tolist()
     late = np.array([max(0.0, link.delay_ms + link.jitter_ms * shape(each)) for each in shares])
@@ -51,29 +51,29 @@ def delays_s(link: LinkModel, shape: Callable[[float], float]) -> Floats:
     return np.where(at < overtaking, 0.0, late[index.astype(np.int64)]) / 1000.0
 
 
-def farthest(samples: Floats, quantiles: Floats) -> float:
-    """Return Kolmogorov and Smirnov's D: how far two distributions are apart; steps are allowed."""
+def kolmogorov_smirnov(samples: Floats, quantiles: Floats) -> float:
+    """Return the Kolmogorov-Smirnov distance D of two distributions, which may have steps."""
     places = np.unique(samples)
-    ordered, far = np.sort(samples), 0.0
+    ordered, distance = np.sort(samples), 0.0
     for side in ("left", "right"):
-        ours = np.searchsorted(ordered, places, side) / len(samples)
-        theirs = np.searchsorted(quantiles, places, side) / len(quantiles)
-        far = max(far, float(np.max(np.abs(ours - theirs))))
-    return far
+        measured = np.searchsorted(ordered, places, side) / len(samples)
+        configured = np.searchsorted(quantiles, places, side) / len(quantiles)
+        distance = max(distance, float(np.max(np.abs(measured - configured))))
+    return distance
 
 
-def effective(link: LinkModel, count: int) -> float:
-    """Return for how many independent delays so many of a link count: they remember each other."""
+def effective_count(link: LinkModel, count: int) -> float:
+    """Return the number of independent delays that ``count`` correlated ones are worth."""
     rho = link.delay_correlation_percent / 100.0
     return count * (1.0 - rho) / (1.0 + rho)
 
 
 def rank_correlation(samples: Floats) -> float:
-    """Return how the ranks of neighbours in a series correlate (Spearman, lag 1)."""
+    """Return Spearman's rank correlation of a series with itself, shifted by one."""
     ranks = np.argsort(np.argsort(samples, kind="stable"), kind="stable").astype(np.float64)
     return float(np.corrcoef(ranks[:-1], ranks[1:])[0, 1])
 
 
 def rank_correlation_of(correlation: float) -> float:
-    """Return the rank correlation that a correlation of normal scores makes."""
+    """Return the rank correlation of normal scores with a given correlation."""
     return 6.0 / pi * asin(correlation / 2.0)

@@ -1,4 +1,4 @@
-"""The parameter sets of a scenario: each different link that its radio has at some time."""
+"""The parameter sets of a scenario: each different link that its radio has at any time."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -11,18 +11,20 @@ from worldsim.scenario.tables import Scenario
 
 
 class ParameterSet(NamedTuple):
-    """One link model, where and when it holds in words, and the channel on which it is tried."""
+    """One link model of a scenario."""
 
     name: str
+    """Which links have it, and from when on."""
     channel: int
+    """The channel on which it is measured."""
     link: LinkModel
 
 
 def parameter_sets(scenario: Scenario) -> list[ParameterSet]:
     """Return the different link models of a scenario, each once, in the order of its tables."""
     found: dict[LinkModel, ParameterSet] = {}
-    for when, conditions in _conditions(scenario):
-        for each in _links(when, conditions):
+    for since, conditions in _conditions(scenario):
+        for each in _links(since, conditions):
             found.setdefault(each.link, each)
     return list(found.values())
 
@@ -34,11 +36,11 @@ def _conditions(scenario: Scenario) -> Iterator[tuple[str, Conditions]]:
             yield f", from {event.at_s:g} s on", overlaid(scenario.netem, event.netem)
 
 
-def _links(when: str, conditions: Conditions) -> Iterator[ParameterSet]:
+def _links(since: str, conditions: Conditions) -> Iterator[ParameterSet]:
     models = LinkModels(conditions)
     for channel, name in enumerate(CHANNELS):
-        yield ParameterSet(f"{name}{when}", channel, models.of_channel(channel))
+        yield ParameterSet(f"{name}{since}", channel, models.of_channel(channel))
     for link in conditions.link:
         for channel, name in enumerate(CHANNELS):
             model = models.of_link(channel, link.source, link.to)
-            yield ParameterSet(f"{link.source} to {link.to}, {name}{when}", channel, model)
+            yield ParameterSet(f"{link.source} to {link.to}, {name}{since}", channel, model)
