@@ -4,7 +4,7 @@ The body frame has x ahead, y to the left and z up.
 """
 
 from math import cos, pi, radians, sin
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from agent.config import Laser, Sensors, Sonar
 from agent.messages import Vector
@@ -13,7 +13,8 @@ IN_BEAM = 6
 """Rays on each of a beam's two rings about its axis."""
 SAME_RAY_RAD = 0.03
 """Within so much a ray looks at a point, not past it."""
-KINDS = ("laser", "sonar")
+ScanKind = Literal["laser", "sonar"]
+KINDS: tuple[ScanKind, ...] = ("laser", "sonar")
 """Sensors that scan, in the order of a Scan's ``kind``."""
 
 
@@ -46,7 +47,7 @@ class Pattern(NamedTuple):
     grid: Grid | None = None
 
 
-def pattern_of(kind: str, sensors: Sensors, tick_hz: float) -> Pattern:
+def pattern_of(kind: ScanKind, sensors: Sensors, tick_hz: float) -> Pattern:
     """Return the pattern of a sensor that scans."""
     if kind == "laser":
         return _laser_pattern(sensors.laser, tick_hz)

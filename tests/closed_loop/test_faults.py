@@ -101,7 +101,7 @@ def test_a_frame_turned_by_90_degrees_takes_the_team_along(seed: int) -> None:
     assert before.formation.name == after.formation.name
     assert after.converge_s is not None
     assert after.converge_s <= 10.0
-    apex = flight.loop.world.fleet.position - np.array([1.0, 0.0, 0.5])
+    apex = flight.loop.world.vehicles.position - np.array([1.0, 0.0, 0.5])
     assert np.min(np.linalg.norm(apex, axis=1)) < 0.01
     assert violated(flight) == []
 
@@ -114,7 +114,7 @@ def test_the_apex_leaves_and_has_a_successor(seed: int, radio: dict[str, str]) -
     assert t_s == 15.0
     assert max(reformed_s(flight)) <= 10.0
     assert violated(flight) == []
-    assert np.isnan(flight.loop.world.fleet.position[gone]).all()
+    assert np.isnan(flight.loop.world.vehicles.position[gone]).all()
     # Without delay nothing is on its way to one who has just been handed its batch.
     assert flight.medium_counters.fates["dropped_medium"] > 0 or not radio
 
@@ -131,7 +131,7 @@ def test_the_apex_dies_and_hovers_in_its_slot(seed: int) -> None:
     flight = flown(seed, 45, "at_s = 15, kill = ['vertex:V1']")
     ((_, _, dead),) = kinds(flight, "kill")
     assert dead is not None
-    assert np.linalg.norm(flight.loop.world.fleet.position[dead]) < 0.12
+    assert np.linalg.norm(flight.loop.world.vehicles.position[dead]) < 0.12
     assert max(reformed_s(flight)) <= 15.0
     assert violated(flight) == []
 

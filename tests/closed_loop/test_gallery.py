@@ -89,7 +89,7 @@ def test_slots_of_the_oriented_curve_are_1_m_apart_along_it() -> None:
 
 def test_a_flock_settles_with_nearest_neighbours_about_spacing_m_apart() -> None:
     spacing_m = scenario("flocking-9").control.spacing_m
-    position = flown("flocking-9").loop.world.fleet.position.tolist()
+    position = flown("flocking-9").loop.world.vehicles.position.tolist()
     for agent, here in enumerate(position):
         nearest_m = min(dist(here, there) for row, there in enumerate(position) if row != agent)
         assert 0.9 * spacing_m < nearest_m < 1.15 * spacing_m

@@ -69,7 +69,7 @@ def flown(seed, move):
     fleet, track = VirtualFleet(scenario), []
     for _ in range(round(DURATION_S * scenario.slot_hz)):
         fleet.slot()
-        track.append(fleet.loop.world.fleet.position.copy())
+        track.append(fleet.loop.world.vehicles.position.copy())
     return np.array(track), [command.telemetry.place for command in fleet.loop.world.latest]
 
 

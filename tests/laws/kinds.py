@@ -13,7 +13,7 @@ from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.controller import Senses
 from agent.guidance.safety_monitor import Guard
 from tests.laws.speck import SPECK
-from worldsim.truth.vehicle import Fleet
+from worldsim.truth.vehicle import Vehicles
 
 SLOTS = 4
 TICK_S = 0.05
@@ -53,7 +53,7 @@ class Pair:
         self.guards = [craft.guard(fastest) for craft in crafts]
         position = np.array([(0.0, 0.0, 0.0), start])
         yaws = np.array([random.uniform(-pi, pi) for _ in crafts])
-        self.fleet = Fleet(position, yaws, [craft.vehicle for craft in crafts])
+        self.fleet = Vehicles(position, yaws, [craft.vehicle for craft in crafts])
         self.phases = [random.randrange(SLOTS) for _ in crafts]
         self.late = [random.randrange((craft.ticks - 1) * SLOTS + 1) for craft in crafts]
         self.wish = [random.choice(WISHES) for _ in crafts]

@@ -73,10 +73,10 @@ def flown(text: str, duration_s: float) -> Iterator[tuple[VirtualFleet, list]]:
     """Fly a scenario; yield the fleet after every slot, and where all stood in each slot so far."""
     scenario = parse(text)
     fleet = VirtualFleet(scenario)
-    track = [fleet.loop.world.fleet.position.tolist()]
+    track = [fleet.loop.world.vehicles.position.tolist()]
     for _ in range(round(duration_s * scenario.slot_hz)):
         fleet.slot()
-        track.append(fleet.loop.world.fleet.position.tolist())
+        track.append(fleet.loop.world.vehicles.position.tolist())
         yield fleet, track
 
 

@@ -35,7 +35,7 @@ any_shape = spheres | cylinders | boxes | walls()
 
 
 def surface(shape, random, count):
-    """Return points (count, 3) strewn over a shape's surface [m; world frame]."""
+    """Return random points (count, 3) on a shape's surface [m; world frame]."""
     if isinstance(shape, Sphere):
         points = random.standard_normal((count, 3))
         points *= shape.radius_m / np.sqrt((points**2).sum(axis=1))[:, None]

@@ -1,4 +1,4 @@
-"""Distances to obstacles as laws: against points on their surfaces, moved, turned, swept."""
+"""Distances from obstacles: against points on their surfaces, moved, turned and swept."""
 
 from math import cos, radians, sin
 
@@ -35,35 +35,35 @@ def distances(shapes, points, time_s=0.0):
         ((0, 0, 0.5), -0.5),
     ],
 )
-def test_along_the_axes_it_is_plain(shape, point, metres):
+def test_distances_along_the_axes(shape, point, metres):
     assert distances([shape], point).distance[0, 0] == pytest.approx(metres)
 
 
 @given(any_shape, triples, st.integers(0, 2**32))
-def test_no_point_of_the_surface_is_nearer_and_one_is_as_near(shape, point, seed):
-    strewn = surface(shape, np.random.default_rng(seed), 300)
+def test_the_distance_is_that_of_the_nearest_surface_point(shape, point, seed):
+    samples = surface(shape, np.random.default_rng(seed), 300)
     found = distances([shape], point)
-    distance, away = found.distance[0, 0], found.away[0, 0]
-    to_strewn = np.sqrt(((strewn - point) ** 2).sum(axis=1))
-    assert abs(distance) <= to_strewn.min() + 1e-9
-    assert np.sqrt((away**2).sum()) == pytest.approx(1.0)
-    nearest = np.array(point) - distance * away
+    distance, outward = found.distance[0, 0], found.outward[0, 0]
+    to_samples = np.sqrt(((samples - point) ** 2).sum(axis=1))
+    assert abs(distance) <= to_samples.min() + 1e-9
+    assert np.sqrt((outward**2).sum()) == pytest.approx(1.0)
+    nearest = np.array(point) - distance * outward
     assert distances([shape], nearest).distance[0, 0] == pytest.approx(0.0, abs=1e-9)
 
 
 @given(any_shape, st.integers(0, 2**32))
-def test_the_surface_is_at_no_distance(shape, seed):
-    strewn = surface(shape, np.random.default_rng(seed), 40)
-    assert distances([shape], strewn).distance == pytest.approx(0.0, abs=1e-9)
+def test_points_of_the_surface_have_distance_zero(shape, seed):
+    samples = surface(shape, np.random.default_rng(seed), 40)
+    assert distances([shape], samples).distance == pytest.approx(0.0, abs=1e-9)
 
 
 @given(st.lists(any_shape, min_size=1, max_size=6), triples)
-def test_each_column_is_as_if_alone(shapes, point):
+def test_each_column_equals_that_of_a_single_obstacle(shapes, point):
     together = distances(shapes, point)
     for column, shape in enumerate(shapes):
         alone = distances([shape], point)
         assert together.distance[0, column] == alone.distance[0, 0]
-        assert together.away[0, column].tolist() == alone.away[0, 0].tolist()
+        assert together.outward[0, column].tolist() == alone.outward[0, 0].tolist()
 
 
 @given(any_shape.filter(lambda shape: not isinstance(shape, Wall)), triples, triples)
@@ -86,19 +86,19 @@ def test_turned_together_nothing_changes(point, yaw_deg, turn_deg):
 
 
 @given(any_shape, triples, triples)
-def test_a_way_is_as_near_as_its_nearest_point(shape, start, way):
+def test_the_swept_distance_is_the_least_along_the_line(shape, start, way):
     obstacles = Obstacles([shape])
     centre = obstacles.centres(0.0)
     before = np.array(start) - centre[None]
     after = before + 0.3 * np.array(way)
     swept = obstacles.swept(before, after)[0, 0]
     along = np.linspace(0.0, 1.0, 400)[:, None, None]
-    strewn = obstacles.from_centres(before + along * (after - before)).distance.min()
+    least = obstacles.from_centres(before + along * (after - before)).distance.min()
     step = 0.3 * np.sqrt((np.array(way) ** 2).sum()) / 399
-    assert strewn - step - 1e-9 <= swept <= strewn + 1e-9
+    assert least - step - 1e-9 <= swept <= least + 1e-9
 
 
-def test_no_vehicle_has_no_distance():
+def test_a_missing_vehicle_has_no_distance():
     shapes = list(UNIT.values())
     found = distances(shapes, [(np.nan, np.nan, np.nan), (2.0, 0.0, 0.0)])
     assert np.isnan(found.distance[0]).all()
@@ -115,25 +115,25 @@ def moving(**more):
     [(0, (0, 0), (0, 0)), (4, (2, 0), (2, 0)), (10, (4, 1), (4, 1)), (12, (4, 2), (4, 2)),
      (14, (4, 1), (4, 2)), (20, (2, 0), (4, 2)), (24, (0, 0), (4, 2)), (28, (2, 0), (4, 2))],
 )  # fmt: skip
-def test_it_goes_to_and_fro_or_stops(time_s, back, stop):
+def test_a_moving_obstacle_turns_back_or_stops(time_s, back, stop):
     to_and_fro, there = moving(), moving(at_end="stop")
     centres = Obstacles([to_and_fro, there]).centres(time_s)
     assert centres[:, :2].tolist() == [pytest.approx(back), pytest.approx(stop)]
 
 
-def test_it_waits_until_it_begins():
+def test_a_moving_obstacle_waits_until_it_starts():
     late = Obstacles([moving(from_s=10.0)])
     assert late.centres(10.0)[0].tolist() == [0.0, 0.0, 0.0]
     assert late.centres(12.0)[0] == pytest.approx([1.0, 0.0, 0.0])
 
 
-def test_a_waypoint_twice_is_one():
+def test_a_repeated_waypoint_counts_once():
     twice = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     assert Obstacles([moving(waypoints_m=twice)]).centres(1.0)[0] == pytest.approx([0.5, 0.0, 0.0])
 
 
 @given(st.floats(0.0, 1000.0), st.sampled_from(["back", "stop"]))
-def test_it_never_outruns_its_speed(time_s, at_end):
+def test_a_moving_obstacle_never_exceeds_its_speed(time_s, at_end):
     obstacles = Obstacles([moving(at_end=at_end)])
     way = obstacles.centres(time_s + 0.05) - obstacles.centres(time_s)
     assert np.sqrt((way**2).sum()) <= 0.5 * 0.05 + 1e-9

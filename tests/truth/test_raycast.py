@@ -1,4 +1,4 @@
-"""Rays against distances: what a ray meets lies on a surface, and nothing lies before it."""
+"""Rays against distances: a ray ends on a surface, and nothing lies before that point."""
 
 from math import cos, inf, radians, sin
 
@@ -28,7 +28,7 @@ ways = triples.filter(lambda way: sum(abs(x) for x in way) > 0.1)
 
 
 @given(any_shape, triples, ways)
-def test_a_ray_ends_at_the_surface_and_passes_nothing_before(shape, origin, way):
+def test_a_ray_ends_on_the_first_surface(shape, origin, way):
     obstacles, far = Obstacles([shape]), ray(origin, way, shape)
     inside = obstacles.nearest(np.array([origin], float), 0.0).distance[0, 0] < -1e-9
     assume(not inside)
@@ -41,7 +41,7 @@ def test_a_ray_ends_at_the_surface_and_passes_nothing_before(shape, origin, way)
 
 
 @given(any_shape, triples, ways)
-def test_a_ray_that_meets_nothing_comes_near_nothing(shape, origin, way):
+def test_a_ray_that_hits_nothing_stays_outside(shape, origin, way):
     if ray(origin, way, shape) == inf:
         along = np.linspace(0.0, 40.0, 400)[:, None]
         points = np.array(origin) + along * unit(way)
@@ -49,7 +49,7 @@ def test_a_ray_that_meets_nothing_comes_near_nothing(shape, origin, way):
 
 
 @given(any_shape, triples)
-def test_within_a_body_a_ray_meets_it_at_once(shape, way):
+def test_a_ray_from_inside_a_body_has_length_zero(shape, way):
     assume(sum(abs(x) for x in way) > 0.1)
     assert ray(Obstacles([shape]).centres(0.0)[0], way, shape) == 0.0
 
@@ -75,7 +75,7 @@ def test_turned_together_nothing_changes(turn_deg):
 
 
 @given(st.lists(st.tuples(triples, st.floats(0.1, 2.0)), min_size=1, max_size=5), triples, ways)
-def test_vehicles_are_met_as_spheres(balls, origin, way):
+def test_vehicles_are_hit_as_spheres(balls, origin, way):
     shapes = [Sphere(centre_m=centre, radius_m=radius) for centre, radius in balls]
     start = np.array(origin) - np.array([centre for centre, _ in balls])
     radius = np.array([radius for _, radius in balls])
@@ -84,6 +84,6 @@ def test_vehicles_are_met_as_spheres(balls, origin, way):
 
 
 @given(coordinates)
-def test_no_vehicle_is_met_nowhere(x):
+def test_a_missing_vehicle_is_never_hit(x):
     start = np.full((1, 2, 3), np.nan)
     assert cast_at_spheres(start, unit((1, x, 0))[None, None], np.ones(2))[0, 0] == inf

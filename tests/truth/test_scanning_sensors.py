@@ -1,4 +1,4 @@
-"""Scans: what laser and sonar tell, their noise keyed, whoever else looks."""
+"""Scans of laser and sonar, and the independence of their noise."""
 
 from array import array
 from math import pi
@@ -10,7 +10,7 @@ from agent.config import Laser, Sensors, Sonar, Vehicle
 from agent.sensing.ray_pattern import KINDS, pattern_of
 from worldsim.scenario.obstacle_tables import Sphere, Wall
 from worldsim.truth.obstacles import Obstacles
-from worldsim.truth.scanning_sensors import NOTHING, Scans
+from worldsim.truth.scanning_sensors import NO_ECHO_MM, ScanningSensors
 
 BALL = Sphere(centre_m=(2.0, 0.0, 0.0), radius_m=0.5)
 WALL = Wall(from_m=(-9, 1.0, -5), to_m=(9, 1.0, -5), height_m=10.0, thickness_m=0.0002)
@@ -23,15 +23,15 @@ YAW = np.array([0.0, pi / 2, np.nan])
 
 def scans(sensors=Sensors(), kinds=KINDS, obstacles=(), seed=1):  # noqa: B008
     vehicles = [Vehicle(sensors=kinds)] * 3
-    return Scans(vehicles, sensors, seed, 20.0, Obstacles(obstacles))
+    return ScanningSensors(vehicles, sensors, seed, 20.0, Obstacles(obstacles))
 
 
-def read(looking, slot=0, tick=0, **more):
-    return scans(**more).read(HERE, YAW, looking, tick, slot, 0.0)
+def read(agents, slot=0, tick=0, **more):
+    return scans(**more).read(HERE, YAW, agents, tick, slot, 0.0)
 
 
 def ranges(scan):
-    return [None if each == NOTHING else each / 1000 for each in array("H", scan.ranges)]
+    return [None if each == NO_ECHO_MM else each / 1000 for each in array("H", scan.ranges)]
 
 
 def test_a_ball_ahead_is_seen_in_the_middle_of_the_laser():
@@ -41,14 +41,14 @@ def test_a_ball_ahead_is_seen_in_the_middle_of_the_laser():
     assert [index for index in range(2, 61) if seen[index]] == list(range(26, 35))
 
 
-def test_others_are_seen_as_balls_and_oneself_is_not():
+def test_other_vehicles_are_seen_as_spheres_and_the_own_one_is_not():
     laser, sonar = read([1])[1]
     assert ranges(laser)[30] == 0.9
     assert ranges(sonar)[0] == 0.9
     assert set(ranges(laser)[2:29]) == {None}
 
 
-def test_a_sonar_tells_the_nearest_of_its_beam():
+def test_a_sonar_measures_the_nearest_point_in_its_beam():
     _, sonar = read([0], obstacles=[WALL])[0]
     seen = ranges(sonar)
     assert seen[4] == pytest.approx(1.0, abs=0.001)
@@ -69,7 +69,7 @@ def test_rings_look_above_and_below():
     assert ranges(read([0], sensors=sensors, obstacles=[high])[0][0]) == [None, None, 1.5]
 
 
-def test_noise_is_of_the_agent_and_the_slot_whoever_looks():
+def test_noise_depends_on_agent_slot_and_seed_only():
     alone, together = (
         read([0], sensors=NOISY, obstacles=[WALL]),
         read([0, 1], sensors=NOISY, obstacles=[WALL]),
@@ -79,7 +79,7 @@ def test_noise_is_of_the_agent_and_the_slot_whoever_looks():
     assert alone[0] != read([0], seed=2, sensors=NOISY, obstacles=[WALL])[0]
 
 
-def test_noise_and_dropouts_are_as_large_as_told():
+def test_noise_and_dropouts_are_as_large_as_configured():
     sensors = Sensors(laser=Laser(noise_m=0.02, dropout_percent=10, rays=201, range_m=50))
     near = [
         ranges(read([0], slot=slot, sensors=sensors, obstacles=[WALL])[0][0]) for slot in range(50)
@@ -94,7 +94,7 @@ def test_noise_and_dropouts_are_as_large_as_told():
     assert lost / (len(rows) * len(near)) == pytest.approx(0.1, abs=0.02)
 
 
-def test_it_scans_at_its_rate_and_only_who_carries_it():
+def test_a_sensor_scans_at_its_rate_on_its_carriers_only():
     every = [bool(read([0], tick=tick)) for tick in range(4)]
     assert every == [True, False, True, False]
     assert read([0], kinds=("proximity",)) == {}

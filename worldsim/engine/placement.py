@@ -6,7 +6,7 @@ from worldsim.engine.operations import StartPose
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.tables import Scenario
 from worldsim.truth.obstacles import Obstacles
-from worldsim.truth.start_positions import room_of, starts
+from worldsim.truth.start_positions import clearance_of, start_poses
 from worldsim.truth.vehicle import Floats
 
 
@@ -55,15 +55,11 @@ class Placement:
     def _drawn(
         self, key: int, start: BoxStart | ListStart, count: int, position: Floats, time_s: float
     ) -> list[StartPose]:
-        where, yaws = starts(
-            start,
-            count,
-            self._scenario.seed,
-            event=key + 1,
-            present=position[~np.isnan(position[:, 0])],
-            apart_m=self._scenario.control.separation_m,
-            room=room_of(self._scenario, self._obstacles, time_s),
+        clearance = clearance_of(self._scenario, self._obstacles, time_s)._replace(
+            vehicles=position[~np.isnan(position[:, 0])],
+            vehicle_m=self._scenario.control.separation_m,
         )
+        where, yaws = start_poses(start, count, self._scenario.seed, clearance, event=key + 1)
         return [
             StartPose((x, y, z), yaw)
             for (x, y, z), yaw in zip(where.tolist(), yaws.tolist(), strict=True)

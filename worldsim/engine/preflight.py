@@ -13,7 +13,7 @@ from worldsim.scenario.rules import Finding, too_fast
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
 from worldsim.truth.obstacles import Obstacles
-from worldsim.truth.start_positions import StartError, starts_of
+from worldsim.truth.start_positions import StartError, start_poses_of
 
 VIRTUAL_COMMAND_TICKS = 1
 PROCESS_COMMAND_TICKS = 2
@@ -61,7 +61,7 @@ def _controller(scenario: Scenario) -> Finding | None:
 
 def _room(scenario: Scenario) -> Finding | None:
     try:
-        starts_of(scenario, Obstacles(scenario.obstacle))
+        start_poses_of(scenario, Obstacles(scenario.obstacle))
     except StartError as error:
         return Finding("fleet.start", str(error))
     return None

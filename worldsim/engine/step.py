@@ -24,8 +24,9 @@ from worldsim.judge.verdict import Figures, Judge
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.proximity_sensor import ProximitySensor
-from worldsim.truth.scanning_sensors import Scans
-from worldsim.truth.start_positions import starts_of
+from worldsim.truth.scanning_sensors import ScanningSensors
+from worldsim.truth.start_positions import start_poses_of
+from worldsim.truth.vehicle import Poses
 from worldsim.truth.world import Clock, World
 
 
@@ -56,15 +57,17 @@ class Opened(msgspec.Struct, frozen=True, gc=False):
 def world_of(scenario: Scenario, command_ticks: int) -> World:
     """Return a scenario's world at its start. Raises StartError where there is no room."""
     obstacles = Obstacles(scenario.obstacle)
-    position, yaw = starts_of(scenario, obstacles)
+    start = start_poses_of(scenario, obstacles)
     later = scenario.rows - scenario.fleet.agents
     return World(
         clock=Clock(scenario.fleet.tick_hz, SLOTS_PER_TICK),
         limits=scenario.vehicles,
-        position=np.concatenate((position, np.full((later, 3), nan))),
-        yaw=np.concatenate((yaw, np.full(later, nan))),
-        sensor=ProximitySensor(scenario.seed, scenario.sensor.proximity.noise_m, obstacles),
-        scans=Scans(
+        start=Poses(
+            np.concatenate((start.position, np.full((later, 3), nan))),
+            np.concatenate((start.yaw, np.full(later, nan))),
+        ),
+        proximity=ProximitySensor(scenario.seed, scenario.sensor.proximity.noise_m, obstacles),
+        scanning=ScanningSensors(
             scenario.vehicles, scenario.sensor, scenario.seed, scenario.fleet.tick_hz, obstacles
         ),
         command_ticks=command_ticks,
@@ -97,7 +100,7 @@ class SlotLoop:
         self._recorder = recorder
         self._shows = recorder is not None and recorder.shows
         self._packets = packets
-        self._headings = world.fleet.yaw.tolist()
+        self._headings = world.vehicles.yaw.tolist()
         self._telemetry = [NO_TELEMETRY] * scenario.rows
 
     def due(self) -> Iterable[Operation]:
@@ -114,7 +117,7 @@ class SlotLoop:
     def open(self) -> Opened:
         """Begin the present slot; at a tick, judge and record it first."""
         world = self.world
-        self.trace.poses(world.slot, world.fleet)
+        self.trace.poses(world.slot, world.vehicles)
         if world.slot % world.clock.slots_per_tick == 0:
             self._see_tick()
         slots, awake = world.clock.slots_per_tick, self.members.awake.tolist()
@@ -128,7 +131,7 @@ class SlotLoop:
 
     def obey(self, agent: int, command: Command, encoded: bytes) -> None:
         """Take one agent's command; under a barrier, in order of ids."""
-        if self.world.obey(agent, command):
+        if self.world.accept(agent, command):
             self.trace.command(agent, encoded)
             telemetry = command.telemetry
             self._telemetry[agent] = telemetry_row(telemetry, self._headings[agent])

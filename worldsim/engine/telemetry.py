@@ -56,7 +56,7 @@ def tick_of(
     awake (N,): who steps; the others tell nothing.
     """
     rows = [row if up else NO_TELEMETRY for row, up in zip(told, awake.tolist(), strict=True)]
-    fleet = world.fleet
+    fleet = world.vehicles
     reasons = np.array([(*row.target, row.force, row.turn_deg) for row in rows], dtype=np.float32)
     attitude = np.empty((len(rows), 3), dtype=np.float32)
     attitude[:, 0], attitude[:, 1:] = fleet.yaw, fleet.tilt

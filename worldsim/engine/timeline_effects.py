@@ -149,7 +149,7 @@ class TimelineEffects:
         return None if step.ends and not self.network.ends(order) else order
 
     def _process_operation(self, step: Step, fault: ProcessFault) -> Operation | None:
-        position, time_s = self._world.fleet.position, self._world.time_s
+        position, time_s = self._world.vehicles.position, self._world.time_s
         if step.ends:
             return self.members.ended(step.number, fault, position, time_s)
         return self.members.begun(step.number, fault, self._claims, position, time_s)
@@ -192,7 +192,7 @@ class TimelineEffects:
     def _set_sensors(self, operation: SetSensorMode, by: By) -> None:
         sensor, mode = operation.sensor or "all", operation.mode or "works again"
         for agent in operation.agents:
-            self._world.failures.set(agent, operation.sensor, operation.mode)
+            self._world.sensor_faults.set(agent, operation.sensor, operation.mode)
             self._emit(
                 SensorChanged(
                     t_s=self._t_s, agent=agent, planned=True, by=by, sensor=sensor, mode=mode

@@ -2,7 +2,7 @@
 
 from hashlib import sha256
 
-from worldsim.truth.vehicle import Fleet
+from worldsim.truth.vehicle import Vehicles
 
 
 class Trace:
@@ -11,9 +11,9 @@ class Trace:
     def __init__(self) -> None:
         self._hash = sha256()
 
-    def poses(self, slot: int, fleet: Fleet) -> None:
+    def poses(self, slot: int, vehicles: Vehicles) -> None:
         """Take the poses at the start of a slot."""
-        rows = fleet.position.tobytes() + fleet.yaw.tobytes() + fleet.tilt.tobytes()
+        rows = vehicles.position.tobytes() + vehicles.yaw.tobytes() + vehicles.tilt.tobytes()
         self._hash.update(slot.to_bytes(8, "little") + rows)
 
     def command(self, agent: int, command: bytes) -> None:

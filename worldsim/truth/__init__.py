@@ -1,1 +1,1 @@
-"""Ground truth as arrays over the fleet: vehicles, their senses, the world that steps them."""
+"""The true state of the world as arrays over the fleet: vehicles, sensors and obstacles."""

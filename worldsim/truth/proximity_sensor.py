@@ -1,4 +1,4 @@
-"""What vehicles sense of one another and of obstacles near by, for all that look at once."""
+"""The proximity sensor: relative positions of near vehicles and of near obstacles' surfaces."""
 
 import msgspec
 import numpy as np
@@ -8,25 +8,28 @@ from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
 
 PROXIMITY_RANGE_M = 2.0
-LARGE = 40
-"""From so many vehicles on, arrays are quicker."""
+ARRAYS_FROM = 40
+"""Number of vehicles from which arrays are faster."""
 MAX_POINTS = 32
-"""Of so many obstacles the nearest points are told at most: what an Observation holds."""
+"""Greatest number of obstacle points in a reading: an Observation holds no more."""
 
 
-class Sensed(msgspec.Struct, frozen=True, gc=False):
-    """Bodies and nearest points of obstacles, relative to the own centre [m; world axes]."""
+class ProximityReading(msgspec.Struct, frozen=True, gc=False):
+    """What one agent's sensor reads, relative to the agent's own centre [m; world axes]."""
 
     vehicles: tuple[Vector, ...]
+    """Centres of other vehicles, by agent id."""
     obstacles: tuple[Vector, ...] = ()
+    """The nearest point of each obstacle's surface, in the order of the scenario."""
+
+
+NO_READING = ProximityReading(())
 
 
 class ProximitySensor:
-    """True relative positions of what is within 2 m, with normal noise per axis [m].
+    """Reads what is within 2 m, with normal noise per axis.
 
-    Of each vehicle it gives the centre, of each obstacle the nearest point of the surface.
-
-    The noise of one reading is keyed by (seed, agent, slot): it does not depend on who else looks.
+    The noise of a reading is keyed by (seed, agent, slot): it does not depend on other readings.
     """
 
     def __init__(self, seed: int, noise_m: float, obstacles: Obstacles) -> None:
@@ -34,64 +37,68 @@ class ProximitySensor:
         self._noise_m = noise_m
         self._obstacles = obstacles
 
-    def read(self, position: Floats, looking: list[int], slot: int, time_s: float) -> list[Sensed]:
-        """Return what each agent in ``looking`` senses.
+    def read(
+        self, position: Floats, agents: list[int], slot: int, time_s: float
+    ) -> list[ProximityReading]:
+        """Return the readings of some agents, in their order.
 
-        position: (N, 3) [m; world frame], NaN for no vehicle. Order of bodies: by agent's row; of
-        obstacles: as in the scenario.
+        position: of all vehicles (N, 3) [m; world frame], NaN for no vehicle.
         """
-        bodies = self._bodies(position, looking)
-        points = self._points(position, looking, time_s) if len(self._obstacles) else None
+        vehicles = self._vehicles(position, agents)
+        points = self._obstacle_points(position, agents, time_s) if len(self._obstacles) else None
         return [
-            self._sensed(body, points[row] if points is not None else None, looking[row], slot)
-            for row, body in enumerate(bodies)
+            self._reading(near, points[row] if points is not None else None, agents[row], slot)
+            for row, near in enumerate(vehicles)
         ]
 
-    def _bodies(self, position: Floats, looking: list[int]) -> list[list[Vector]]:
-        """Return the vehicles near each who looks [m; relative].
+    def _vehicles(self, position: Floats, agents: list[int]) -> list[list[Vector]]:
+        """Return the vehicles near each agent [m; relative].
 
-        Small fleets are walked through in plain floats, large ones as arrays, by the same steps.
+        Small fleets are searched in a loop over plain floats, large ones as arrays, by the same
+        operations.
         """
-        if len(position) < LARGE:
+        if len(position) < ARRAYS_FROM:
             rows = position.tolist()
-            return [_walked(rows, agent) for agent in looking]
-        relative = position - position.take(looking, axis=0)[:, None]
+            return [_vehicles_by_loop(rows, agent) for agent in agents]
+        relative = position - position.take(agents, axis=0)[:, None]
         square = relative * relative
         near = square[:, :, 0] + square[:, :, 1] + square[:, :, 2] <= PROXIMITY_RANGE_M**2
-        near[np.arange(len(looking)), looking] = False
+        near[np.arange(len(agents)), agents] = False
         return [
             [(x, y, z) for x, y, z in relative[row, near[row]].tolist()]
-            for row in range(len(looking))
+            for row in range(len(agents))
         ]
 
-    def _points(self, position: Floats, looking: list[int], time_s: float) -> list[Floats]:
-        """Return the nearest points of obstacles near each who looks, (K, 3) [m; relative]."""
-        distance, away = self._obstacles.nearest(position.take(looking, axis=0), time_s)
+    def _obstacle_points(self, position: Floats, agents: list[int], time_s: float) -> list[Floats]:
+        """Return the nearest points of obstacles near each agent, (K, 3) [m; relative]."""
+        distance, outward = self._obstacles.nearest(position.take(agents, axis=0), time_s)
         found = []
-        for row in range(len(looking)):
+        for row in range(len(agents)):
             near = np.flatnonzero(distance[row] <= PROXIMITY_RANGE_M)
             if len(near) > MAX_POINTS:
                 order = np.argsort(distance[row, near], kind="stable")
                 near = np.sort(near[order[:MAX_POINTS]])
-            found.append(-distance[row, near, None] * away[row, near])
+            found.append(-distance[row, near, None] * outward[row, near])
         return found
 
-    def _sensed(self, bodies: list[Vector], points: Floats | None, agent: int, slot: int) -> Sensed:
+    def _reading(
+        self, vehicles: list[Vector], points: Floats | None, agent: int, slot: int
+    ) -> ProximityReading:
+        true = vehicles
         if points is not None:
-            bodies = bodies + [(x, y, z) for x, y, z in points.tolist()]
-        told = self._told(bodies, agent, slot)
-        vehicles = len(told) - (len(points) if points is not None else 0)
-        return Sensed(told[:vehicles], told[vehicles:])
+            true = vehicles + [(x, y, z) for x, y, z in points.tolist()]
+        noisy = self._with_noise(true, agent, slot)
+        return ProximityReading(noisy[: len(vehicles)], noisy[len(vehicles) :])
 
-    def _told(self, sensed: list[Vector], agent: int, slot: int) -> tuple[Vector, ...]:
-        if self._noise_m == 0.0 or not sensed:
-            return tuple(sensed)
+    def _with_noise(self, true: list[Vector], agent: int, slot: int) -> tuple[Vector, ...]:
+        if self._noise_m == 0.0 or not true:
+            return tuple(true)
         generator = np.random.Generator(np.random.Philox(key=[self.seed, agent << 40 | slot]))
-        noisy = np.array(sensed) + self._noise_m * generator.standard_normal((len(sensed), 3))
+        noisy = np.array(true) + self._noise_m * generator.standard_normal((len(true), 3))
         return tuple([(x, y, z) for x, y, z in noisy.tolist()])
 
 
-def _walked(rows: list[list[float]], agent: int) -> list[Vector]:
+def _vehicles_by_loop(rows: list[list[float]], agent: int) -> list[Vector]:
     x, y, z = rows[agent]
     near: list[Vector] = []
     for row, (a, b, c) in enumerate(rows):

@@ -1,6 +1,7 @@
-"""Rays against obstacles and vehicles, all at once: how far each goes before it meets something.
+"""Ray casting: the distance along each ray to the first obstacle or vehicle that it hits.
 
-Only + - * / sqrt and comparisons cross rows here. A ray that begins within a body meets it at once.
+Only + - * / sqrt and comparisons act across rows here. A ray that starts inside a body hits it at
+distance 0.
 """
 
 import numpy as np
@@ -10,49 +11,50 @@ from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
 
 PARALLEL = 1e-12
-"""A unit vector's part across a face below which the ray is taken to run along it."""
+"""A ray whose component across a face is smaller than this counts as parallel to the face."""
 
 
 def cast(origins: Floats, rays: Floats, obstacles: Obstacles, time_s: float) -> Floats:
-    """Return how far rays go to the first obstacle (P, K) [m]; infinite where they meet none.
+    """Return the distance (P, K) [m] along rays to the first obstacle; infinite for none.
 
     origins: (P, 3) [m; world frame]; rays: (P, K, 3), unit vectors [world axes].
     """
     far = np.full(rays.shape[:2], np.inf)
     centres = obstacles.centres(time_s)
     start = origins[:, None] - centres
-    for columns, meet in (
-        (obstacles.spheres, _meet_spheres),
-        (obstacles.cylinders, _meet_cylinders),
-        (obstacles.boxes, _meet_boxes),
+    for columns, hit in (
+        (obstacles.spheres, _hit_spheres),
+        (obstacles.cylinders, _hit_cylinders),
+        (obstacles.boxes, _hit_boxes),
     ):
         for column in columns.tolist():
-            form = (obstacles.radius[column], obstacles.half[column], obstacles.heading[column])
-            far = np.minimum(far, meet(start[:, None, column], rays, *form))
+            solid = (obstacles.radius[column], obstacles.half[column], obstacles.heading[column])
+            far = np.minimum(far, hit(start[:, None, column], rays, *solid))
     return far
 
 
 def cast_at_spheres(start: Floats, rays: Floats, radius: Floats) -> Floats:
-    """Return how far rays go to the first of some spheres (P, K) [m].
+    """Return the distance (P, K) [m] along rays to the first of M spheres; infinite for none.
 
-    start: (P, M, 3), the rays' origins from each centre [m]; radius (M,) [m]. NaN meets nothing.
+    start: (P, M, 3), the rays' origins relative to the centres [m]; NaN hits nothing. rays:
+    (P, K, 3), unit vectors. radius: (M,) [m].
     """
     far = np.full(rays.shape[:2], np.inf)
     for column in range(start.shape[1]):
-        far = np.fmin(far, _meet_spheres(start[:, None, column], rays, radius[column]))
+        far = np.fmin(far, _hit_spheres(start[:, None, column], rays, radius[column]))
     return far
 
 
-def _meet_spheres(start: Floats, rays: Floats, radius: float, *_: Floats) -> Floats:
+def _hit_spheres(start: Floats, rays: Floats, radius: float, *_: Floats) -> Floats:
     along = -_dot(start, rays)
     excess = _dot(start, start) - radius * radius
     square = along * along - excess
     root = np.sqrt(np.maximum(square, 0.0))
-    met = (square >= 0.0) & (along + root >= 0.0)
-    return np.where(met, np.maximum(along - root, 0.0), np.inf)
+    hits = (square >= 0.0) & (along + root >= 0.0)
+    return np.where(hits, np.maximum(along - root, 0.0), np.inf)
 
 
-def _meet_cylinders(start: Floats, rays: Floats, radius: float, half: Floats, _: Floats) -> Floats:
+def _hit_cylinders(start: Floats, rays: Floats, radius: float, half: Floats, _: Floats) -> Floats:
     flat_start, flat_rays = start * (1.0, 1.0, 0.0), rays * (1.0, 1.0, 0.0)
     a, b = _dot(flat_rays, flat_rays), _dot(flat_start, flat_rays)
     excess = _dot(flat_start, flat_start) - radius * radius
@@ -63,11 +65,11 @@ def _meet_cylinders(start: Floats, rays: Floats, radius: float, half: Floats, _:
     enter = np.where(crosses, (-b - root) / level, -upright)
     leave = np.where(crosses, (-b + root) / level, upright)
     low, high = _slab(start[..., 2], rays[..., 2], half[2])
-    met = (square >= 0.0) | ~crosses
-    return _first(np.maximum(enter, low), np.minimum(leave, high), met)
+    hits = (square >= 0.0) | ~crosses
+    return _first(np.maximum(enter, low), np.minimum(leave, high), hits)
 
 
-def _meet_boxes(start: Floats, rays: Floats, _: float, half: Floats, heading: Floats) -> Floats:
+def _hit_boxes(start: Floats, rays: Floats, _: float, half: Floats, heading: Floats) -> Floats:
     c, s = heading.tolist()
     enter, leave = _slab(start[..., 2], rays[..., 2], half[2])
     for axis, (x, y) in enumerate(((c, s), (-s, c))):
@@ -79,7 +81,10 @@ def _meet_boxes(start: Floats, rays: Floats, _: float, half: Floats, heading: Fl
 
 
 def _slab(start: Floats, way: Floats, half: float) -> tuple[Floats, Floats]:
-    """Return from where to where a ray is between two faces at +-half [m]."""
+    """Return the distances at which a ray enters and leaves the slab between faces at +-half [m].
+
+    start, way: the ray's origin [m] and direction across the faces.
+    """
     still = np.abs(way) < PARALLEL
     pace = np.where(still, 1.0, way)
     one, other = (-half - start) / pace, (half - start) / pace
@@ -89,8 +94,8 @@ def _slab(start: Floats, way: Floats, half: float) -> tuple[Floats, Floats]:
     return low, high
 
 
-def _first(enter: Floats, leave: Floats, met: NDArray[np.bool_]) -> Floats:
-    sound = met & (enter <= leave) & (leave >= 0.0)
+def _first(enter: Floats, leave: Floats, hits: NDArray[np.bool_]) -> Floats:
+    sound = hits & (enter <= leave) & (leave >= 0.0)
     return np.where(sound, np.maximum(enter, 0.0), np.inf)
 
 

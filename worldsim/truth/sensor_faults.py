@@ -1,79 +1,91 @@
 """Sensors that fail: stuck at their last reading, silent, or wrong, until they work again.
 
-What a wrong sensor tells is keyed by (seed, agent, slot), like all noise.
+Wrong readings are keyed by (seed, agent, slot), as all noise is.
 """
 
-from typing import Literal
+from typing import assert_never
 
 import numpy as np
 
 from agent.messages import Scan, Vector
 from agent.sensing.ray_pattern import KINDS
-from worldsim.truth.proximity_sensor import PROXIMITY_RANGE_M, Sensed
+from worldsim.scenario.faults import FailureMode
+from worldsim.truth.proximity_sensor import NO_READING, PROXIMITY_RANGE_M, ProximityReading
 
-Mode = Literal["stuck", "silent", "wrong"]
 SENSORS = ("proximity", *KINDS)
-NOTHING = Sensed(())
-SALT = 1 << 60
+KEY_SALT = 1 << 60
 
 
 class SensorFaults:
-    """Which sensors of which agents have failed, and what they told when they got stuck."""
+    """Which sensors of which agents have failed, and the readings at which they are stuck."""
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
-        self._modes: dict[tuple[int, str], Mode] = {}
-        self._frozen: dict[tuple[int, str], Sensed | Scan] = {}
+        self._modes: dict[tuple[int, str], FailureMode] = {}
+        self._stuck_readings: dict[int, ProximityReading] = {}
+        self._stuck_scans: dict[tuple[int, str], Scan] = {}
 
     def __bool__(self) -> bool:
         return bool(self._modes)
 
-    def set(self, agent: int, sensor: str | None, mode: Mode | None) -> None:
-        """Let an agent's sensor fail, or all with None; with no mode it works again."""
+    def set(self, agent: int, sensor: str | None, mode: FailureMode | None) -> None:
+        """Let an agent's sensor (None: all of them) fail in a mode, or with None work again."""
         for name in SENSORS if sensor is None else (sensor,):
-            self._frozen.pop((agent, name), None)
             self._modes.pop((agent, name), None)
+            self._stuck_scans.pop((agent, name), None)
+            if name == "proximity":
+                self._stuck_readings.pop(agent, None)
             if mode is not None:
                 self._modes[agent, name] = mode
 
-    def sensed(self, agent: int, true: Sensed, slot: int) -> Sensed:
-        """Return what the proximity sensor tells of what is truly there."""
+    def reading(self, agent: int, true: ProximityReading, slot: int) -> ProximityReading:
+        """Return the reading of an agent's proximity sensor, given the true one."""
         mode = self._modes.get((agent, "proximity"))
-        if mode == "silent":
-            return NOTHING
-        if mode == "stuck":
-            frozen = self._frozen.setdefault((agent, "proximity"), true)
-            return frozen if isinstance(frozen, Sensed) else true
-        return self._anywhere(true, agent, slot) if mode == "wrong" else true
+        match mode:
+            case None:
+                return true
+            case "silent":
+                return NO_READING
+            case "stuck":
+                return self._stuck_readings.setdefault(agent, true)
+            case "wrong":
+                return self._wrong_reading(true, agent, slot)
+        assert_never(mode)
 
     def scans(self, agent: int, true: tuple[Scan, ...], slot: int) -> tuple[Scan, ...]:
-        """Return what the scanning sensors tell of what is truly there."""
-        told = (self._scan(agent, scan, slot) for scan in true)
-        return tuple(scan for scan in told if scan is not None)
+        """Return the scans of an agent's scanning sensors, given the true ones."""
+        scans = (self._scan(agent, scan, slot) for scan in true)
+        return tuple(scan for scan in scans if scan is not None)
 
     def _scan(self, agent: int, true: Scan, slot: int) -> Scan | None:
         name = KINDS[true.kind]
         mode = self._modes.get((agent, name))
-        if mode == "silent":
-            return None
-        if mode == "stuck":
-            frozen = self._frozen.setdefault((agent, name), true)
-            return frozen if isinstance(frozen, Scan) else true
-        if mode == "wrong":
-            count = len(true.ranges) // 2
-            ranges = self._generator(agent, slot).integers(1 << 16, size=count)
-            return Scan(true.kind, ranges.astype("<u2").tobytes())
-        return true
+        match mode:
+            case None:
+                return true
+            case "silent":
+                return None
+            case "stuck":
+                return self._stuck_scans.setdefault((agent, name), true)
+            case "wrong":
+                return self._wrong_scan(true, agent, slot)
+        assert_never(mode)
 
-    def _anywhere(self, true: Sensed, agent: int, slot: int) -> Sensed:
-        """Return as many bodies and points as there are, each somewhere within the range."""
+    def _wrong_scan(self, true: Scan, agent: int, slot: int) -> Scan:
+        """Return random ranges, as many as there are."""
+        count = len(true.ranges) // 2
+        ranges = self._generator(agent, slot).integers(1 << 16, size=count)
+        return Scan(true.kind, ranges.astype("<u2").tobytes())
+
+    def _wrong_reading(self, true: ProximityReading, agent: int, slot: int) -> ProximityReading:
+        """Return as many vehicles and points as there are, at random places within the range."""
         count = len(true.vehicles) + len(true.obstacles)
         reach = PROXIMITY_RANGE_M / 3.0**0.5
-        strewn = self._generator(agent, slot).uniform(-reach, reach, (count, 3)).tolist()
-        told: list[Vector] = [(x, y, z) for x, y, z in strewn]
+        drawn = self._generator(agent, slot).uniform(-reach, reach, (count, 3)).tolist()
+        places: list[Vector] = [(x, y, z) for x, y, z in drawn]
         vehicles = len(true.vehicles)
-        return Sensed(tuple(told[:vehicles]), tuple(told[vehicles:]))
+        return ProximityReading(tuple(places[:vehicles]), tuple(places[vehicles:]))
 
     def _generator(self, agent: int, slot: int) -> np.random.Generator:
-        key = [self._seed, SALT | agent << 40 | slot]
+        key = [self._seed, KEY_SALT | agent << 40 | slot]
         return np.random.Generator(np.random.Philox(key=key))

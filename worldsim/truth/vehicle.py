@@ -1,10 +1,11 @@
-"""Vehicles as arrays: every row is one vehicle, in the world frame, SI units.
+"""Vehicles as arrays: every row is one vehicle, in the world frame, in SI units.
 
-Only + - * / sqrt and rounding cross rows here, so that a trace is the same in every clock.
+Only + - * / sqrt and rounding act across rows here, so that a trace is the same in every clock.
 """
 
 from collections.abc import Sequence
 from math import cos, isnan, sin, sqrt
+from typing import NamedTuple, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,30 +17,37 @@ Floats = NDArray[np.float64]
 _TURN = 2.0 * np.pi
 
 
+class Poses(NamedTuple):
+    """Where N vehicles are and where they point; NaN for a vehicle that is not in the world."""
+
+    position: Floats
+    """(N, 3) [m; world frame]"""
+    yaw: Floats
+    """(N,) [rad; world frame]"""
+
+
 def wrapped(angle: Floats) -> Floats:
     """Return angles [rad] in [-pi, pi]."""
     return angle - _TURN * np.rint(angle / _TURN)
 
 
-class Fleet:
-    """Vehicles of all kinds, within speed, climb, yaw rate and acceleration.
-
-    position (N, 3) [m], velocity (N, 3) [m/s], yaw (N,) [rad], tilt (N, 2): pitch and roll [rad]; a
-    row of NaN is not in the world.
-    """
+class Vehicles:
+    """Vehicles of all kinds, which move within their limits; a row of NaN is not in the world."""
 
     def __init__(self, position: Floats, yaw: Floats, limits: Sequence[Vehicle]) -> None:
         self.position = position.astype(np.float64)
+        """(N, 3) [m; world frame]"""
         self.velocity = np.zeros_like(self.position)
+        """(N, 3) [m/s; world frame]"""
         self.yaw = yaw.astype(np.float64)
-        self.tilt = np.zeros((len(yaw), 2))
+        """(N,) [rad; world frame]"""
+        self.tilt = np.zeros((len(self.yaw), 2))
+        """(N, 2): pitch and roll [rad]."""
         self._max_tilt = np.radians([[each.max_tilt_deg] for each in limits])
         self._tilts = bool(self._max_tilt.any())
-        self._max_change = np.array(
-            [[each.max_accel_mps2 if each.kind == "accelerating" else np.inf] for each in limits]
-        )
-        self._forward = [row for row, each in enumerate(limits) if each.kind == "forward"]
-        self._accelerates = bool(np.isfinite(self._max_change).any())
+        self._max_accel = np.array([[_max_accel_mps2(each)] for each in limits])
+        self._accelerates = bool(np.isfinite(self._max_accel).any())
+        self._forward = [row for row, each in enumerate(limits) if _flies_forward(each)]
         self._max_speed = [each.max_speed_mps for each in limits]
         self._max_climb = [each.max_climb_mps for each in limits]
         self._max_yaw_rate = np.radians([each.max_yaw_rate_dps for each in limits])
@@ -60,13 +68,13 @@ class Fleet:
     def integrate(self, velocity: Floats, yaw: Floats, tilt: Floats, dt: float) -> None:
         """Fly for ``dt`` [s] at velocities (N, 3) [m/s], towards yaws (N,) and tilts (N, 2) [rad].
 
-        The velocities are within the vehicles' limits.
+        The velocities must be within the vehicles' limits of speed and climb.
         """
         velocity = velocity.copy()
         for row in self._forward:
-            velocity[row] = self._along(row, velocity[row])
+            velocity[row] = self._along_heading(row, velocity[row])
         if self._accelerates:
-            velocity = self._changed(velocity, dt)
+            velocity = self._accelerated(velocity, dt)
         self.velocity = velocity
         self.position = self.position + velocity * dt
         reach = self._max_yaw_rate * dt
@@ -76,7 +84,7 @@ class Fleet:
             self._tilt_towards(tilt, reach[:, None])
 
     def within_limits(self, row: int, velocity: Vector) -> Vector:
-        """Return a velocity [m/s] as a vehicle flies it: scaled down as a whole, beyond a limit."""
+        """Return a velocity [m/s] scaled down to a vehicle's limits of speed and climb."""
         x, y, z = velocity
         max_speed, max_climb = self._max_speed[row], self._max_climb[row]
         square = x * x + y * y + z * z
@@ -85,26 +93,45 @@ class Fleet:
         scale = min(1.0, max_speed / sqrt(square), max_climb / max(abs(z), 1e-12))
         return x * scale, y * scale, z * scale
 
-    def _along(self, row: int, velocity: Floats) -> Vector:
-        """Return what of a velocity [m/s] a vehicle flies that moves only where it points."""
+    def _along_heading(self, row: int, velocity: Floats) -> Vector:
+        """Return the part of a velocity [m/s] that a vehicle flies which only moves forward."""
         x, y, z = velocity.tolist()
         yaw = float(self.yaw[row])
         c, s = (0.0, 0.0) if isnan(yaw) else (cos(yaw), sin(yaw))
         forward = max(0.0, c * x + s * y)
         return c * forward, s * forward, z
 
-    def _changed(self, velocity: Floats, dt: float) -> Floats:
-        """Return velocities [m/s] after ``dt`` on the straight way to those asked for."""
+    def _accelerated(self, velocity: Floats, dt: float) -> Floats:
+        """Return the velocities [m/s] reached after ``dt`` [s] towards those commanded."""
         change = velocity - self.velocity
         size = np.sqrt(
             change[:, :1] * change[:, :1]
             + change[:, 1:2] * change[:, 1:2]
             + change[:, 2:] * change[:, 2:]
         )
-        share = np.minimum(1.0, self._max_change * dt / np.maximum(size, 1e-12))
-        # A share of one would bring rounding to vehicles that take up any velocity at once.
+        share = np.minimum(1.0, self._max_accel * dt / np.maximum(size, 1e-12))
+        # A share of 1 would add rounding errors to vehicles that reach any velocity at once.
         return np.where(share < 1.0, self.velocity + share * change, velocity)
 
     def _tilt_towards(self, tilt: Floats, reach: Floats) -> None:
         tilt = np.minimum(np.maximum(tilt, -self._max_tilt), self._max_tilt)
         self.tilt = self.tilt + np.minimum(np.maximum(tilt - self.tilt, -reach), reach)
+
+
+def _max_accel_mps2(vehicle: Vehicle) -> float:
+    match vehicle.kind:
+        case "accelerating":
+            return vehicle.max_accel_mps2
+        case "kinematic" | "forward":
+            return np.inf
+    assert_never(vehicle.kind)
+
+
+def _flies_forward(vehicle: Vehicle) -> bool:
+    """Return whether a vehicle moves only where it points."""
+    match vehicle.kind:
+        case "forward":
+            return True
+        case "kinematic" | "accelerating":
+            return False
+    assert_never(vehicle.kind)

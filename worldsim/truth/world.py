@@ -1,6 +1,6 @@
-"""The world: commands in, vehicles fly, observations out.
+"""The world: takes commands, moves vehicles, and gives observations.
 
-A pure state machine over slots; ``slot`` counts them, ``time_s`` is slot / slot_hz, never a sum.
+A pure state machine over slots. ``slot`` counts them; ``time_s`` is slot / slot_hz, never a sum.
 """
 
 from collections.abc import Sequence
@@ -12,19 +12,18 @@ from numpy.typing import NDArray
 
 from agent.config import Vehicle
 from agent.messages import Command, Observation, Scan, Vector
-from worldsim.truth.proximity_sensor import ProximitySensor, Sensed
-from worldsim.truth.scanning_sensors import Scans
+from worldsim.truth.proximity_sensor import NO_READING, ProximitySensor
+from worldsim.truth.scanning_sensors import ScanningSensors
 from worldsim.truth.sensor_faults import SensorFaults
-from worldsim.truth.vehicle import Fleet, Floats
-
-NOTHING = Sensed(())
+from worldsim.truth.vehicle import Poses, Vehicles
 
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """How simulated time is cut: ``slots_per_tick`` slots to a tick, ``tick_hz`` ticks a second."""
+    """How simulated time is divided into ticks and slots."""
 
     tick_hz: float
+    """Ticks per second."""
     slots_per_tick: int
 
     @property
@@ -37,43 +36,46 @@ class Clock:
         return slot / self.slot_hz
 
     def steps(self, agent: int, slot: int) -> bool:
-        """Whether an agent steps in a slot: agents take turns, so they are asynchronous."""
+        """Return whether an agent steps in a slot; agents step in turn and so are asynchronous."""
         return slot % self.slots_per_tick == agent % self.slots_per_tick
 
 
 class World:
-    """Vehicles under commands.
-
-    limits: each agent's vehicle. command_ticks: for how many ticks a command may be valid at most.
-    """
+    """Vehicles that fly as they are commanded."""
 
     def __init__(
         self,
         *,
         clock: Clock,
         limits: Sequence[Vehicle],
-        position: Floats,
-        yaw: Floats,
-        sensor: ProximitySensor,
-        scans: Scans,
+        start: Poses,
+        proximity: ProximitySensor,
+        scanning: ScanningSensors,
         command_ticks: int,
     ) -> None:
+        """Start at slot 0.
+
+        limits, start: of each agent's vehicle. command_ticks: longest validity of a command.
+        """
+        rows = len(start.yaw)
         self.clock = clock
         self.slot = 0
-        self.fleet = Fleet(position, yaw, limits)
-        self.latest: list[Command | None] = [None] * len(yaw)
+        self.vehicles = Vehicles(start.position, start.yaw, limits)
+        self.latest: list[Command | None] = [None] * rows
+        """The last accepted command of each agent."""
         self.discarded = 0
-        self._senses = ["proximity" in each.sensors for each in limits]
-        self._sensor = sensor
-        self._scanning = scans
-        self.failures = SensorFaults(sensor.seed)
-        self._longest = command_ticks * clock.slots_per_tick
-        self._expires = np.zeros(len(yaw), dtype=np.int64)
-        # A row each: velocity, yaw, pitch and roll, so that a command is one assignment.
-        self._commanded = np.zeros((len(yaw), 6))
+        """Number of commands that were not accepted."""
+        self.sensor_faults = SensorFaults(proximity.seed)
+        self._has_proximity = ["proximity" in each.sensors for each in limits]
+        self._proximity = proximity
+        self._scanning = scanning
+        self._max_validity = command_ticks * clock.slots_per_tick
+        self._expires = np.zeros(rows, dtype=np.int64)
+        # One row for velocity, yaw, pitch and roll, so that a command is one assignment.
+        self._commanded = np.zeros((rows, 6))
         self._velocity, self._tilt = self._commanded[:, :3], self._commanded[:, 4:]
         self._yaw = self._commanded[:, 3]
-        self._yaw[:] = self.fleet.yaw
+        self._yaw[:] = self.vehicles.yaw
 
     @property
     def time_s(self) -> float:
@@ -82,36 +84,37 @@ class World:
 
     def positions(self) -> tuple[Vector | None, ...]:
         """Return true positions, row i = agent i [m; world frame], None where there is none."""
-        return tuple([None if isnan(x) else (x, y, z) for x, y, z in self.fleet.position.tolist()])
+        rows = self.vehicles.position.tolist()
+        return tuple([None if isnan(x) else (x, y, z) for x, y, z in rows])
 
     def enter(self, agent: int, position: Vector, yaw: float) -> None:
         """Put an agent's vehicle into the world [m; world frame, rad]; it hovers."""
-        self.fleet.place(agent, position, yaw)
+        self.vehicles.place(agent, position, yaw)
         self._halt(agent)
 
     def leave(self, agent: int) -> None:
         """Take an agent's vehicle out of the world."""
-        self.fleet.remove(agent)
+        self.vehicles.remove(agent)
         self._halt(agent)
 
-    def observe(self, looking: list[int]) -> list[Observation]:
-        """Return the present slot's observations of these agents, in their order."""
-        read = self._sensor.read(self.fleet.position, looking, self.slot, self.time_s)
-        sensed = [
-            each if self._senses[agent] else NOTHING
-            for agent, each in zip(looking, read, strict=True)
+    def observe(self, agents: list[int]) -> list[Observation]:
+        """Return the present slot's observations of some agents, in their order."""
+        read = self._proximity.read(self.vehicles.position, agents, self.slot, self.time_s)
+        readings = [
+            each if self._has_proximity[agent] else NO_READING
+            for agent, each in zip(agents, read, strict=True)
         ]
-        scans = self._scans(looking)
-        if self.failures:
-            sensed = [
-                self.failures.sensed(agent, each, self.slot)
-                for agent, each in zip(looking, sensed, strict=True)
+        scans = self._scans(agents)
+        if self.sensor_faults:
+            readings = [
+                self.sensor_faults.reading(agent, each, self.slot)
+                for agent, each in zip(agents, readings, strict=True)
             ]
-            scans = {a: self.failures.scans(a, each, self.slot) for a, each in scans.items()}
+            scans = {a: self.sensor_faults.scans(a, each, self.slot) for a, each in scans.items()}
         slot, time_s = self.slot, self.time_s
-        position = self.fleet.position.take(looking, axis=0).tolist()
-        velocity = self.fleet.velocity.take(looking, axis=0).tolist()
-        yaw = self.fleet.yaw.take(looking).tolist()
+        position = self.vehicles.position.take(agents, axis=0).tolist()
+        velocity = self.vehicles.velocity.take(agents, axis=0).tolist()
+        yaw = self.vehicles.yaw.take(agents).tolist()
         return [
             Observation(
                 slot,
@@ -125,23 +128,23 @@ class World:
                 scans.get(agent, ()),
             )
             for agent, (x, y, z), (u, v, w), heading, each in zip(
-                looking, position, velocity, yaw, sensed, strict=True
+                agents, position, velocity, yaw, readings, strict=True
             )
         ]
 
-    def _scans(self, looking: list[int]) -> dict[int, tuple[Scan, ...]]:
-        """Return what was scanned in the present slot, by agent."""
+    def _scans(self, agents: list[int]) -> dict[int, tuple[Scan, ...]]:
+        """Return the scans of the present slot, by agent."""
         if not self._scanning.any:
             return {}
         tick = self.slot // self.clock.slots_per_tick
-        fleet = self.fleet
-        return self._scanning.read(fleet.position, fleet.yaw, looking, tick, self.slot, self.time_s)
+        position, yaw = self.vehicles.position, self.vehicles.yaw
+        return self._scanning.read(position, yaw, agents, tick, self.slot, self.time_s)
 
-    def obey(self, agent: int, command: Command) -> bool:
-        """Take a command, or discard and count it: too old, not newer than the last, or ahead.
+    def accept(self, agent: int, command: Command) -> bool:
+        """Take a command, or discard and count it, and return whether it was taken.
 
-        A process that was stopped for a while answers old observations when it goes on; what it
-        says then must move nothing.
+        A command is discarded when it is older than a tick, not newer than the agent's last, or
+        ahead of the slot: a process that was paused answers old observations when it goes on.
         """
         last = self.latest[agent]
         stale = not self.slot - self.clock.slots_per_tick <= command.slot <= self.slot
@@ -152,8 +155,8 @@ class World:
             self.discarded += 1
             return False
         self.latest[agent] = command
-        self._expires[agent] = min(command.expires_slot, command.slot + self._longest)
-        velocity = self.fleet.within_limits(agent, command.velocity)
+        self._expires[agent] = min(command.expires_slot, command.slot + self._max_validity)
+        velocity = self.vehicles.within_limits(agent, command.velocity)
         self._commanded[agent] = (*velocity, command.yaw, *command.tilt)
         return True
 
@@ -162,15 +165,15 @@ class World:
         expired = self._expires <= self.slot
         if np.count_nonzero(expired):
             self._hover(expired)
-        self.fleet.integrate(self._velocity, self._yaw, self._tilt, 1.0 / self.clock.slot_hz)
+        self.vehicles.integrate(self._velocity, self._yaw, self._tilt, 1.0 / self.clock.slot_hz)
         self.slot += 1
 
     def _halt(self, agent: int) -> None:
         self._expires[agent] = 0
         self._velocity[agent] = self._tilt[agent] = 0.0
-        self._yaw[agent] = self.fleet.yaw[agent]
+        self._yaw[agent] = self.vehicles.yaw[agent]
 
     def _hover(self, rows: NDArray[np.bool_]) -> None:
         self._velocity[rows] = 0.0
-        self._yaw[rows] = self.fleet.yaw[rows]
-        self._tilt[rows] = self.fleet.tilt[rows]
+        self._yaw[rows] = self.vehicles.yaw[rows]
+        self._tilt[rows] = self.vehicles.tilt[rows]
