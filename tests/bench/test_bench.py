@@ -1,4 +1,4 @@
-"""The benchmark: every row is measured, the best of repeats counts, and a goal is a goal."""
+"""The benchmark: every row is measured, the best repeat counts, and goals are bounds."""
 
 import json
 
@@ -14,7 +14,7 @@ from worldsim.commands.app import command
 
 @pytest.fixture
 def quick(monkeypatch):
-    """Two measures that take no time: each repeat yields the next of its numbers."""
+    """Two measures that take no time: each repeat returns the next number."""
     slower, faster = iter([3.0, 1.0, 2.0]), iter([30.0, 60.0, 40.0])
     rows = (
         ("less", "us", 2.0, False, lambda: next(slower)),
@@ -48,7 +48,7 @@ def test_fleets_start_at_one_density():
         assert agents / (x * y * z) == pytest.approx(9 / 75, rel=0.05)
 
 
-def test_the_command_tells_each_row_and_overwrites_nothing(quick, capsys, tmp_path):
+def test_the_command_prints_each_row_and_overwrites_nothing(quick, capsys, tmp_path):
     file = tmp_path / "speed.json"
     assert command(["bench", "--repeats", "3", "--json", str(file)]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -1,1 +1,1 @@
-"""What things cost in CPU time: the figures behind `qswarm bench`."""
+"""Measures CPU time: the figures behind `qswarm bench`."""

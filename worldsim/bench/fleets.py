@@ -1,4 +1,4 @@
-"""Fleets as a benchmark flies them: wedges of any size at one density, in virtual time."""
+"""Fleets for the benchmark: wedges of any size at one density, flown in virtual time."""
 
 from math import ceil
 from time import process_time
@@ -12,14 +12,15 @@ from worldsim.scenario.tables import Fleet, Scenario
 
 EDGES = ((-1.0, 1.0, 1.0), (-1.0, -1.0, 1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, -1.0))
 BOX_M = (5.0, 5.0, 3.0)
+"""Start box of BOX_AGENTS agents; larger fleets start at the same density."""
 BOX_AGENTS = 9
 RANGE_M = 6.0
-IN_RANGE_M = 2.5
-"""A range in which an agent of a large fleet hears about eight others."""
+EIGHT_IN_RANGE_M = 2.5
+"""Radio range within which an agent of a large fleet hears about eight others."""
 
 
 def wedge(agents: int, duration_s: float, range_m: float = RANGE_M) -> Scenario:
-    """Return a wedge of so many agents that start as densely as nine in 5 x 5 x 3 m do."""
+    """Return a wedge of ``agents`` that start at the density of nine in 5 x 5 x 3 m."""
     queues = tuple(QueueSpec(f"Q{i}", ("V1",), Ray(edge)) for i, edge in enumerate(EDGES))
     scale = (agents / BOX_AGENTS) ** (1.0 / 3.0)
     x, y, z = (ceil(10.0 * side * scale) / 10.0 for side in BOX_M)
@@ -32,10 +33,10 @@ def wedge(agents: int, duration_s: float, range_m: float = RANGE_M) -> Scenario:
     )
 
 
-def flown_cpu_s(scenario: Scenario) -> float:
-    """Fly a scenario without a recording; return what its flight took of the CPU [s]."""
+def flight_cpu_s(scenario: Scenario) -> float:
+    """Fly a scenario without a recording; return the CPU time of the flight [s]."""
     fleet = VirtualFleet(scenario)
-    begun_s = process_time()
+    started_s = process_time()
     for _ in range(scenario.slots):
         fleet.slot()
-    return process_time() - begun_s
+    return process_time() - started_s

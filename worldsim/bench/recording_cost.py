@@ -1,4 +1,4 @@
-"""What a recording costs: ticks of a large fleet of which every vehicle moves at every tick."""
+"""The cost of a recording, for a large fleet whose vehicles all move at every tick."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,58 +8,60 @@ from time import process_time
 import numpy as np
 
 from agent.comms.hierarchy import MEMBER, SUB_VERTEX, VERTEX
-from worldsim.bench.fleets import IN_RANGE_M, wedge
+from worldsim.bench.fleets import EIGHT_IN_RANGE_M, wedge
 from worldsim.judge.run_events import SlotChanged
 from worldsim.judge.tick import Standings, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording.recorder import RunRecorder
 from worldsim.scenario.tables import Scenario
 
-SECONDS = 20
+DURATION_S = 20
 LATTICE_M = 1.75
+"""Spacing of the slots on a cubic lattice."""
 SWAY_M = 0.5
+"""Amplitude of the vehicles about their slots."""
 QUEUES = 4
 UNSETTLED = 5
-"""One in so many changes its place and its tier each second, as while a fleet gathers."""
+"""One agent in this many changes its slot and tier each second, as while a fleet gathers."""
 ROLES = (VERTEX, SUB_VERTEX, MEMBER)
 
 
 def recording_us(agents: int) -> float:
-    """Return what recording one tick takes of the CPU, in all threads [us]."""
+    """Return the CPU time for recording one tick, over all threads [us]."""
     return _recorded(agents)[0]
 
 
 def recording_mb(agents: int) -> float:
-    """Return how large the recording of a minute is [MB]."""
+    """Return the size of a recording of one minute [MB]."""
     return _recorded(agents)[1]
 
 
 def _recorded(agents: int) -> tuple[float, float]:
-    scenario = wedge(agents, SECONDS, IN_RANGE_M)
+    scenario = wedge(agents, DURATION_S, EIGHT_IN_RANGE_M)
     rows = list(_flight(scenario))
     with TemporaryDirectory() as folder:
         path = Path(folder) / "run.rrd"
         recorder = RunRecorder(path, scenario, "bench", mode="virtual")
-        begun_s = process_time()
+        started_s = process_time()
         for tick, figures in rows:
             recorder.event(SlotChanged(t_s=tick.time_s, agent=0, place=(0, 1), before=None))
             recorder.tick(tick, figures)
         recorder.close()
-        spent_s = process_time() - begun_s
-        return 1e6 * spent_s / len(rows), path.stat().st_size * 60 / SECONDS / 1e6
+        spent_s = process_time() - started_s
+        return 1e6 * spent_s / len(rows), path.stat().st_size * 60 / DURATION_S / 1e6
 
 
 def _flight(scenario: Scenario) -> Iterator[tuple[Tick, Figures]]:
-    """Yield ticks of agents that sway about their slots and hear about eight others.
+    """Yield ticks of agents that sway about fixed slots and hear about eight others.
 
-    Slots rest; nothing else does, and no figure is a round number: little can be packed away.
+    All other values change at every tick and are no round numbers, so they compress badly.
     """
     agents, tick_hz = scenario.fleet.agents, scenario.fleet.tick_hz
     generator = np.random.default_rng(scenario.seed)
     side = round(agents ** (1.0 / 3.0) + 0.49)
     lattice = LATTICE_M * np.stack(np.unravel_index(np.arange(agents), (side,) * 3), axis=1)
     phase = generator.uniform(0.0, 2.0 * np.pi, (agents, 3))
-    for index in range(round(SECONDS * tick_hz)):
+    for index in range(round(DURATION_S * tick_hz)):
         time_s = index / tick_hz
         position = (lattice + SWAY_M * np.sin(time_s + phase)).astype(np.float32)
         error = generator.uniform(0.0, 2.0, (4, agents))
@@ -74,7 +76,7 @@ def _flight(scenario: Scenario) -> Iterator[tuple[Tick, Figures]]:
             force=error[2].astype(np.float32),
             turn_deg=error[3].astype(np.float32),
             alive=np.ones(agents, dtype=np.bool_),
-            links=_heard(position),
+            links=_links(position),
             mission=np.zeros(agents, dtype=np.int64),
             packets={"sent": agents * index, "delivered": 8 * agents * index},
             standings=_standings(agents, changed),
@@ -82,9 +84,9 @@ def _flight(scenario: Scenario) -> Iterator[tuple[Tick, Figures]]:
         yield tick, Figures(error[0], error[1], False, queue_residual=error[0, :QUEUES])
 
 
-def _heard(position: np.ndarray) -> np.ndarray:
+def _links(position: np.ndarray) -> np.ndarray:
     away = np.linalg.norm(position[:, None] - position[None, :], axis=2)
-    return np.argwhere((away < IN_RANGE_M) & (away > 0.0)).astype(np.int32)
+    return np.argwhere((away < EIGHT_IN_RANGE_M) & (away > 0.0)).astype(np.int32)
 
 
 def _places(agents: int, shift: int) -> np.ndarray:

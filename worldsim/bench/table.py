@@ -1,10 +1,10 @@
-"""The benchmark's rows: what is measured, in which unit, and the goal it is held against."""
+"""The benchmark's rows: what is measured, its unit and its goal."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from netem.link_keys import Conditions
-from worldsim.bench.fleets import IN_RANGE_M, flown_cpu_s, wedge
+from worldsim.bench.fleets import EIGHT_IN_RANGE_M, flight_cpu_s, wedge
 from worldsim.bench.part_costs import control_step_us, frame_us
 from worldsim.bench.recording_cost import recording_mb, recording_us
 
@@ -14,16 +14,15 @@ WEDGE_S = 20.0
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One figure: the best of some repeats, since a busy host only ever adds.
-
-    more: whether more is better, so that the goal is a least value.
-    """
+    """One figure, the best of some repeats: a busy host can only make it worse."""
 
     name: str
     unit: str
+    """Of goal and measured."""
     goal: float
     measured: float
     more: bool
+    """Whether a greater value is better; then the goal is the least value."""
 
     @property
     def reached(self) -> bool:
@@ -31,13 +30,13 @@ class Row:
         return self.measured >= self.goal if self.more else self.measured <= self.goal
 
 
-def _real_time() -> float:
-    return WEDGE_S / flown_cpu_s(wedge(9, WEDGE_S))
+def _real_time_factor() -> float:
+    return WEDGE_S / flight_cpu_s(wedge(9, WEDGE_S))
 
 
-def _steps(agents: int, duration_s: float) -> Callable[[], float]:
-    scenario = wedge(agents, duration_s, IN_RANGE_M)
-    return lambda: agents * TICK_HZ * duration_s / flown_cpu_s(scenario)
+def _steps_per_cpu_s(agents: int, duration_s: float) -> Callable[[], float]:
+    scenario = wedge(agents, duration_s, EIGHT_IN_RANGE_M)
+    return lambda: agents * TICK_HZ * duration_s / flight_cpu_s(scenario)
 
 
 MEASURES: tuple[tuple[str, str, float, bool, Callable[[], float]], ...] = (
@@ -51,16 +50,16 @@ MEASURES: tuple[tuple[str, str, float, bool, Callable[[], float]], ...] = (
         False,
         lambda: frame_us(100, Conditions(loss_percent=20.0, delay_ms=20.0, jitter_ms=5.0)),
     ),
-    ("virtual time, N = 9, one core", "x real time", 50.0, True, _real_time),
-    ("virtual time, N = 10", "agent-steps/CPU s", 10_000.0, True, _steps(10, 10.0)),
-    ("virtual time, N = 100", "agent-steps/CPU s", 20_000.0, True, _steps(100, 2.0)),
+    ("virtual time, N = 9, one core", "x real time", 50.0, True, _real_time_factor),
+    ("virtual time, N = 10", "agent-steps/CPU s", 10_000.0, True, _steps_per_cpu_s(10, 10.0)),
+    ("virtual time, N = 100", "agent-steps/CPU s", 20_000.0, True, _steps_per_cpu_s(100, 2.0)),
     ("recording, a tick, N = 200", "us", 500.0, False, lambda: recording_us(200)),
     ("recording, N = 200", "MB a minute", 25.0, False, lambda: recording_mb(200)),
 )
 
 
 def measured(repeats: int) -> Iterator[Row]:
-    """Yield each row as soon as it is measured."""
+    """Measure each row ``repeats`` times; yield it with its best figure."""
     for name, unit, goal, more, measure in MEASURES:
         found = [measure() for _ in range(repeats)]
         yield Row(name, unit, goal, max(found) if more else min(found), more)
