@@ -11,21 +11,21 @@ from agent.messages import Observation
 from agent.stepping import Controls
 from netem.wire.bus import Bus
 from netem.wire.frame import BATCH_RING, Delivery, WireError, pack, unpack_delivery
-from netem.wire.latency import Tally
+from netem.wire.latency import LatencyHistogram
 
 
 class FreeRunningAgent:
     """Free-running: nobody is waited for, and how late each frame comes is counted."""
 
     def __init__(self, bus: Bus, setup: AgentSetup) -> None:
-        command, radio = bus.putter("command", setup.id), bus.putter("tx", setup.id)
+        command, radio = bus.publisher("command", setup.id), bus.publisher("tx", setup.id)
         self._controls = Controls(setup, command, radio)
-        self._batches = bus.ring("rx", setup.id, BATCH_RING)
+        self._batches = bus.subscriber("rx", setup.id, BATCH_RING)
         self._early: deque[Delivery] = deque(maxlen=BATCH_RING)
         self._incarnation = setup.incarnation
         self._slots_a_report = round(setup.slots_per_tick * setup.tick_hz)
-        self._tally = Tally(1.0 / (setup.slots_per_tick * setup.tick_hz))
-        self._tell = bus.putter("arrivals", setup.id)
+        self._tally = LatencyHistogram(1.0 / (setup.slots_per_tick * setup.tick_hz))
+        self._tell = bus.publisher("arrivals", setup.id)
         self._report_at = self._slots_a_report + setup.id % self._slots_a_report
 
     def see(self, data: bytes) -> None:
@@ -43,7 +43,7 @@ class FreeRunningAgent:
 
     def report(self) -> None:
         """Tell the world how late the frames came so far."""
-        self._tell(pack(self._tally.told(self._incarnation)))
+        self._tell(pack(self._tally.report(self._incarnation)))
 
     def _hear(self, observation: Observation) -> None:
         """Take what has come by an observation; what is of a later slot waits for it.
@@ -57,5 +57,5 @@ class FreeRunningAgent:
                 self._controls.core.rejected["batch"] += 1
         while self._early and self._early[0].slot <= observation.slot:
             batch = self._early.popleft()
-            self._tally.note(batch.frames, batch.early_us, observation.slot - batch.slot)
+            self._tally.add(batch.frames, batch.early_us, observation.slot - batch.slot)
             self._controls.hear(batch, observation.time_s)

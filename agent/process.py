@@ -15,11 +15,11 @@ from agent.controller import ControllerError
 from agent.free_running import FreeRunningAgent
 from agent.lockstep import LockstepAgent
 from netem.wire.access import AccessError, login_of
-from netem.wire.barrier import LockstepError, UnwantedError
-from netem.wire.bus import Bus, RefusedError, Ring
+from netem.wire.barrier import LockstepError, RunOverError
+from netem.wire.bus import Bus, RefusedError, Subscriber
 from netem.wire.keys import Keys, agent_name
 from netem.wire.session import SessionError, open_client
-from netem.wire.shutdown import Ending, Stop
+from netem.wire.shutdown import RunEnd, StopRequest
 
 WAIT_S = 0.2
 SILENCE_S = 30.0
@@ -66,8 +66,8 @@ def fly(
     of turn.
     """
     login = login_of(users, agent_name(agent)) if users is not None else None
-    with open_client(connect, patient=patient, login=login) as session:
-        stop = Stop()
+    with open_client(connect, long_lease=patient, login=login) as session:
+        stop = StopRequest()
         bus = Bus(session, keys)
         setup = _setup(bus, agent, keys.run, stop)
         if setup is not None:
@@ -75,12 +75,12 @@ def fly(
     return 0
 
 
-def _setup(bus: Bus, agent: int, run: str, stop: Stop) -> AgentSetup | None:
+def _setup(bus: Bus, agent: int, run: str, stop: StopRequest) -> AgentSetup | None:
     """Ask the world for this agent's setup until it answers; None when asked to stop."""
     deadline = time.monotonic() + SETUP_WITHIN_S
     say_once = _once(f"agent-{agent} waits for the world of run {run!r}")
-    while not stop.asked:
-        answer = bus.ask("setup", agent, b"", timeout_s=2.0)
+    while not stop.requested:
+        answer = bus.query("setup", agent, b"", timeout_s=2.0)
         if answer is not None:
             return _checked(answer)
         if time.monotonic() > deadline:
@@ -99,31 +99,34 @@ def _checked(answer: bytes) -> AgentSetup:
         raise GoneError(f"the world sent a setup that cannot be read: {error}") from error
 
 
-def _fly(bus: Bus, setup: AgentSetup, run: str, stop: Stop) -> None:
-    observations, ending = bus.ring("observation", setup.id), Ending(bus.ring("over"), stop)
+def _fly(bus: Bus, setup: AgentSetup, run: str, stop: StopRequest) -> None:
+    observations, ending = (
+        bus.subscriber("observation", setup.id),
+        RunEnd(bus.subscriber("over"), stop),
+    )
     shell = LockstepAgent(bus, setup, ending) if setup.lockstep else FreeRunningAgent(bus, setup)
     _wait_for_ears(bus, ending)
-    bus.show_life(f"agent-{setup.id}")
+    bus.declare_alive(f"agent-{setup.id}")
     print(f"agent-{setup.id} flies in run {run!r}", flush=True)
     try:
         _steer(shell, observations, run, ending)
         shell.report()
-    except UnwantedError:
+    except RunOverError:
         print(f"agent-{setup.id}: the run is over, within a slot", flush=True)
     print(f"agent-{setup.id} is done", flush=True)
 
 
-def _wait_for_ears(bus: Bus, ending: Ending) -> None:
+def _wait_for_ears(bus: Bus, ending: RunEnd) -> None:
     """In lockstep, wait until somebody listens to what this agent says."""
     deadline = time.monotonic() + SETUP_WITHIN_S
-    while not bus.heard and not ending():
+    while not bus.matched and not ending():
         if time.monotonic() > deadline:
             raise GoneError(f"nobody listens within {SETUP_WITHIN_S:g} s")
         time.sleep(LISTEN_EVERY_S)
 
 
 def _steer(
-    shell: FreeRunningAgent | LockstepAgent, observations: Ring, run: str, ending: Ending
+    shell: FreeRunningAgent | LockstepAgent, observations: Subscriber, run: str, ending: RunEnd
 ) -> None:
     """Step on each observation until the run is over.
 

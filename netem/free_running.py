@@ -112,11 +112,11 @@ class FreeRunningMedium:
         self._intake = Intake(setup)
         self._lateness = Lateness(setup.speed)
         agents = range(setup.agents)
-        self._senders = bus.rings("tx", agents)
-        self._receivers = [bus.putter("rx", agent) for agent in agents]
-        self._orders = bus.ring("orders", size=ORDERS_RING)
+        self._senders = bus.fair_subscriber("tx", agents)
+        self._receivers = [bus.publisher("rx", agent) for agent in agents]
+        self._orders = bus.subscriber("orders", size=ORDERS_RING)
         self._book = FaultQueue()
-        self._report = bus.putter("verdicts")
+        self._report = bus.publisher("verdicts")
         self._report_every = max(1, round(setup.slot_hz))
         self._slot = 0
 

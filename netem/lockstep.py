@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from netem.medium import Medium
 from netem.messages import Done, MediumSetup, Turn, unpack_turn
-from netem.wire.barrier import TURN_RING, LockstepError, answer, same_slot
+from netem.wire.barrier import LOCKSTEP_RING, LockstepError, await_message, check_slot
 from netem.wire.bus import Bus
 from netem.wire.frame import (
     BATCH_RING,
@@ -43,14 +43,14 @@ class LockstepMedium:
         self._medium = Medium(setup, setup.receivers)
         self._own = frozenset(agents if setup.receivers is None else setup.receivers)
         self._waiting = {agent: Waiting(0, deque(maxlen=BATCH_RING)) for agent in agents}
-        self._senders = [bus.ring("tx", agent, TURN_RING) for agent in agents]
-        self._receivers = [bus.putter("rx", agent, lockstep=True) for agent in agents]
-        self._done = bus.putter("done", shard, lockstep=True)
+        self._senders = [bus.subscriber("tx", agent, LOCKSTEP_RING) for agent in agents]
+        self._receivers = [bus.publisher("rx", agent, lockstep=True) for agent in agents]
+        self._done = bus.publisher("done", shard, lockstep=True)
 
     def hear(self, truths: list[bytes]) -> None:
         """Play the slots that the world opened.
 
-        Raises LockstepError when somebody does not answer, or out of turn; UnwantedError when the
+        Raises LockstepError when somebody does not answer, or out of turn; RunOverError when the
         run ends meanwhile.
         """
         for opened in truths:
@@ -77,7 +77,7 @@ class LockstepMedium:
             turn = unpack_turn(opened)
         except WireError as error:
             raise LockstepError(f"the world's truth: {error}") from error
-        same_slot("the world's truth", turn.truth.slot, self._slot)
+        check_slot("the world's truth", turn.truth.slot, self._slot)
         rows = {len(turn.truth.positions), len(turn.incarnations), self._setup.agents}
         if len(rows) > 1 or any(who >= self._setup.agents for who in turn.participants):
             raise LockstepError(f"the world's truth is not of {self._setup.agents} agents")
@@ -98,8 +98,8 @@ class LockstepMedium:
     def _transmit(self, sender: int, turn: Turn) -> None:
         slot = turn.truth.slot
         what = f"agent-{sender}'s transmission of slot {slot}"
-        transmission = _read(what, answer(self._senders[sender], what, self._unwanted))
-        same_slot(what, transmission.slot, slot)
+        transmission = _read(what, await_message(self._senders[sender], what, self._unwanted))
+        check_slot(what, transmission.slot, slot)
         if transmission.incarnation != turn.incarnations[sender]:
             raise LockstepError(f"{what} is of its incarnation {transmission.incarnation}")
         self._medium.transmit(sender, turn.truth.time_s, transmission)

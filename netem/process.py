@@ -13,12 +13,12 @@ from zenoh.handlers import RingChannel
 from netem.free_running import FreeRunningMedium
 from netem.lockstep import LockstepMedium
 from netem.messages import MAX_CONDITIONS_B, MediumSetup
-from netem.wire.access import AccessError, Guard
-from netem.wire.barrier import LockstepError, UnwantedError
-from netem.wire.bus import Bus, Ring, Waiting, drained, receive
+from netem.wire.access import AccessControl, AccessError
+from netem.wire.barrier import LockstepError, RunOverError
+from netem.wire.bus import Bus, Handler, Subscriber, drain, receive
 from netem.wire.keys import Keys, medium_name
 from netem.wire.session import SessionError, open_client, open_router
-from netem.wire.shutdown import Ending, Stop
+from netem.wire.shutdown import RunEnd, StopRequest
 
 WAIT_S = 0.2
 SILENCE_S = 30.0
@@ -40,7 +40,7 @@ class SetupServer:
         self.run: str | None = None
         self.setup: MediumSetup | None = None
         key = Keys.any_run("shard", shard) if shard else Keys.any_run("medium")
-        self._questions: Waiting[zenoh.Query] = session.declare_queryable(key, RingChannel(16))
+        self._questions: Handler[zenoh.Query] = session.declare_queryable(key, RingChannel(16))
 
     def wait(self, timeout_s: float) -> None:
         """Answer the next question that comes within ``timeout_s`` [s]."""
@@ -50,7 +50,7 @@ class SetupServer:
 
     def attend(self) -> None:
         """Answer the questions that are there."""
-        for query in drained(self._questions, 16):
+        for query in drain(self._questions, 16):
             self._answer(query)
 
     def _answer(self, query: zenoh.Query) -> None:
@@ -77,7 +77,9 @@ class SetupServer:
         return None
 
 
-def run(endpoint: str, shard: int = 0, patient: bool = False, guard: Guard | None = None) -> int:
+def run(
+    endpoint: str, shard: int = 0, patient: bool = False, guard: AccessControl | None = None
+) -> int:
     """Serve at an endpoint, and say in one line what stood in its way; return the exit status."""
     try:
         return serve(endpoint, shard, patient, guard)
@@ -86,7 +88,9 @@ def run(endpoint: str, shard: int = 0, patient: bool = False, guard: Guard | Non
         return 2 if isinstance(error, AccessError | SessionError) else 1
 
 
-def serve(endpoint: str, shard: int = 0, patient: bool = False, guard: Guard | None = None) -> int:
+def serve(
+    endpoint: str, shard: int = 0, patient: bool = False, guard: AccessControl | None = None
+) -> int:
     """Be the medium of the first run that asks; return 0 at its end.
 
     Shard 0 is the router at the endpoint, too; the others connect to it. patient: whether who is
@@ -95,39 +99,39 @@ def serve(endpoint: str, shard: int = 0, patient: bool = False, guard: Guard | N
     gone, LockstepError when somebody speaks out of turn.
     """
     with _opened(endpoint, shard, patient, guard) as session:
-        stop = Stop()
+        stop = StopRequest()
         at = "is connected to" if shard else "listens at"
         print(f"{medium_name(shard)} {at} {endpoint}, for one run", flush=True)
         server = SetupServer(session, shard)
-        while server.run is None and not stop.asked:
+        while server.run is None and not stop.requested:
             server.wait(WAIT_S)
         if server.run is not None and server.setup is not None:
             _serve_run(Bus(session, Keys(server.run)), server, server.setup, stop)
     return 0
 
 
-def _opened(endpoint: str, shard: int, patient: bool, guard: Guard | None) -> zenoh.Session:
+def _opened(endpoint: str, shard: int, patient: bool, guard: AccessControl | None) -> zenoh.Session:
     if not shard:
         return open_router(endpoint, patient, guard)
     login = guard.login(medium_name(shard)) if guard is not None else None
-    return open_client(endpoint, patient=patient, login=login)
+    return open_client(endpoint, long_lease=patient, login=login)
 
 
-def _serve_run(bus: Bus, server: SetupServer, setup: MediumSetup, stop: Stop) -> None:
+def _serve_run(bus: Bus, server: SetupServer, setup: MediumSetup, stop: StopRequest) -> None:
     name = medium_name(server.shard)
     print(
         f"{name} serves run {server.run!r} of {setup.agents} agents, seed {setup.seed}", flush=True
     )
-    truths, ending = bus.ring("truth", size=TRUTH_RING), Ending(bus.ring("over"), stop)
+    truths, ending = bus.subscriber("truth", size=TRUTH_RING), RunEnd(bus.subscriber("over"), stop)
     radio = (
         LockstepMedium(bus, setup, server.shard, ending)
         if setup.lockstep
         else FreeRunningMedium(bus, setup)
     )
-    bus.show_life(name)
+    bus.declare_alive(name)
     try:
         _play(radio, truths, server, ending)
-    except UnwantedError:
+    except RunOverError:
         print(f"{name}: the run is over, within a slot", flush=True)
     else:
         radio.report()
@@ -135,7 +139,10 @@ def _serve_run(bus: Bus, server: SetupServer, setup: MediumSetup, stop: Stop) ->
 
 
 def _play(
-    radio: LockstepMedium | FreeRunningMedium, truths: Ring, server: SetupServer, ending: Ending
+    radio: LockstepMedium | FreeRunningMedium,
+    truths: Subscriber,
+    server: SetupServer,
+    ending: RunEnd,
 ) -> None:
     """Play slots until the run is over; what came before its end is played still."""
     silent_s = 0.0

@@ -43,7 +43,7 @@ from netem.wire.frame import (
     unpack_inbox,
     unpack_transmission,
 )
-from netem.wire.latency import Tally, unpack_arrivals
+from netem.wire.latency import LatencyHistogram, unpack_report
 from worldsim.engine.virtual import VirtualFleet
 from worldsim.fleet.control import RequestError, _request
 from worldsim.scenario.file import load
@@ -135,8 +135,8 @@ def _targets(
     sent = Transmission(3, 0, tuple(Outgoing(*frame) for frame in frames))
     heard = tuple(Frame(1, 0, c, 5, data) for c, data in frames)
     batch = pack(Batch(3, heard))
-    tally = Tally(0.0125)
-    tally.note(heard, tuple(range(len(heard))), 0)
+    tally = LatencyHistogram(0.0125)
+    tally.add(heard, tuple(range(len(heard))), 0)
     turn = Turn(Truth(3, 0.0375, positions), (3, 7), (0,) * len(positions))
     done = Done(3, ((1, b"page"),), fleet.medium_counters)
     return [
@@ -147,7 +147,7 @@ def _targets(
         Target("transmission", unpack_transmission, [pack(sent)]),
         Target("batch", unpack_batch, [batch]),
         Target("delivery", unpack_delivery, [pack(Delivery(3, heard, tuple(range(len(heard)))))]),
-        Target("arrivals", unpack_arrivals, [pack(tally.told(0))]),
+        Target("arrivals", unpack_report, [pack(tally.report(0))]),
         Target("inbox", unpack_inbox, [pack(Inbox(3, (batch,)))]),
         Target("turn", unpack_turn, [pack(turn)]),
         Target("done", unpack_done, [pack(done)]),

@@ -1,1 +1,1 @@
-"""What crosses a wire: frames, keys and the session; imports nothing else of this project."""
+"""The wire: frames, keys, sessions and messaging. Imports nothing else of this project."""

@@ -1,7 +1,8 @@
-"""Who may put and hear what in a run: a password each, and nobody hears a radio but its own.
+"""Access control of a run: a password for each process, and rules for what it may put and get.
 
-The router lets each name do what is its own, and drops everything else without a word. On a host
-where everybody may read everybody's files that is a fence against mistakes, not against malice.
+An agent gets its own radio's messages only. The router drops everything that is not allowed,
+without an error. On a host where all users can read all files this protects against mistakes, not
+against attacks.
 """
 
 import os
@@ -12,14 +13,14 @@ from typing import Any, NamedTuple
 
 from netem.wire.frame import MAX_TRANSMISSION_B
 from netem.wire.keys import EVERY_KEY, Keys, agent_name
-from netem.wire.latency import MAX_ARRIVALS_B
+from netem.wire.latency import MAX_REPORT_B
 
 OPERATOR = "operator"
-MOST_B = {"tx": MAX_TRANSMISSION_B, "command": 4096, "arrivals": MAX_ARRIVALS_B}
-"""Of what an agent says, what is larger goes no further than the router."""
-HEARS = ("observation", "rx")
-"""Topics of which each agent has its own, and puts to the ones and gets the others."""
-ALL = [
+MAX_AGENT_PUT_B = {"tx": MAX_TRANSMISSION_B, "command": 4096, "arrivals": MAX_REPORT_B}
+"""Topics that agents put, and the longest message on each [B]; the router drops longer ones."""
+AGENT_GETS = ("observation", "rx")
+"""Topics with one key for each agent, which only that agent gets."""
+ALL_MESSAGES = [
     *("put", "delete", "declare_subscriber", "query", "reply", "declare_queryable"),
     *("liveliness_token", "liveliness_query", "declare_liveliness_subscriber"),
 ]
@@ -30,65 +31,68 @@ Rule = dict[str, Any]
 
 
 class AccessError(RuntimeError):
-    """A file of passwords that cannot be used; the text says why in one line."""
+    """A file of passwords cannot be used; the text says why in one line."""
 
 
 class Login(NamedTuple):
-    """A name and its password."""
+    """A user's name and password."""
 
     user: str
     password: str
 
 
-class Guard(NamedTuple):
-    """What a router goes by: the file of passwords, the run, and how many agents it has."""
+class AccessControl(NamedTuple):
+    """What a router needs for the access control of one run."""
 
     users: Path
+    """The file of passwords."""
     run: str
     agents: int
+    """Number of agents in the run."""
 
     def login(self, user: str) -> Login:
         """Return a user's login. Raises AccessError where the file has none."""
         return login_of(self.users, user)
 
     def config(self) -> dict[str, Any]:
-        """Return Zenoh's access control: what is not allowed is denied."""
+        """Return Zenoh's access control, which denies what no rule allows."""
         keys = Keys(self.run)
         agents = [agent_name(agent) for agent in range(self.agents)]
-        asking = [user for user in _passwords(self.users) if user == OPERATOR]
+        operators = [user for user in _passwords(self.users) if user == OPERATOR]
         others = [user for user in _passwords(self.users) if user not in (*agents, OPERATOR)]
-        rules = [_rule("everything", [EVERY_KEY], ALL, BOTH)]
+        rules = [_rule("everything", [EVERY_KEY], ALL_MESSAGES, BOTH)]
         policies = [{"rules": ["everything"], "subjects": others}] if others else []
-        allowed = {user: _asking(user, [keys.of("control")]) for user in asking}
-        allowed |= {name: _flying(name, keys, agent) for agent, name in enumerate(agents)}
+        allowed = {user: _query_rules(user, [keys.of("control")]) for user in operators}
+        allowed |= {name: _agent_rules(name, keys, agent) for agent, name in enumerate(agents)}
         for user, own in allowed.items():
             rules += own
             policies.append({"rules": [rule["id"] for rule in own], "subjects": [user]})
+        users = (*agents, *operators, *others)
         return {
             "enabled": True,
             "default_permission": "deny",
             "rules": rules,
-            "subjects": [{"id": user, "usernames": [user]} for user in (*agents, *asking, *others)],
+            "subjects": [{"id": user, "usernames": [user]} for user in users],
             "policies": policies,
         }
 
 
 def size_limits() -> list[Rule]:
-    """Return Zenoh's filters by size: how long a message on a topic of an agent's may be [B]."""
+    """Return Zenoh's filters by size for the topics that agents put."""
     return [
         {
             "id": f"size of {topic}",
             "flows": INGRESS,
             "messages": ["put"],
             "key_exprs": [Keys.any_run(topic, "*")],
-            "size_limit": most_b,
+            "size_limit": max_b,
         }
-        for topic, most_b in MOST_B.items()
+        for topic, max_b in MAX_AGENT_PUT_B.items()
     ]
 
 
 def write_users(path: Path, users: Iterable[str]) -> None:
-    """Write a new file of passwords, for its owner alone. Raises OSError."""
+    """Write a new file of passwords, readable by its owner alone. Raises OSError."""
     lines = [f"{user}:{secrets.token_urlsafe(16)}\n" for user in users]
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(descriptor, "w", encoding="ascii") as file:
@@ -111,25 +115,25 @@ def _passwords(path: Path) -> dict[str, str]:
     return {user: password for user, _, password in (line.partition(":") for line in lines)}
 
 
-def _flying(name: str, keys: Keys, agent: int) -> list[Rule]:
-    """Return what one agent may: say and hear what is its own, show its life, ask for its setup."""
-    said = [keys.of(topic, agent) for topic in MOST_B]
-    heard = [keys.of("over"), *(keys.of(topic, agent) for topic in HEARS)]
+def _agent_rules(name: str, keys: Keys, agent: int) -> list[Rule]:
+    """Return the rules of one agent: its own topics, its liveliness, and the query of its setup."""
+    puts = [keys.of(topic, agent) for topic in MAX_AGENT_PUT_B]
+    gets = [keys.of("over"), *(keys.of(topic, agent) for topic in AGENT_GETS)]
     return [
-        _rule(f"{name} says", said, ["put"], INGRESS),
-        _rule(f"{name} is heard", said, ["declare_subscriber"], EGRESS),
-        _rule(f"{name} listens", heard, ["declare_subscriber"], INGRESS),
-        _rule(f"{name} hears", heard, ["put"], EGRESS),
-        _rule(f"{name} lives", [keys.of("alive", name)], ["liveliness_token"], INGRESS),
-        *_asking(name, [keys.of("setup", agent)]),
+        _rule(f"{name} puts", puts, ["put"], INGRESS),
+        _rule(f"{name} has subscribers", puts, ["declare_subscriber"], EGRESS),
+        _rule(f"{name} subscribes", gets, ["declare_subscriber"], INGRESS),
+        _rule(f"{name} gets", gets, ["put"], EGRESS),
+        _rule(f"{name} is alive", [keys.of("alive", name)], ["liveliness_token"], INGRESS),
+        *_query_rules(name, [keys.of("setup", agent)]),
     ]
 
 
-def _asking(user: str, questions: list[str]) -> list[Rule]:
-    """Return what lets a user ask, and be answered."""
+def _query_rules(user: str, key_exprs: list[str]) -> list[Rule]:
+    """Return the rules that let a user send queries and get their replies."""
     return [
-        _rule(f"{user} asks", questions, ["query"], INGRESS),
-        _rule(f"{user} is answered", questions, ["reply", "declare_queryable"], EGRESS),
+        _rule(f"{user} queries", key_exprs, ["query"], INGRESS),
+        _rule(f"{user} gets replies", key_exprs, ["reply", "declare_queryable"], EGRESS),
     ]
 
 

@@ -1,47 +1,50 @@
-"""Taking turns: in lockstep nobody goes on before the others have answered.
+"""The lockstep barrier: no process goes on before the messages of its slot have arrived.
 
-Waits are counted, not timed: a host that stands still for a minute has not waited for a minute,
-and nobody waits for ever.
+Waiting is counted in polls, not measured by a clock: a host that stands still for a minute has not
+waited for a minute. Every wait has an end.
 """
 
 from collections.abc import Callable
 
-from netem.wire.bus import Ring
+from netem.wire.bus import Subscriber
 
-ANSWER_WITHIN_S = 20.0
-LOOK_EVERY_S = 0.2
-TURN_RING = 4
-"""Room for the messages of one key, of which a turn has one."""
+ANSWER_TIMEOUT_S = 20.0
+POLL_S = 0.2
+LOCKSTEP_RING = 4
+"""Ring size of a lockstep subscriber, which receives one message a slot."""
 
 
 class LockstepError(RuntimeError):
-    """Somebody did not answer, or answered for another slot; the text says who, and to what."""
+    """A message is missing or belongs to another slot; the text names it."""
 
 
-class UnwantedError(Exception):
-    """The run is over while an answer is waited for."""
+class RunOverError(Exception):
+    """The run has ended during a wait."""
 
 
-def answer(
-    ring: Ring, what: str, unwanted: Callable[[], bool], within_s: float = ANSWER_WITHIN_S
+def await_message(
+    subscriber: Subscriber,
+    what: str,
+    is_over: Callable[[], bool],
+    timeout_s: float = ANSWER_TIMEOUT_S,
 ) -> bytes:
-    """Return the next message on a ring.
+    """Return the next message of a subscriber.
 
-    ``unwanted`` is asked now and then. Raises UnwantedError when it says so, and LockstepError,
-    with ``what`` is missing, when the message has not come after ``within_s`` [s].
+    what: the message's name for errors. is_over: polled while waiting. Raises RunOverError when it
+    returns True, and LockstepError when no message has arrived after ``timeout_s`` [s].
     """
     waited_s = 0.0
-    while waited_s < within_s:
-        data = ring.wait(LOOK_EVERY_S)
+    while waited_s < timeout_s:
+        data = subscriber.wait(POLL_S)
         if data is not None:
             return data
-        if unwanted():
-            raise UnwantedError
-        waited_s += LOOK_EVERY_S
-    raise LockstepError(f"{what} has not come within {within_s:g} s")
+        if is_over():
+            raise RunOverError
+        waited_s += POLL_S
+    raise LockstepError(f"{what} has not arrived within {timeout_s:g} s")
 
 
-def same_slot(what: str, told: int, slot: int) -> None:
-    """Raise LockstepError where a message is of another slot than the one that is played."""
-    if told != slot:
-        raise LockstepError(f"{what} is of slot {told}, in slot {slot}")
+def check_slot(what: str, received: int, expected: int) -> None:
+    """Raise LockstepError where a message is not of the slot that is being played."""
+    if received != expected:
+        raise LockstepError(f"{what} is of slot {received}; expected slot {expected}")

@@ -1,6 +1,6 @@
-"""Messages by topic: one process's rings, puts, questions and sign of life in one run.
+"""Messaging by topic: publishers, subscribers, queries and liveliness of one process in one run.
 
-What arrives waits in rings, where the newest messages push out the oldest; nothing here runs a
+Received messages wait in ring buffers, where the newest replace the oldest. Nothing here starts a
 thread of ours or blocks a sender.
 """
 
@@ -16,25 +16,27 @@ from zenoh.handlers import RingChannel
 from netem.wire.keys import TOPICS, Keys
 
 Put = Callable[[bytes], None]
-LATE = "Timeout"
-"""What Zenoh itself answers for somebody who has heard the question and says nothing in time."""
+QUERY_TIMEOUT = "Timeout"
+"""Zenoh's error reply in place of a process that received a query and did not reply in time."""
+LIVELINESS_RING = 4096
+QUERY_RING = 4096
 
 _T = TypeVar("_T")
 _T_co = TypeVar("_T_co", covariant=True)
 
 
 class RefusedError(RuntimeError):
-    """A question that was answered with a refusal; the text is the other side's reason."""
+    """A query was refused; the text is the other side's reason."""
 
 
-class Waiting(Protocol[_T_co]):
-    """What Zenoh's rings offer to a reader."""
+class Handler(Protocol[_T_co]):
+    """The reading end of a Zenoh ring buffer: a subscriber's or a queryable's."""
 
     def recv(self) -> _T_co:
-        """Wait for an item, for ever."""
+        """Wait for an item, without a limit."""
 
     def try_recv(self) -> _T_co | None:
-        """Return an item that is there, or None."""
+        """Return the next item, or None where there is none."""
 
 
 class _DeadlineError(Exception):
@@ -44,20 +46,20 @@ class _DeadlineError(Exception):
 class _Alarm:
     """A deadline for a wait that has none of its own: SIGALRM, so for the main thread only.
 
-    Zenoh looks for signals about every 100 ms while it waits, so a deadline is that coarse.
+    Zenoh checks for signals about every 100 ms while it waits, so a deadline is that coarse.
     """
 
     def __init__(self) -> None:
         self._waiting = False
 
     def within(self, timeout_s: float, wait: Callable[[], _T]) -> _T | None:
-        """Return what ``wait`` returns, or None when it has not by ``timeout_s`` [s]."""
+        """Return the result of ``wait``, or None when it has none by ``timeout_s`` [s]."""
         items: list[_T] = []
         before = signal.signal(signal.SIGALRM, self._ring)
         try:
             self._waiting = True
             signal.setitimer(signal.ITIMER_REAL, timeout_s)
-            # All of it in C: an alarm that rings while an item is handed over finds it in the list.
+            # All in C: an alarm that rings while an item is handed over finds it in the list.
             items.extend(map(call, (wait,)))
             self._waiting = False
         except _DeadlineError:
@@ -75,142 +77,152 @@ class _Alarm:
 _alarm = _Alarm()
 
 
-def receive(source: Waiting[_T], timeout_s: float) -> _T | None:
-    """Return the next item, or None when none has come by ``timeout_s`` [s] (coarse: 0.1 s)."""
-    item = source.try_recv()
-    return item if item is not None else _alarm.within(timeout_s, source.recv)
+def receive(handler: Handler[_T], timeout_s: float) -> _T | None:
+    """Return the next item, or None when none arrives by ``timeout_s`` [s] (coarse: 0.1 s)."""
+    item = handler.try_recv()
+    return item if item is not None else _alarm.within(timeout_s, handler.recv)
 
 
-def drained(source: Waiting[_T], quota: int) -> list[_T]:
-    """Return what is there already, at most ``quota`` items; never waits."""
+def drain(handler: Handler[_T], quota: int) -> list[_T]:
+    """Return the items that have arrived, oldest first, at most ``quota``; never waits."""
     items: list[_T] = []
-    while len(items) < quota and (item := source.try_recv()) is not None:
+    while len(items) < quota and (item := handler.try_recv()) is not None:
         items.append(item)
     return items
 
 
-class Ring:
-    """The newest payloads on one key; with size 1, the latest wins."""
+class Subscriber:
+    """The newest payloads on one key; with size 1, the latest replaces the one before."""
 
     def __init__(self, session: zenoh.Session, key: str, size: int) -> None:
-        self._source = session.declare_subscriber(key, RingChannel(size))
+        self._handler = session.declare_subscriber(key, RingChannel(size))
 
     def wait(self, timeout_s: float) -> bytes | None:
-        """Return the next payload, or None when none has come by ``timeout_s`` [s]."""
-        sample = receive(self._source, timeout_s)
+        """Return the next payload, or None when none arrives by ``timeout_s`` [s]."""
+        sample = receive(self._handler, timeout_s)
         return sample.payload.to_bytes() if sample is not None else None
 
     def drain(self, quota: int) -> list[bytes]:
-        """Return the payloads that are there, oldest first, at most ``quota``."""
-        return [sample.payload.to_bytes() for sample in drained(self._source, quota)]
+        """Return the payloads that have arrived, oldest first, at most ``quota``."""
+        return [sample.payload.to_bytes() for sample in drain(self._handler, quota)]
 
 
-class Rings:
-    """The rings of all who say something on one topic, each read up to a quota at a time.
+class FairSubscriber:
+    """One subscriber for each sender of a topic, each read up to a quota at a time.
 
-    Who has more there is read on, up to a reserve that all of them share: so what somebody says is
-    found among much that is said in his name, others lose nothing by it, and the time that it
-    costs is bounded.
+    Beyond the quota all senders share a reserve. So a sender's own messages are found among many
+    forged in its name, other senders lose nothing by a flood, and the time it costs is bounded.
     """
 
     SIZE = 256
+    """Ring size for each sender."""
     QUOTA = 2
+    """Messages that are read of each sender at a time."""
     RESERVE = 256
+    """Messages that are read at a time in addition, of all senders together."""
 
-    def __init__(self, rings: Sequence[Ring]) -> None:
-        self._rings = rings
+    def __init__(self, subscribers: Sequence[Subscriber]) -> None:
+        self._subscribers = subscribers
 
     def drain(self) -> Iterator[tuple[int, list[bytes]]]:
-        """Yield for each sender the payloads that are there, oldest first."""
+        """Yield each sender's index and its payloads, oldest first."""
         left = self.RESERVE
-        for sender, ring in enumerate(self._rings):
-            found = ring.drain(self.QUOTA + left)
-            left -= max(0, len(found) - self.QUOTA)
-            yield sender, found
+        for sender, subscriber in enumerate(self._subscribers):
+            payloads = subscriber.drain(self.QUOTA + left)
+            left -= max(0, len(payloads) - self.QUOTA)
+            yield sender, payloads
 
 
-class Presence:
-    """Who shows a sign of life in a run, by name (``world``, ``netem``, ``agent-3``).
+class Liveliness:
+    """The processes of a run that are alive, by name (``world``, ``netem``, ``agent-3``).
 
-    A hint, no more: when the router is gone, everybody seems to be.
+    Only a hint: when the router dies, all processes seem to be gone.
     """
 
     def __init__(self, session: zenoh.Session, keys: Keys) -> None:
-        self.present: set[str] = set()
-        self._source = session.liveliness().declare_subscriber(
-            keys.every("alive"), RingChannel(4096), history=True
+        self.alive: set[str] = set()
+        """Up to date as of the last call of ``departed``."""
+        self._handler = session.liveliness().declare_subscriber(
+            keys.all_of("alive"), RingChannel(LIVELINESS_RING), history=True
         )
 
-    def gone(self) -> list[str]:
-        """Take in what changed, and return who went since the last call."""
-        gone = []
-        while (sample := self._source.try_recv()) is not None:
-            name = Keys.who(str(sample.key_expr))
+    def departed(self) -> list[str]:
+        """Update ``alive``, and return the names that have gone since the last call."""
+        departed = []
+        while (sample := self._handler.try_recv()) is not None:
+            name = Keys.owner_of(str(sample.key_expr))
             if sample.kind == zenoh.SampleKind.PUT:
-                self.present.add(name)
-            elif name in self.present:
-                self.present.discard(name)
-                gone.append(name)
-        return gone
+                self.alive.add(name)
+            elif name in self.alive:
+                self.alive.discard(name)
+                departed.append(name)
+        return departed
 
 
 class Bus:
-    """One process's way to send and receive in one run."""
+    """One process's access to the topics of one run.
+
+    owner: the agent's id, the shard or the process's name where a topic has one key for each.
+    """
 
     def __init__(self, session: zenoh.Session, keys: Keys) -> None:
         self._session = session
         self._keys = keys
-        self._signs: list[zenoh.LivelinessToken] = []
-        self._awaited: list[zenoh.Publisher] = []
+        self._tokens: list[zenoh.LivelinessToken] = []
+        self._lockstep_publishers: list[zenoh.Publisher] = []
 
-    def putter(self, topic: str, who: int | None = None, *, lockstep: bool = False) -> Put:
-        """Return what puts on a topic, with the quality of service that the table gives it.
+    def publisher(self, topic: str, owner: int | None = None, *, lockstep: bool = False) -> Put:
+        """Return the function that puts on a topic, with the quality of service of TOPICS.
 
-        In lockstep every message is waited for: it blocks where it would else be dropped.
+        lockstep: block instead of dropping, whatever TOPICS says.
         """
-        reliable = lockstep or TOPICS[topic].reliable
-        control = zenoh.CongestionControl.BLOCK if reliable else zenoh.CongestionControl.DROP
-        key = self._keys.of(topic, who)
+        blocking = lockstep or TOPICS[topic].blocking
+        control = zenoh.CongestionControl.BLOCK if blocking else zenoh.CongestionControl.DROP
+        key = self._keys.of(topic, owner)
         publisher = self._session.declare_publisher(key, congestion_control=control)
         if lockstep:
-            self._awaited.append(publisher)
+            self._lockstep_publishers.append(publisher)
         return publisher.put
 
     @property
-    def heard(self) -> bool:
-        """Whether all that is put in lockstep has somebody who listens."""
-        # Zenoh's stubs call a status a bool; it has one.
-        found: list[Any] = [publisher.matching_status for publisher in self._awaited]
+    def matched(self) -> bool:
+        """Whether every lockstep publisher has a subscriber."""
+        # Zenoh's stubs declare matching_status as a bool; it is an object with a field.
+        found: list[Any] = [publisher.matching_status for publisher in self._lockstep_publishers]
         return all(status.matching for status in found)
 
-    def ring(self, topic: str, who: int | None = None, size: int = 1) -> Ring:
-        """Return a ring of the newest messages on a topic."""
-        return Ring(self._session, self._keys.of(topic, who), size)
+    def subscriber(self, topic: str, owner: int | None = None, size: int = 1) -> Subscriber:
+        """Return a subscriber that keeps the newest ``size`` messages on a topic."""
+        return Subscriber(self._session, self._keys.of(topic, owner), size)
 
-    def rings(self, topic: str, agents: Iterable[int]) -> Rings:
-        """Return the rings of what each of some agents says on a topic."""
-        return Rings([self.ring(topic, agent, Rings.SIZE) for agent in agents])
+    def fair_subscriber(self, topic: str, agents: Iterable[int]) -> FairSubscriber:
+        """Return a subscriber to a topic of several agents."""
+        size = FairSubscriber.SIZE
+        return FairSubscriber([self.subscriber(topic, agent, size) for agent in agents])
 
-    def presence(self) -> Presence:
-        """Return the roll of those who are alive."""
-        return Presence(self._session, self._keys)
+    def liveliness(self) -> Liveliness:
+        """Return a view of the processes that are alive."""
+        return Liveliness(self._session, self._keys)
 
-    def show_life(self, name: str) -> None:
-        """Show a sign of life under a name, until the session closes."""
-        self._signs.append(self._session.liveliness().declare_token(self._keys.of("alive", name)))
+    def declare_alive(self, name: str) -> None:
+        """Show a process as alive under a name, until the session closes."""
+        key = self._keys.of("alive", name)
+        self._tokens.append(self._session.liveliness().declare_token(key))
 
-    def questions(self, topic: str) -> Waiting[zenoh.Query]:
-        """Return where the questions on a topic, of whomever, come in."""
-        return self._session.declare_queryable(self._keys.every(topic), RingChannel(4096))
+    def queryable(self, topic: str) -> Handler[zenoh.Query]:
+        """Return the queries on a topic, of any owner, as they arrive."""
+        return self._session.declare_queryable(self._keys.all_of(topic), RingChannel(QUERY_RING))
 
-    def ask(self, topic: str, who: int | None, question: bytes, timeout_s: float) -> bytes | None:
-        """Return the answer to a question, or None when there is nobody yet who answers it.
+    def query(
+        self, topic: str, owner: int | None, payload: bytes, timeout_s: float
+    ) -> bytes | None:
+        """Return the reply to a query, or None when no process replies in time.
 
-        Raises :class:`RefusedError` when the answer is a refusal.
+        Raises :class:`RefusedError` when the reply is an error.
         """
-        key = self._keys.of(topic, who)
-        for reply in self._session.get(key, payload=question, timeout=timeout_s):
-            if reply.err is not None and reply.err.payload.to_string() != LATE:
+        key = self._keys.of(topic, owner)
+        for reply in self._session.get(key, payload=payload, timeout=timeout_s):
+            if reply.err is not None and reply.err.payload.to_string() != QUERY_TIMEOUT:
                 raise RefusedError(reply.err.payload.to_string())
             if reply.ok is not None:
                 return reply.ok.payload.to_bytes()

@@ -1,7 +1,7 @@
 """Frames, and the two messages that carry them between an agent and the medium.
 
-An agent's slot ends with one :class:`Transmission`; a slot begins with one :class:`Batch`. The
-payload of a frame is opaque here: the radio never decodes what it carries.
+An agent ends its slot with one :class:`Transmission` and starts it with one :class:`Batch`. The
+payload of a frame is opaque: the radio never decodes it.
 """
 
 from collections.abc import Callable
@@ -19,16 +19,18 @@ CHANNELS = ("local", "multihop")
 
 MAX_PAYLOAD_B = 1200
 MAX_OUTGOING = 160
+"""Greatest number of frames in a transmission."""
 MAX_TRANSMISSION_B = MAX_OUTGOING * (MAX_PAYLOAD_B + 5) + 22
 MAX_BATCH_B = 256 * 1024
 BATCH_RING = 8
-"""How many batches wait at an agent that does not read; newer ones push out the oldest."""
+"""Number of batches that wait for an agent; newer ones replace the oldest."""
 MAX_EARLY_US = 2**32 - 1
 MAX_INBOX_B = BATCH_RING * (MAX_BATCH_B + 5) + 16
 MAX_FRAMES = 4096
+"""Greatest number of frames in a batch."""
 FRAME_HEAD_B = 26
 BATCH_HEAD_B = 13
-"""Sizes as msgpack writes the greatest numbers round a payload, and round a batch's frames."""
+"""Greatest size in msgpack of a frame without its payload, and of a batch without its frames."""
 MAX_DELIVERY_B = MAX_BATCH_B + 5 * (MAX_FRAMES + 1)
 
 Count = Annotated[int, Meta(ge=0, lt=2**53)]
@@ -38,11 +40,11 @@ Payload = Annotated[bytes, Meta(max_length=MAX_PAYLOAD_B)]
 
 
 class WireError(ValueError):
-    """A message that is not what it claims to be; the text says why."""
+    """A message that is too long or malformed; the first word of the text is the cause."""
 
 
 class Outgoing(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
-    """A payload that an agent hands to its radio, for one channel."""
+    """A payload that an agent sends on one channel."""
 
     channel: Channel
     payload: Payload
@@ -51,7 +53,7 @@ class Outgoing(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_un
 class Transmission(
     msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True
 ):
-    """All that one agent sends in one slot; empty ones are sent too, for they mark the slot."""
+    """All frames that one agent sends in one slot; sent without frames too, to mark the slot."""
 
     slot: Count
     incarnation: Count
@@ -59,7 +61,7 @@ class Transmission(
 
 
 class Frame(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
-    """A payload as it is heard: from whom, on which channel, and the medium's own count of it."""
+    """A received payload; count: the medium's own number of the frame."""
 
     source: AgentId
     incarnation: Count
@@ -69,24 +71,25 @@ class Frame(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unkno
 
 
 class Batch(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
-    """All that one agent hears at the start of one slot, in the order it came due."""
+    """All frames that one agent receives at the start of one slot, in the order they fell due."""
 
     slot: Count
     frames: Annotated[tuple[Frame, ...], Meta(max_length=MAX_FRAMES)]
 
 
 class Delivery(Batch, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
-    """A batch that says how long before its slot each frame was due [us]; for free-running."""
+    """A batch with the time at which each frame was due; for free-running."""
 
     early_us: Annotated[
         tuple[Annotated[int, Meta(ge=0, le=MAX_EARLY_US)], ...], Meta(max_length=MAX_FRAMES)
     ]
+    """How long before the batch's slot each frame was due [us]."""
 
 
 class Inbox(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
     """All batches that wait for one agent when it steps in a slot, encoded; for lockstep.
 
-    One, as a rule; none at an agent's first step, more after a pause.
+    Usually one; none at an agent's first step, several after a pause.
     """
 
     slot: Count
@@ -98,15 +101,15 @@ _encode = msgspec.msgpack.Encoder().encode
 
 
 def pack(message: msgspec.Struct) -> bytes:
-    """Encode a message of ours as msgpack."""
+    """Encode a message as msgpack."""
     return _encode(message)
 
 
 def unpack(data: bytes, kind: type[_T], max_bytes: int, max_items: int = MAX_FRAMES) -> _T:
-    """Decode and check a message from outside, or raise :class:`WireError`.
+    """Decode and check a message, or raise :class:`WireError`.
 
-    Sizes are checked before anything is built; extension types, map keys that are no strings, text
-    for bytes, and numbers that are not finite or out of range do not pass.
+    Sizes are checked before any object is built. Extension types, map keys that are not strings,
+    text in place of bytes, and numbers that are not finite or out of range are refused.
     """
     if len(data) > max_bytes:
         raise WireError(f"oversize: {len(data)} B where {max_bytes} B are allowed")
@@ -134,30 +137,35 @@ _inbox = msgspec.msgpack.Decoder(Inbox).decode
 
 
 def unpack_transmission(data: bytes) -> Transmission:
-    """Decode what an agent sent, or raise :class:`WireError`."""
+    """Decode an agent's transmission, or raise :class:`WireError`."""
     return unpack_typed(data, _transmission, MAX_TRANSMISSION_B)
 
 
 def unpack_batch(data: bytes) -> Batch:
-    """Decode what the medium delivered, or raise :class:`WireError`."""
+    """Decode a batch of the medium, or raise :class:`WireError`."""
     return unpack_typed(data, _batch, MAX_BATCH_B)
 
 
 def unpack_delivery(data: bytes) -> Delivery:
-    """Decode what the medium delivered free-running, or raise :class:`WireError`."""
+    """Decode a delivery of the free-running medium, or raise :class:`WireError`."""
     delivery = unpack_typed(data, _delivery, MAX_DELIVERY_B)
     if len(delivery.early_us) != len(delivery.frames):
-        raise WireError(f"malformed: {len(delivery.early_us)} times of {len(delivery.frames)}")
+        raise WireError(
+            f"malformed: {len(delivery.early_us)} due times for {len(delivery.frames)} frames"
+        )
     return delivery
 
 
 def unpack_inbox(data: bytes) -> Inbox:
-    """Decode what waited for an agent, or raise :class:`WireError`."""
+    """Decode an agent's inbox, or raise :class:`WireError`."""
     return unpack_typed(data, _inbox, MAX_INBOX_B)
 
 
 def unpack_typed(data: bytes, decode: Callable[[bytes], _T], max_bytes: int) -> _T:
-    """Decode where it happens most: the type alone bounds depth, lengths and extension types."""
+    """Decode and check a message with a typed decoder, or raise :class:`WireError`.
+
+    Faster than ``unpack``: the type alone bounds depth and lengths and refuses extension types.
+    """
     if len(data) > max_bytes:
         raise WireError(f"oversize: {len(data)} B where {max_bytes} B are allowed")
     try:

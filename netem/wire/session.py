@@ -1,6 +1,6 @@
-"""Zenoh sessions as this project uses them: one router a host, every other process its client.
+"""Zenoh sessions: one router on a host, and every other process its client.
 
-Nothing is discovered, nothing is listened on that was not named, and what comes in is bounded.
+No peers are discovered, no endpoint is opened that was not named, and message sizes are bounded.
 """
 
 import ipaddress
@@ -10,31 +10,33 @@ from typing import Any
 
 import zenoh
 
-from netem.wire.access import Guard, Login, size_limits
+from netem.wire.access import AccessControl, Login, size_limits
 
 OPEN_TIMEOUT_S = 8.0
 MAX_MESSAGE_B = 4 * 1024 * 1024
-PATIENT_LEASE_S = 24 * 3600
-"""How long a session in lockstep may be silent: as long as somebody is paused there."""
+LONG_LEASE_S = 24 * 3600
+"""Lease of a session in lockstep: a process that is paused sends no keep-alives for so long."""
 
 _ENDPOINT = re.compile(r"(?P<protocol>[a-z][a-z-]*)/(?P<address>.+)")
 _IN_USE = re.compile(r"in use|lock", re.IGNORECASE)
 
 
 class SessionError(RuntimeError):
-    """A session that could not be opened; the text says it in one line."""
+    """A session could not be opened; the text says why in one line."""
 
 
-def open_router(listen: str, patient: bool = False, guard: Guard | None = None) -> zenoh.Session:
+def open_router(
+    listen: str, long_lease: bool = False, access: AccessControl | None = None
+) -> zenoh.Session:
     """Open this host's router at ``listen``, for example ``tcp/127.0.0.1:7447``.
 
-    patient: whether who is silent for long is still there. guard: who may do what; without one,
-    everybody everything. Raises :class:`SessionError` when the endpoint is malformed, not loopback
-    or in use.
+    long_lease: keep sessions of processes that are silent for long. access: None allows every
+    process everything. Raises :class:`SessionError` when the endpoint is malformed, not loopback or
+    in use.
     """
     _refuse_all_but_loopback(listen)
     try:
-        return zenoh.open(router_config(listen, patient, guard))
+        return zenoh.open(router_config(listen, long_lease, access))
     except zenoh.ZError as error:
         raise SessionError(f"{listen}: {_cause(error)}") from error
 
@@ -42,39 +44,41 @@ def open_router(listen: str, patient: bool = False, guard: Guard | None = None) 
 def open_client(
     connect: str,
     timeout_s: float = OPEN_TIMEOUT_S,
-    patient: bool = False,
+    long_lease: bool = False,
     login: Login | None = None,
 ) -> zenoh.Session:
     """Open a client of the router at ``connect``; later the client reconnects by itself.
 
-    patient: whether it may be silent for long and is still there. login: its name to a router with
-    a guard. Raises :class:`SessionError` when no router answers within ``timeout_s`` [s].
+    long_lease: keep the session though this process is silent for long. login: for a router with
+    access control. Raises :class:`SessionError` when no router answers within ``timeout_s`` [s].
     """
     _address(connect)
     try:
-        return zenoh.open(client_config(connect, timeout_s, patient, login))
+        return zenoh.open(client_config(connect, timeout_s, long_lease, login))
     except zenoh.ZError as error:
         raise SessionError(f"no router answers at {connect} within {timeout_s:g} s") from error
 
 
-def router_config(listen: str, patient: bool = False, guard: Guard | None = None) -> zenoh.Config:
+def router_config(
+    listen: str, long_lease: bool = False, access: AccessControl | None = None
+) -> zenoh.Config:
     """Return the configuration of a router that listens at one endpoint."""
     router: dict[str, Any] = {
         "mode": "router",
         "listen": {"endpoints": [listen]},
         "low_pass_filter": size_limits(),
     }
-    if guard is None:
-        return _config(router, patient, {})
-    # A router must have a name, too, though it calls nobody.
-    known = {"user": "router", "password": "", "dictionary_file": str(guard.users)}
-    return _config(router | {"access_control": guard.config()}, patient, known)
+    if access is None:
+        return _config(router, long_lease, {})
+    # Zenoh wants a user name of a router, too, though the router connects to nothing.
+    passwords = {"user": "router", "password": "", "dictionary_file": str(access.users)}
+    return _config(router | {"access_control": access.config()}, long_lease, passwords)
 
 
 def client_config(
-    connect: str, timeout_s: float, patient: bool = False, login: Login | None = None
+    connect: str, timeout_s: float, long_lease: bool = False, login: Login | None = None
 ) -> zenoh.Config:
-    """Return the configuration of a client that listens nowhere."""
+    """Return the configuration of a client, which listens at no endpoint."""
     retry = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2}
     return _config(
         {
@@ -87,20 +91,20 @@ def client_config(
                 "retry": retry,
             },
         },
-        patient,
+        long_lease,
         login._asdict() if login is not None else {},
     )
 
 
-def _config(own: dict[str, Any], patient: bool, known: dict[str, str]) -> zenoh.Config:
-    sending = {"tx": {"lease": PATIENT_LEASE_S * 1000}} if patient else {}
+def _config(own: dict[str, Any], long_lease: bool, passwords: dict[str, str]) -> zenoh.Config:
+    lease = {"tx": {"lease": LONG_LEASE_S * 1000}} if long_lease else {}
     common = {
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "adminspace": {"enabled": False},
         "transport": {
-            "link": {"rx": {"max_message_size": MAX_MESSAGE_B}, **sending},
+            "link": {"rx": {"max_message_size": MAX_MESSAGE_B}, **lease},
             "shared_memory": {"enabled": False},
-            **({"auth": {"usrpwd": known}} if known else {}),
+            **({"auth": {"usrpwd": passwords}} if passwords else {}),
         },
     }
     return zenoh.Config.from_json5(json.dumps(common | own))
@@ -109,7 +113,7 @@ def _config(own: dict[str, Any], patient: bool, known: dict[str, str]) -> zenoh.
 def _address(endpoint: str) -> tuple[str, str]:
     match = _ENDPOINT.fullmatch(endpoint)
     if match is None:
-        raise SessionError(f"{endpoint!r}: no endpoint; one looks like tcp/127.0.0.1:7447")
+        raise SessionError(f"{endpoint!r}: not an endpoint, for example tcp/127.0.0.1:7447")
     return match["protocol"], match["address"]
 
 
@@ -139,5 +143,5 @@ def _cause(error: zenoh.ZError) -> str:
     text = str(error)
     if _IN_USE.search(text):
         return "the port is in use"
-    # Zenoh appends where in its own source an error arose; that helps nobody here.
+    # Zenoh appends the place in its own source, which does not help a user.
     return re.sub(r" at /\S+\.rs:\d+\.?", "", text).splitlines()[0]

@@ -1,7 +1,8 @@
-"""How a process ends: by a signal, or because the world says that the run is over.
+"""How a process ends: on a signal, or when the world says that the run is over.
 
-Ctrl-C, SIGTERM and a terminal that closes ask a run to end and to report. A process that was asked
-finishes what it is doing; its loops look at a :class:`Stop`, or at an :class:`Ending`.
+Ctrl-C, SIGTERM and SIGHUP (the terminal closes) ask a run to end and to write its results. A
+process that is asked finishes what it is doing: its loops poll a :class:`StopRequest` or a
+:class:`RunEnd`.
 """
 
 import signal
@@ -11,63 +12,63 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from netem.wire.bus import Ring
+    from netem.wire.bus import Subscriber
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-class Stop:
-    """Whether this process was asked to end.
+class StopRequest:
+    """Whether a signal has asked this process to end.
 
-    SIGTERM asks it, and so does Ctrl-C unless SIGINT is ignored: then a launcher conducts the end.
+    SIGTERM does, and SIGINT too unless it is ignored: then a launcher controls the end.
     """
 
     def __init__(self) -> None:
-        self.asked = False
-        signal.signal(signal.SIGTERM, self._ask)
+        self.requested = False
+        signal.signal(signal.SIGTERM, self._request)
         if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-            signal.signal(signal.SIGINT, self._ask)
+            signal.signal(signal.SIGINT, self._request)
 
-    def _ask(self, _number: int, _frame: FrameType | None) -> None:
-        self.asked = True
+    def _request(self, _number: int, _frame: FrameType | None) -> None:
+        self.requested = True
 
 
-class Ending:
-    """Whether the run is over for this process: it was asked to end, or the world says so.
+class RunEnd:
+    """Whether the run is over for this process: a stop was requested, or the world says so.
 
-    over: the ring of the topic on which the world says so.
+    over: subscriber to the topic of that name.
     """
 
-    def __init__(self, over: "Ring", stop: Stop) -> None:
-        self._told = False
+    def __init__(self, over: "Subscriber", stop: StopRequest) -> None:
+        self._received = False
         self._over = over
         self._stop = stop
 
     def __call__(self) -> bool:
-        """Look, and return whether it is."""
-        self._told = self._told or bool(self._over.drain(1))
-        return self._told or self._stop.asked
+        """Poll, and return whether the run is over."""
+        self._received = self._received or bool(self._over.drain(1))
+        return self._received or self._stop.requested
 
 
-def interruptible() -> None:
-    """Make SIGTERM interrupt this process as Ctrl-C does, and SIGHUP unless it is ignored."""
+def interrupt_on_signals() -> None:
+    """Let SIGTERM raise KeyboardInterrupt as Ctrl-C does, and SIGHUP unless it is ignored."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         signal.signal(signal.SIGHUP, signal.default_int_handler)
 
 
-def uninterrupted() -> None:
+def ignore_signals() -> None:
     """Ignore every signal that ends a run: a second Ctrl-C would leave the end half done."""
     for number in (*SIGNALS, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
 
 
 @contextmanager
-def stoppable() -> Iterator[Stop]:
-    """Give a :class:`Stop` that holds within this block; earlier handlers return after it."""
+def stop_requests() -> Iterator[StopRequest]:
+    """Yield a :class:`StopRequest` for this block; restore the earlier handlers after it."""
     before = {number: signal.getsignal(number) for number in SIGNALS}
     try:
-        yield Stop()
+        yield StopRequest()
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

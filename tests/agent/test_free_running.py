@@ -9,7 +9,7 @@ from agent.codec import encode
 from agent.free_running import FreeRunningAgent
 from agent.messages import Observation
 from netem.wire.frame import Batch, Delivery, Frame, pack
-from netem.wire.latency import BINS_A_SLOT, unpack_arrivals
+from netem.wire.latency import BINS_PER_SLOT, unpack_report
 from worldsim.scenario.file import load
 
 WEDGE = Path("deploy/scenarios/wedge-9.toml")
@@ -30,10 +30,10 @@ class FakePost:
         self.heard = Waiting()
         self.said = defaultdict(list)
 
-    def ring(self, _topic, _who, _size):
+    def subscriber(self, _topic, _who, _size):
         return self.heard
 
-    def putter(self, topic, _who):
+    def publisher(self, topic, _who):
         return self.said[topic].append
 
 
@@ -53,14 +53,17 @@ def seen(slot):
 
 def told(shell, bus):
     shell.report()
-    return unpack_arrivals(bus.said["arrivals"][-1])
+    return unpack_report(bus.said["arrivals"][-1])
 
 
 def test_frames_are_counted_from_when_they_were_due_to_when_they_are_used(shell, bus):
     bus.heard.append(pack(Delivery(4, (JUNK, JUNK), (0, 25_000))))
     shell.see(seen(8))
     counts = told(shell, bus).counts[0]
-    assert [at for at, count in enumerate(counts) if count] == [4 * BINS_A_SLOT, 6 * BINS_A_SLOT]
+    assert [at for at, count in enumerate(counts) if count] == [
+        4 * BINS_PER_SLOT,
+        6 * BINS_PER_SLOT,
+    ]
     assert told(shell, bus).incarnation == 2
 
 

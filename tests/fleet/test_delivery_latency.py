@@ -5,21 +5,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netem.wire.frame import WireError, pack
-from netem.wire.latency import BINS, BINS_A_SLOT, Arrivals
+from netem.wire.latency import BINS, BINS_PER_SLOT, LatencyReport
 from worldsim.fleet.delivery_latency import ArrivalBook, quantile
 
 SLOT_S = 0.0125
-BIN_US = 1e6 * SLOT_S / BINS_A_SLOT
+BIN_US = 1e6 * SLOT_S / BINS_PER_SLOT
 PLENTY = 10**9
 LATE_S = 100.0
 
 
-def told(bins, multihop=None, incarnation=0, most_us=None):
+def told(bins, multihop=None, incarnation=0, max_us=None):
     """Return what an agent tells that counted so many frames in each of these bins."""
     by_channel = (bins, multihop or {})
     rows = tuple(tuple(row.get(at, 0) for at in range(BINS)) for row in by_channel)
-    most_us = most_us or tuple(int(max(row, default=0) * BIN_US) for row in by_channel)
-    return pack(Arrivals(incarnation, rows, most_us))
+    max_us = max_us or tuple(int(max(row, default=0) * BIN_US) for row in by_channel)
+    return pack(LatencyReport(incarnation, rows, max_us))
 
 
 @pytest.fixture
@@ -52,7 +52,7 @@ def test_the_sum_over_agents_keeps_every_frame_and_its_order(agents):
         return
     assert summary["frames"] == summary["channels"]["local"]["frames"] == frames
     assert summary["channels"]["multihop"] is None
-    within = sum(n for bins in agents for at, n in bins.items() if at <= 5 * BINS_A_SLOT)
+    within = sum(n for bins in agents for at, n in bins.items() if at <= 5 * BINS_PER_SLOT)
     assert summary["within_fraction"] == within / frames
     spread = list(summary["excess_ms"].values())
     assert spread == sorted(spread)
@@ -60,7 +60,7 @@ def test_the_sum_over_agents_keeps_every_frame_and_its_order(agents):
 
 
 def test_the_bound_is_one_slot_and_one_tick(book):
-    book.take(0, 0, told({16: 1, 40: 2, 41: 1}, {24: 4}, most_us=(63_000, 37_500)), LATE_S)
+    book.take(0, 0, told({16: 1, 40: 2, 41: 1}, {24: 4}, max_us=(63_000, 37_500)), LATE_S)
     summary = book.summary(PLENTY)
     assert summary["bound_ms"] == 62.5
     assert summary["within_fraction"] == 7 / 8
@@ -78,7 +78,7 @@ def test_the_last_word_of_each_process_counts(book):
 
 def test_nothing_told_is_nothing_measured(book):
     assert book.summary(PLENTY) is None
-    book.take(0, 0, told({}, most_us=(0, 0)), LATE_S)
+    book.take(0, 0, told({}, max_us=(0, 0)), LATE_S)
     assert book.summary(PLENTY) is None
 
 
@@ -86,10 +86,10 @@ def test_who_counts_backwards_or_speaks_for_another_process_is_not_believed(book
     book.take(0, 0, told({8: 5}), LATE_S)
     lies = [
         told({8: 4, 9: 3}),
-        told({8: 6}, most_us=(10_938, 0)),
-        told({8: 6}, most_us=(200_000_000, 0)),
-        told({8: 6, BINS - 1: 1}, most_us=(200_000_000, 0)),
-        told({8: 6}, most_us=(12_500, 2_000)),
+        told({8: 6}, max_us=(10_938, 0)),
+        told({8: 6}, max_us=(200_000_000, 0)),
+        told({8: 6, BINS - 1: 1}, max_us=(200_000_000, 0)),
+        told({8: 6}, max_us=(12_500, 2_000)),
         told({8: 6}, incarnation=1),
         b"junk",
     ]

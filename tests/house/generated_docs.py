@@ -45,8 +45,8 @@ def modules() -> str:
 def topics() -> str:
     """Return the table of topics: key, who puts, who gets, rate, quality of service."""
     rows = [
-        f"| `{topic.template}` | {topic.writer} | {topic.reader} | {topic.rate}"
-        f" | {'reliable' if topic.reliable else 'newest wins'} | {topic.what} |"
+        f"| `{topic.template}` | {topic.publisher} | {topic.subscriber} | {topic.rate}"
+        f" | {'reliable' if topic.blocking else 'newest wins'} | {topic.content} |"
         for topic in TOPICS.values()
     ]
     head = [

@@ -19,7 +19,7 @@ from netem.wire.access import login_of
 from netem.wire.bus import Bus, Put
 from netem.wire.frame import Frame, Outgoing, Transmission, pack
 from netem.wire.keys import Keys
-from netem.wire.latency import Tally
+from netem.wire.latency import LatencyHistogram
 from netem.wire.session import open_client
 from worldsim.fleet.process_table import fleet_of
 from worldsim.results.run_folder import USERS
@@ -41,9 +41,9 @@ def transmission(slot: int, incarnation: int = 0) -> bytes:
 
 
 def arrivals(slot: int, incarnation: int = 0) -> bytes:
-    tally = Tally(0.0125)
-    tally.note((Frame(1, 0, 0, 0, b""),) * (slot % 50), (slot,) * (slot % 50), slot % 7)
-    return pack(tally.told(incarnation))
+    tally = LatencyHistogram(0.0125)
+    tally.add((Frame(1, 0, 0, 0, b""),) * (slot % 50), (slot,) * (slot % 50), slot % 7)
+    return pack(tally.report(incarnation))
 
 
 SAYS = {"tx": transmission, "command": command, "arrivals": arrivals}
@@ -54,8 +54,8 @@ def flood(run: Path, agent: int, seconds: float, forged: bool) -> dict[str, int]
     fleet, login = fleet_of(run), login_of(run / USERS, f"agent-{agent}")
     with open_client(fleet.endpoint, login=login) as session:
         bus, random = Bus(session, Keys(fleet.run)), Random(1)
-        puts = [(bus.putter(topic, agent), cycle(_mixed(topic, random))) for topic in SAYS]
-        seen = bus.ring("observation", agent)
+        puts = [(bus.publisher(topic, agent), cycle(_mixed(topic, random))) for topic in SAYS]
+        seen = bus.subscriber("observation", agent)
         begun, sent, pause = time.monotonic(), 0, threading.Event()
         while (now_s := time.monotonic() - begun) < seconds:
             for put, messages in puts:
@@ -87,7 +87,7 @@ def _forge(bus: Bus, agent: int, observed: list[bytes]) -> None:
     for data in observed:
         slot = decode_observation(data).slot
         for topic, make in SAYS.items():
-            bus.putter(topic, agent)(make(slot))
+            bus.publisher(topic, agent)(make(slot))
 
 
 def main() -> None:

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from netem.wire.access import MOST_B, AccessError, Guard, login_of, write_users
-from netem.wire.bus import Bus, Ring, receive
+from netem.wire.access import MAX_AGENT_PUT_B, AccessControl, AccessError, login_of, write_users
+from netem.wire.bus import Bus, Subscriber, receive
 from netem.wire.keys import Keys
 from netem.wire.session import SessionError, open_client, open_router
 from tests.processes.harness import QSWARM, Started, eventually
@@ -19,14 +19,14 @@ KEYS = Keys("mine")
 
 
 @pytest.fixture
-def guard(tmp_path: Path) -> Guard:
+def guard(tmp_path: Path) -> AccessControl:
     write_users(tmp_path / "users", USERS)
-    return Guard(tmp_path / "users", "mine", 2)
+    return AccessControl(tmp_path / "users", "mine", 2)
 
 
 @pytest.fixture
-def session_of(guard: Guard, endpoint: str) -> Iterator[Callable[[str], zenoh.Session]]:
-    opened = [open_router(endpoint, guard=guard)]
+def session_of(guard: AccessControl, endpoint: str) -> Iterator[Callable[[str], zenoh.Session]]:
+    opened = [open_router(endpoint, access=guard)]
 
     def of(user: str) -> zenoh.Session:
         opened.append(open_client(endpoint, login=guard.login(user)))
@@ -37,7 +37,7 @@ def session_of(guard: Guard, endpoint: str) -> Iterator[Callable[[str], zenoh.Se
         session.close()
 
 
-def test_the_file_of_passwords_is_its_owners_alone(guard: Guard) -> None:
+def test_the_file_of_passwords_is_its_owners_alone(guard: AccessControl) -> None:
     assert guard.users.stat().st_mode & 0o777 == 0o600
     assert len({guard.login(user).password for user in USERS}) == len(USERS)
     with pytest.raises(AccessError, match="no password of agent-7"):
@@ -47,7 +47,7 @@ def test_the_file_of_passwords_is_its_owners_alone(guard: Guard) -> None:
 
 
 def test_without_a_password_nobody_comes_in(
-    session_of: Callable[[str], zenoh.Session], guard: Guard, endpoint: str
+    session_of: Callable[[str], zenoh.Session], guard: AccessControl, endpoint: str
 ) -> None:
     for login in (None, guard.login("agent-0")._replace(password="guess")):
         with pytest.raises(SessionError, match="no router answers"):
@@ -58,10 +58,12 @@ def test_an_agent_hears_its_own_radio_and_nothing_else(
     session_of: Callable[[str], zenoh.Session],
 ) -> None:
     world, spy = Bus(session_of("world"), KEYS), session_of("agent-0")
-    own = Ring(spy, KEYS.of("rx", 0), 4)
-    others = [Ring(spy, key, 64) for key in (KEYS.of("rx", 1), KEYS.every("rx"), "qswarm/**")]
-    puts = [world.putter(topic, agent, lockstep=True) for topic in ("rx",) for agent in (0, 1)]
-    puts += [world.putter("truth"), world.putter("observation", 1), world.putter("tx", 1)]
+    own = Subscriber(spy, KEYS.of("rx", 0), 4)
+    others = [
+        Subscriber(spy, key, 64) for key in (KEYS.of("rx", 1), KEYS.all_of("rx"), "qswarm/**")
+    ]
+    puts = [world.publisher(topic, agent, lockstep=True) for topic in ("rx",) for agent in (0, 1)]
+    puts += [world.publisher("truth"), world.publisher("observation", 1), world.publisher("tx", 1)]
     eventually(lambda: puts_reach(own, puts[0]), 5.0)
     for put in puts:
         put(b"secret")
@@ -78,7 +80,7 @@ def test_an_agent_hears_its_own_radio_and_nothing_else(
     assert sum(each == b"secret" for each in heard) == 1
 
 
-def puts_reach(ring: Ring, put: Callable[[bytes], None]) -> bool:
+def puts_reach(ring: Subscriber, put: Callable[[bytes], None]) -> bool:
     put(b"probe")
     return bool(ring.drain(64))
 
@@ -87,13 +89,13 @@ def test_an_agent_says_nothing_in_anybody_elses_name(
     session_of: Callable[[str], zenoh.Session],
 ) -> None:
     listener, agent = session_of("world"), Bus(session_of("agent-0"), KEYS)
-    own = Ring(listener, KEYS.of("command", 0), 64)
+    own = Subscriber(listener, KEYS.of("command", 0), 64)
     topics = [(topic, 1) for topic in ("command", "tx", "arrivals", "rx", "observation")]
     # Nor does it tell itself what only the world and the radio do.
     topics += [("rx", 0), ("observation", 0), ("over", None), ("truth", None), ("verdicts", None)]
-    forbidden = [Ring(listener, KEYS.of(*each), 64) for each in topics]
-    puts = [agent.putter(*each) for each in topics]
-    mine = agent.putter("command", 0)
+    forbidden = [Subscriber(listener, KEYS.of(*each), 64) for each in topics]
+    puts = [agent.publisher(*each) for each in topics]
+    mine = agent.publisher("command", 0)
     eventually(lambda: puts_reach(own, mine), 5.0)
     for put in puts:
         put(b"forged")
@@ -101,14 +103,14 @@ def test_an_agent_says_nothing_in_anybody_elses_name(
     assert [ring.drain(64) for ring in forbidden] == [[]] * len(topics)
 
 
-@pytest.mark.parametrize("topic", MOST_B)
+@pytest.mark.parametrize("topic", MAX_AGENT_PUT_B)
 def test_what_is_too_long_goes_no_further_than_the_router(
     session_of: Callable[[str], zenoh.Session], topic: str
 ) -> None:
-    heard = Ring(session_of("world"), KEYS.of(topic, 0), 64)
-    put = Bus(session_of("agent-0"), KEYS).putter(topic, 0)
+    heard = Subscriber(session_of("world"), KEYS.of(topic, 0), 64)
+    put = Bus(session_of("agent-0"), KEYS).publisher(topic, 0)
     eventually(lambda: puts_reach(heard, put), 5.0)
-    longest = bytes(MOST_B[topic])
+    longest = bytes(MAX_AGENT_PUT_B[topic])
     put(longest + b"x")
     put(longest)
     said: list[bytes] = []
@@ -116,23 +118,26 @@ def test_what_is_too_long_goes_no_further_than_the_router(
     assert longest + b"x" not in said
 
 
-@pytest.mark.parametrize("topic", MOST_B)
+@pytest.mark.parametrize("topic", MAX_AGENT_PUT_B)
 def test_what_an_agent_says_is_heard_and_not_by_itself(
     session_of: Callable[[str], zenoh.Session], topic: str
 ) -> None:
     agent = session_of("agent-0")
-    heard, echo = Ring(session_of("world"), KEYS.of(topic, 0), 64), Ring(agent, "qswarm/**", 64)
-    put = Bus(session_of("agent-0"), KEYS).putter(topic, 0)
+    heard, echo = (
+        Subscriber(session_of("world"), KEYS.of(topic, 0), 64),
+        Subscriber(agent, "qswarm/**", 64),
+    )
+    put = Bus(session_of("agent-0"), KEYS).publisher(topic, 0)
     eventually(lambda: puts_reach(heard, put), 5.0)
     assert echo.drain(64) == []
 
 
 def test_an_operator_asks_and_does_no_more(session_of: Callable[[str], zenoh.Session]) -> None:
     world, operator = session_of("world"), session_of("operator")
-    questions = Bus(world, KEYS).questions("control")
-    over = Ring(world, KEYS.of("over"), 4)
+    questions = Bus(world, KEYS).queryable("control")
+    over = Subscriber(world, KEYS.of("over"), 4)
     asking = Bus(operator, KEYS)
-    asking.putter("over")(b"forged")
+    asking.publisher("over")(b"forged")
 
     def answered() -> bool:
         replies = operator.get(KEYS.of("control"), payload=b"how is it?", timeout=2.0)

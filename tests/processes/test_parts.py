@@ -49,11 +49,11 @@ def test_netem_serves_the_run_that_asks_first_and_refuses_a_second(
     question = msgspec.json.encode(MediumSetup(1, 2, 4, 80.0, Conditions()))
     with open_client(endpoint) as session:
         first, second = Bus(session, Keys("first")), Bus(session, Keys("second"))
-        assert first.ask("medium", None, question, timeout_s=5.0) == b""
+        assert first.query("medium", None, question, timeout_s=5.0) == b""
         with pytest.raises(RefusedError, match="serves run 'first' already"):
-            second.ask("medium", None, question, timeout_s=5.0)
-        assert first.ask("medium", None, question, timeout_s=5.0) == b""
-        first.putter("over")(b"")
+            second.query("medium", None, question, timeout_s=5.0)
+        assert first.query("medium", None, question, timeout_s=5.0) == b""
+        first.publisher("over")(b"")
         assert netem.status(5.0) == 0, netem.text
 
 
@@ -61,7 +61,7 @@ def test_netem_refuses_conditions_that_make_no_sense(start: Start, endpoint: str
     netem = start(*PYTHON, "netem", "--listen", endpoint)
     netem.says("netem listens at")
     with open_client(endpoint) as session, pytest.raises(RefusedError, match="conditions: "):
-        Bus(session, Keys("odd")).ask("medium", None, b'{"seed": -1}', timeout_s=5.0)
+        Bus(session, Keys("odd")).query("medium", None, b'{"seed": -1}', timeout_s=5.0)
 
 
 def test_a_fleet_started_by_a_shell_loop_passes(
@@ -122,8 +122,8 @@ def test_netem_that_nobody_asked_ends_when_told_to(start: Start, endpoint: str) 
         ("tcp/example.org:7447", "not a loopback address"),
         ("tcp/127.0.0.1", "the port is missing or wrong"),
         ("tcp/127.0.0.1:99999", "the port is missing or wrong"),
-        ("127.0.0.1:7447", "no endpoint"),
-        ("", "no endpoint"),
+        ("127.0.0.1:7447", "not an endpoint"),
+        ("", "not an endpoint"),
     ],
 )
 def test_a_router_listens_on_loopback_only(listen: str, said: str) -> None:
@@ -133,7 +133,7 @@ def test_a_router_listens_on_loopback_only(listen: str, said: str) -> None:
 
 
 def test_a_client_needs_an_endpoint() -> None:
-    with pytest.raises(SessionError, match="no endpoint"):
+    with pytest.raises(SessionError, match="not an endpoint"):
         open_client("localhost:7447")
 
 

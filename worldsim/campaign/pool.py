@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from netem.wire.shutdown import Stop
+from netem.wire.shutdown import StopRequest
 from worldsim.engine.step import SlotLoop
 from worldsim.engine.virtual import fly
 from worldsim.results.run_folder import RunDirectory
@@ -38,7 +38,7 @@ class Job(NamedTuple):
 
 
 def simulate(
-    job: Job, stop: Stop, on_progress: Callable[[SlotLoop], None] | None = None
+    job: Job, stop: StopRequest, on_progress: Callable[[SlotLoop], None] | None = None
 ) -> Summary:
     """Fly one run into a new folder; return its summary and, under ``folder``, where it is.
 
@@ -49,7 +49,7 @@ def simulate(
     directory = RunDirectory.create(job.folder, scenario)
     notes = open_sinks(directory, scenario, directory.path.name, "virtual", job.recording)
     try:
-        flight = fly(scenario, notes, on_progress=on_progress, unwanted=lambda: stop.asked)
+        flight = fly(scenario, notes, on_progress=on_progress, unwanted=lambda: stop.requested)
     finally:
         notes.close()
     flown_s = flight.loop.world.time_s
@@ -68,21 +68,21 @@ def simulate(
     return {**summary, "folder": str(directory.path)}
 
 
-def sweep(jobs: list[Job], workers: int, stop: Stop) -> Iterator[Summary]:
+def sweep(jobs: list[Job], workers: int, stop: StopRequest) -> Iterator[Summary]:
     """Fly many runs in up to ``workers`` processes; yield each summary as it is done.
 
     When ``stop`` is asked for, the runs in flight are the last.
     """
     if workers == 1 or len(jobs) == 1:
         for job in jobs:
-            if not stop.asked:
+            if not stop.requested:
                 yield simulate(job, stop)
         return
     with _pool(min(workers, len(jobs))) as pool:
         yield from _done([pool.submit(_in_worker, job) for job in jobs], stop)
 
 
-def _done(pending: list[Future[Summary | None]], stop: Stop) -> Iterator[Summary]:
+def _done(pending: list[Future[Summary | None]], stop: StopRequest) -> Iterator[Summary]:
     interrupted = False
     while pending:
         done, _ = wait(pending, LOOK_EVERY_S, FIRST_COMPLETED)
@@ -92,7 +92,7 @@ def _done(pending: list[Future[Summary | None]], stop: Stop) -> Iterator[Summary
             summary = _result(future, stop)
             if summary is not None:
                 yield summary
-        if stop.asked and not interrupted:
+        if stop.requested and not interrupted:
             interrupted = True
             _interrupt(pending)
 
@@ -104,7 +104,7 @@ def _interrupt(pending: list[Future[Summary | None]]) -> None:
         worker.terminate()
 
 
-def _result(future: Future[Summary | None], stop: Stop) -> Summary | None:
+def _result(future: Future[Summary | None], stop: StopRequest) -> Summary | None:
     """Return what a worker brought; None for a run that an interruption kept from beginning."""
     if future.cancelled():
         return None
@@ -112,7 +112,7 @@ def _result(future: Future[Summary | None], stop: Stop) -> Summary | None:
         return future.result()
     except BrokenProcessPool:
         # A worker that is told to end before it can hear of it just ends.
-        if stop.asked:
+        if stop.requested:
             return None
         raise
 
@@ -199,13 +199,13 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 @cache
-def _stop_of_worker() -> Stop:
-    return Stop()
+def _stop_of_worker() -> StopRequest:
+    return StopRequest()
 
 
 def _in_worker(job: Job) -> Summary | None:
     stop = _stop_of_worker()
-    return None if stop.asked else simulate(job, stop)
+    return None if stop.requested else simulate(job, stop)
 
 
 def _begin_worker() -> None:

@@ -3,7 +3,7 @@
 from collections import Counter
 from pathlib import Path
 
-from netem.wire.shutdown import Stop, stoppable
+from netem.wire.shutdown import StopRequest, stop_requests
 from worldsim.campaign.pool import Job, Summary, over_all, simulate, sweep
 from worldsim.results.run_folder import RunDirectoryError, make_folder, write_json
 from worldsim.results.summary import EXIT_STATUS, INTERRUPTED
@@ -17,7 +17,7 @@ def fly_one(scenario: Scenario, out: Path | None, recording: bool) -> int:
     Ctrl-C ends it early; its verdict is told and kept all the same.
     """
     line = ProgressLine()
-    with stoppable() as stop:
+    with stop_requests() as stop:
         summary = simulate(
             Job(scenario, out, recording),
             stop,
@@ -25,7 +25,7 @@ def fly_one(scenario: Scenario, out: Path | None, recording: bool) -> int:
         )
     line.clear()
     print(verdict(summary, Path(summary["folder"]), recording))
-    return INTERRUPTED if stop.asked else EXIT_STATUS[summary["outcome"]]
+    return INTERRUPTED if stop.requested else EXIT_STATUS[summary["outcome"]]
 
 
 def fly_many(scenarios: list[Scenario], out: Path | None, recording: bool, workers: int) -> int:
@@ -42,15 +42,15 @@ def fly_many(scenarios: list[Scenario], out: Path | None, recording: bool, worke
         Job(scenario, folder / name, recording)
         for scenario, name in zip(scenarios, names, strict=True)
     ]
-    with stoppable() as stop:
+    with stop_requests() as stop:
         done = _flown(jobs, workers, stop)
-    overall = over_all(done, stop.asked)
+    overall = over_all(done, stop.requested)
     write_json(folder / "summary.json", overall)
     print(table(overall, folder))
-    return INTERRUPTED if stop.asked else EXIT_STATUS[overall["outcome"]]
+    return INTERRUPTED if stop.requested else EXIT_STATUS[overall["outcome"]]
 
 
-def _flown(jobs: list[Job], workers: int, stop: Stop) -> list[Summary]:
+def _flown(jobs: list[Job], workers: int, stop: StopRequest) -> list[Summary]:
     line = ProgressLine()
     done: list[Summary] = []
     for summary in sweep(jobs, workers, stop):

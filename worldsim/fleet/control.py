@@ -13,7 +13,7 @@ import zenoh
 
 from netem.faults import RadioEvent
 from netem.link_keys import Conditions
-from netem.wire.bus import Bus, Waiting, drained
+from netem.wire.bus import Bus, Handler, drain
 from worldsim.engine.operations import (
     EndProcesses,
     GiveMission,
@@ -186,11 +186,11 @@ class Reception:
 
     def __init__(self, bus: Bus, control: Control) -> None:
         self._control = control
-        self._questions: Waiting[zenoh.Query] = bus.questions("control")
+        self._questions: Handler[zenoh.Query] = bus.queryable("control")
 
     def attend(self, carry_out: CarryOut) -> None:
         """Answer what has come, a few a slot."""
-        for query in drained(self._questions, REQUESTS_A_SLOT):
+        for query in drain(self._questions, REQUESTS_A_SLOT):
             with query:
                 asked = query.payload.to_bytes() if query.payload is not None else b""
                 try:

@@ -10,7 +10,7 @@ from itertools import accumulate
 from typing import Any
 
 from netem.wire.frame import CHANNELS, WireError
-from netem.wire.latency import BINS_A_SLOT, Arrivals, bin_of, unpack_arrivals
+from netem.wire.latency import BINS_PER_SLOT, LatencyReport, bin_of, unpack_report
 
 PERCENTILES = (1, 5, 50, 95, 99)
 Counts = Sequence[int]
@@ -20,18 +20,18 @@ class ArrivalBook:
     """What agents told of frames that came; slots_per_tick and slot_s [s] as in the run's clock."""
 
     def __init__(self, slots_per_tick: int, slot_s: float) -> None:
-        self._bound_bins = (1 + slots_per_tick) * BINS_A_SLOT
+        self._bound_bins = (1 + slots_per_tick) * BINS_PER_SLOT
         self._slot_s = slot_s
-        self._bin_ms = 1e3 * slot_s / BINS_A_SLOT
-        self._told: dict[tuple[int, int], Arrivals] = {}
+        self._bin_ms = 1e3 * slot_s / BINS_PER_SLOT
+        self._told: dict[tuple[int, int], LatencyReport] = {}
 
     def take(self, agent: int, incarnation: int, data: bytes, now_s: float) -> None:
         """Take what an agent told of itself by ``now_s`` [s].
 
         Raises WireError where it is not to be believed.
         """
-        told = unpack_arrivals(data)
-        if max(told.most_us) > 1e6 * now_s or not self._consistent(told):
+        told = unpack_report(data)
+        if max(told.max_us) > 1e6 * now_s or not self._consistent(told):
             raise WireError("an excess that none of its frames can have")
         if told.incarnation != incarnation:
             raise WireError(f"of incarnation {told.incarnation}, where {incarnation} flies")
@@ -53,20 +53,20 @@ class ArrivalBook:
         each = {name: self._distribution(told, [at]) for at, name in enumerate(CHANNELS)}
         return {"bound_ms": bound_ms, **whole, "channels": each}
 
-    def _consistent(self, told: Arrivals) -> bool:
+    def _consistent(self, told: LatencyReport) -> bool:
         """Whether the greatest excess of each channel is where its last frames are."""
         last = [max((at for at, n in enumerate(bins) if n), default=0) for bins in told.counts]
-        return last == [bin_of(most_us, self._slot_s) for most_us in told.most_us]
+        return last == [bin_of(max_us, self._slot_s) for max_us in told.max_us]
 
     def _distribution(
-        self, told: Sequence[Arrivals], channels: Sequence[int]
+        self, told: Sequence[LatencyReport], channels: Sequence[int]
     ) -> dict[str, Any] | None:
         bins = [each.counts[at] for each in told for at in channels]
         counts = [sum(column) for column in zip(*bins, strict=True)]
         frames = sum(counts)
         if not frames:
             return None
-        most_ms = max(each.most_us[at] for each in told for at in channels) / 1000.0
+        most_ms = max(each.max_us[at] for each in told for at in channels) / 1000.0
         excess_ms = {
             f"p{percent}": min(at * self._bin_ms, most_ms) if at < len(counts) - 1 else most_ms
             for percent in PERCENTILES
@@ -89,14 +89,14 @@ def quantile(counts: Counts, percent: float) -> int:
     return next(at for at, so_far in enumerate(accumulate(counts)) if so_far and so_far >= wanted)
 
 
-def _frames(told: Arrivals) -> int:
+def _frames(told: LatencyReport) -> int:
     return sum(map(sum, told.counts))
 
 
-def _backwards(before: Arrivals, now: Arrivals) -> bool:
+def _backwards(before: LatencyReport, now: LatencyReport) -> bool:
     less = any(
         one > other
         for ones, others in zip(before.counts, now.counts, strict=True)
         for one, other in zip(ones, others, strict=True)
     )
-    return less or any(a > b for a, b in zip(before.most_us, now.most_us, strict=True))
+    return less or any(a > b for a, b in zip(before.max_us, now.max_us, strict=True))

@@ -76,13 +76,13 @@ class FreeRunningFleet:
         self._refused: Counter[str] = Counter()
         self._pacer = Pacer(1.0 / (scenario.slot_hz * speed))
         self._progress_reporter = ProgressReporter(scenario.duration_s, self.loop, launcher)
-        self._truth, self._over = bus.putter("truth"), bus.putter("over")
-        self._observers = [bus.putter("observation", agent) for agent in rows]
-        self._commands = bus.rings("command", rows)
-        self._reports = bus.ring("verdicts", size=REPORTS_RING)
+        self._truth, self._over = bus.publisher("truth"), bus.publisher("over")
+        self._observers = [bus.publisher("observation", agent) for agent in rows]
+        self._commands = bus.fair_subscriber("command", rows)
+        self._reports = bus.subscriber("verdicts", size=REPORTS_RING)
         clock = self.loop.world.clock
         self._book = ArrivalBook(clock.slots_per_tick, 1.0 / clock.slot_hz)
-        self._arrivals = [bus.ring("arrivals", agent) for agent in rows]
+        self._arrivals = [bus.subscriber("arrivals", agent) for agent in rows]
         self._slots_a_report = round(clock.slot_hz)
 
     @property
@@ -227,7 +227,7 @@ class ProcessActions:
     def __init__(
         self, bus: Bus, startup: Startup, launcher: LauncherLink, boot_wall_s: float
     ) -> None:
-        self._orders = bus.putter("orders")
+        self._orders = bus.publisher("orders")
         self._startup = startup
         self._launcher = launcher
         self._after_s = max(0.0, boot_wall_s - START_WITHIN_S)

@@ -15,9 +15,9 @@ from typing import Any
 from rich.console import Console
 
 from netem import process as netem_process
-from netem.wire.access import OPERATOR, Guard, write_users
+from netem.wire.access import OPERATOR, AccessControl, write_users
 from netem.wire.keys import agent_name, medium_name
-from netem.wire.shutdown import interruptible, uninterrupted
+from netem.wire.shutdown import ignore_signals, interrupt_on_signals
 from worldsim.fleet import process as world_process
 from worldsim.fleet.fork import Exit
 from worldsim.fleet.ipc import Line, MessageSocket
@@ -52,7 +52,7 @@ def run(scenario: Scenario, directory: RunDirectory, terms: Terms) -> int:
 
     Whatever happens, Ctrl-C, SIGTERM and SIGHUP included, no process is left behind.
     """
-    interruptible()
+    interrupt_on_signals()
     # One thread for receiving is enough for a client, and saves a tenth of its CPU time.
     os.environ.setdefault("ZENOH_RUNTIME", "(rx: (worker_threads: 1))")
     launch = Launch(scenario, directory, terms._replace(users=directory.users))
@@ -65,11 +65,11 @@ def run(scenario: Scenario, directory: RunDirectory, terms: Terms) -> int:
         directory.nothing_flew()
         status = NOT_STARTED
     except KeyboardInterrupt:
-        uninterrupted()
+        ignore_signals()
         launch.interrupt()
         status = INTERRUPTED
     finally:
-        uninterrupted()
+        ignore_signals()
         launch.end()
     return status
 
@@ -83,7 +83,7 @@ class Launch:
         self._directory = directory
         self._terms = terms
         self._endpoint = f"tcp/127.0.0.1:{_free_port()}"
-        self._guard = Guard(directory.users, terms.run, scenario.rows)
+        self._guard = AccessControl(directory.users, terms.run, scenario.rows)
         self._table = ProcessTable(directory.path, terms.run, self._endpoint)
         self._supervisor = Supervisor(directory.logs, self._child_ended)
         self._zygote, self._zygote_end = MessageSocket.pair()

@@ -14,15 +14,15 @@ from netem.delivery_log import Digest, joined_pages
 from netem.faults import FaultOrder
 from netem.messages import Done, MediumCounters, Truth, Turn, together, unpack_done
 from netem.wire.barrier import (
-    ANSWER_WITHIN_S,
-    LOOK_EVERY_S,
-    TURN_RING,
+    ANSWER_TIMEOUT_S,
+    LOCKSTEP_RING,
+    POLL_S,
     LockstepError,
-    UnwantedError,
-    answer,
-    same_slot,
+    RunOverError,
+    await_message,
+    check_slot,
 )
-from netem.wire.bus import Bus, Ring
+from netem.wire.bus import Bus, Subscriber
 from netem.wire.frame import WireError, pack
 from netem.wire.keys import medium_name
 from worldsim.engine.operations import (
@@ -79,11 +79,11 @@ class LockstepFleet:
         self._reception = Reception(bus, Control(scenario, self.loop, launcher.launches))
         self._progress_reporter = ProgressReporter(scenario.duration_s, self.loop, launcher)
         self._digest = Digest()
-        self._truth = bus.putter("truth", lockstep=True)
-        self._over = bus.putter("over")
-        self._observers = [bus.putter("observation", agent, lockstep=True) for agent in rows]
-        self._commands = [bus.ring("command", agent, TURN_RING) for agent in rows]
-        self._done = [bus.ring("done", shard, TURN_RING) for shard in range(shards)]
+        self._truth = bus.publisher("truth", lockstep=True)
+        self._over = bus.publisher("over")
+        self._observers = [bus.publisher("observation", agent, lockstep=True) for agent in rows]
+        self._commands = [bus.subscriber("command", agent, LOCKSTEP_RING) for agent in rows]
+        self._done = [bus.subscriber("done", shard, LOCKSTEP_RING) for shard in range(shards)]
 
     def fly(self, unwanted: Callable[[], bool]) -> bool:
         """Fly the scenario's slots until the end, or until unwanted; return whether all of them.
@@ -97,7 +97,7 @@ class LockstepFleet:
             while self.loop.world.slot < self._slots and not unwanted():
                 self._slot()
                 self._progress_reporter.tell(time.perf_counter() - begun_s, None)
-        except UnwantedError:
+        except RunOverError:
             self.failure = self._broken()
             return False
         except LockstepError as error:
@@ -152,7 +152,7 @@ class LockstepFleet:
             command = decode_command(data)
         except RejectedError as error:
             raise LockstepError(f"{what}: {error}") from error
-        same_slot(what, command.slot, slot)
+        check_slot(what, command.slot, slot)
         if command.incarnation != self.loop.members.incarnations[agent]:
             raise LockstepError(f"{what} is of its incarnation {command.incarnation}")
         self.loop.obey(agent, command, data)
@@ -170,19 +170,19 @@ class LockstepFleet:
             done = unpack_done(self._answer(self._done[shard], what))
         except WireError as error:
             raise LockstepError(f"{what}: {error}") from error
-        same_slot(what, done.slot, slot)
+        check_slot(what, done.slot, slot)
         return done
 
-    def _answer(self, ring: Ring, what: str) -> bytes:
+    def _answer(self, ring: Subscriber, what: str) -> bytes:
         """Wait for a message; meanwhile see who is lost, and whether the run is still wanted."""
         standstill = Standstill(what, self._launcher)
 
         def over() -> bool:
-            standstill.lasts(LOOK_EVERY_S)
+            standstill.lasts(POLL_S)
             self._watch()
             return self._over_already()
 
-        return answer(ring, what, over)
+        return await_message(ring, what, over)
 
     def _over_already(self) -> bool:
         return self._unwanted()
@@ -223,7 +223,7 @@ class AwaitedActions:
 
         A process starts when its agent has booted: until then there is nothing for it to do.
         incarnations: of all agents, as they were before the operation. Raises LockstepError when it
-        does not come to pass, UnwantedError when the run ends meanwhile.
+        does not come to pass, RunOverError when the run ends meanwhile.
         """
         match operation:
             case EndProcesses(agents=agents):
@@ -268,9 +268,9 @@ class AwaitedActions:
         waited_s, standstill = 0.0, Standstill(what, self._launcher)
         while not there():
             if self._unwanted():
-                raise UnwantedError
-            if waited_s > ANSWER_WITHIN_S:
-                raise LockstepError(f"{what} has not come within {ANSWER_WITHIN_S:g} s")
+                raise RunOverError
+            if waited_s > ANSWER_TIMEOUT_S:
+                raise LockstepError(f"{what} has not come within {ANSWER_TIMEOUT_S:g} s")
             self._launcher.wait(DONE_LOOK_EVERY_S)
             waited_s += DONE_LOOK_EVERY_S
             standstill.lasts(DONE_LOOK_EVERY_S)

@@ -27,7 +27,7 @@ def ask(run: Path, request: Request) -> Answer:
     try:
         with open_client(fleet.endpoint, OPEN_WITHIN_S, login=_login(run)) as session:
             bus = Bus(session, Keys(fleet.run))
-            told = bus.ask("control", None, msgspec.json.encode(request), ANSWER_WITHIN_S)
+            told = bus.query("control", None, msgspec.json.encode(request), ANSWER_WITHIN_S)
     except (AccessError, SessionError) as error:
         raise OperatorError(f"{run}: {error}") from error
     except RefusedError as refusal:

@@ -12,7 +12,7 @@ from netem.wire.access import AccessError, login_of
 from netem.wire.bus import Bus
 from netem.wire.keys import Keys
 from netem.wire.session import SessionError, open_client
-from netem.wire.shutdown import Stop
+from netem.wire.shutdown import StopRequest
 from worldsim.fleet.free_running import FreeRunningFleet
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.lockstep import LockstepFleet
@@ -58,7 +58,7 @@ def run(
     """
     try:
         login = login_of(terms.users, "world") if terms.users is not None else None
-        with open_client(connect, patient=terms.lockstep, login=login) as session:
+        with open_client(connect, long_lease=terms.lockstep, login=login) as session:
             return conduct(session, scenario, directory(), terms, launcher_of)
     except (AccessError, SessionError, StartupError, RunDirectoryError) as error:
         print(f"world: {error}", file=sys.stderr)
@@ -78,9 +78,9 @@ def conduct(
     ours, the recording is finished and a summary written of what there was; a fleet that never
     took off leaves neither.
     """
-    stop = Stop()
+    stop = StopRequest()
     bus = Bus(session, Keys(terms.run))
-    bus.show_life("world")
+    bus.declare_alive("world")
     startup = Startup(bus, scenario, terms.lockstep, terms.shards)
     launcher = launcher_of(startup)
     notes = open_sinks(directory, scenario, directory.path.name, terms.mode, terms.recording)
@@ -88,7 +88,7 @@ def conduct(
     whole = False
 
     def unwanted() -> bool:
-        return stop.asked or launcher.stopped is not None
+        return stop.requested or launcher.stopped is not None
 
     try:
         whole = assemble(startup, terms.speed, unwanted, launcher) and flight.fly(unwanted)

@@ -8,7 +8,7 @@ import zenoh
 
 from agent.config import AgentSetup
 from netem.messages import MediumSetup
-from netem.wire.bus import Bus, Presence, RefusedError, Waiting, drained
+from netem.wire.bus import Bus, Handler, Liveliness, RefusedError, drain
 from netem.wire.keys import medium_name
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
 from worldsim.fleet.launcher_link import LauncherLink
@@ -38,8 +38,8 @@ class Startup:
         self._shards = shards
         self._uninstructed = list(range(shards))
         self._incarnations = dict.fromkeys(range(scenario.fleet.agents), 0)
-        self._presence: Presence = bus.presence()
-        self._questions: Waiting[zenoh.Query] = bus.questions("setup")
+        self._liveliness: Liveliness = bus.liveliness()
+        self._questions: Handler[zenoh.Query] = bus.queryable("setup")
 
     def instruct_medium(self, speed: float) -> bool:
         """Tell each medium its conditions; False while one is missing.
@@ -50,24 +50,24 @@ class Startup:
             shard = self._uninstructed[0]
             question = msgspec.json.encode(self._medium_setup(shard, speed))
             topic, who = ("shard", shard) if shard else ("medium", None)
-            if self._bus.ask(topic, who, question, timeout_s=2.0) is None:
+            if self._bus.query(topic, who, question, timeout_s=2.0) is None:
                 return False
             self._uninstructed.pop(0)
         return True
 
     def instruct_agents(self) -> None:
         """Answer the agents that ask."""
-        for query in drained(self._questions, QUESTIONS_AT_ONCE):
+        for query in drain(self._questions, QUESTIONS_AT_ONCE):
             with query:
                 self._answer(query)
 
     def missing(self) -> list[str]:
         """Return the names of those who have not come."""
-        self._presence.gone()
+        self._liveliness.departed()
         agents = range(self._scenario.fleet.agents)
         mediums = [medium_name(shard) for shard in range(self._shards)]
         wanted = [*mediums, *(f"agent-{agent}" for agent in agents)]
-        return [name for name in wanted if name not in self._presence.present]
+        return [name for name in wanted if name not in self._liveliness.alive]
 
     def expect(self, incarnations: Mapping[int, int]) -> None:
         """Let agents come, too, or again: each with its incarnation."""
@@ -75,8 +75,8 @@ class Startup:
 
     def absent(self, agents: Iterable[int]) -> list[int]:
         """Return which of these agents show no sign of life."""
-        self._presence.gone()
-        return [agent for agent in agents if f"agent-{agent}" not in self._presence.present]
+        self._liveliness.departed()
+        return [agent for agent in agents if f"agent-{agent}" not in self._liveliness.alive]
 
     def present(self, agents: Iterable[int]) -> list[int]:
         """Return which of these agents show a sign of life."""
@@ -85,7 +85,7 @@ class Startup:
 
     def gone(self) -> list[str]:
         """Return who went since the last call, as liveliness has it: a hint."""
-        return self._presence.gone()
+        return self._liveliness.departed()
 
     def _medium_setup(self, shard: int, speed: float) -> MediumSetup:
         rows = range(self._scenario.rows)

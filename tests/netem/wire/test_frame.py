@@ -1,4 +1,4 @@
-"""Whatever bytes come, the wire gives back a message that keeps its promises, or a WireError."""
+"""Any bytes decode into a message that keeps the promises of its type, or raise WireError."""
 
 from math import inf, nan
 from random import Random
@@ -59,12 +59,12 @@ batches = st.builds(
 
 
 def kept(message):
-    """Whether a message keeps what its type promises: it survives its own codec, unchanged."""
+    """Whether a message keeps the promises of its type: it survives its own codec unchanged."""
     return READER_OF[type(message)](pack(message)) == message
 
 
 def survives(reader, kind, data):
-    """Return what came of the bytes; any error but WireError ends the test."""
+    """Return the decoded message or None; any error but WireError fails the test."""
     try:
         message = reader(data)
     except WireError:
@@ -93,7 +93,7 @@ def test_the_greatest_transmission_survives_the_wire():
     assert unpack_transmission(pack(transmission)) == transmission
 
 
-def test_a_batch_is_no_larger_than_its_parts_say():
+def test_the_size_of_a_batch_is_the_sum_of_its_parts():
     frame = Frame(2**16 - 1, GREATEST, 1, GREATEST, b"x" * MAX_PAYLOAD_B)
     batch = Batch(GREATEST, (frame,) * 4000)
     assert len(pack(batch)) == BATCH_HEAD_B + 4000 * (FRAME_HEAD_B + MAX_PAYLOAD_B)
@@ -101,14 +101,14 @@ def test_a_batch_is_no_larger_than_its_parts_say():
 
 @settings(derandomize=True, deadline=None, max_examples=150)
 @given(batches, st.data())
-def test_a_delivery_is_a_batch_and_a_time_for_each_frame(batch, data):
+def test_a_delivery_is_a_batch_with_a_time_for_each_frame(batch, data):
     size = len(batch.frames)
     early_us = tuple(data.draw(st.lists(st.integers(0, MAX_EARLY_US), max_size=10)))
     delivery = Delivery(batch.slot, batch.frames, early_us)
     if len(early_us) == size:
         assert unpack_delivery(pack(delivery)) == delivery
     else:
-        with pytest.raises(WireError, match="times of"):
+        with pytest.raises(WireError, match="due times for"):
             unpack_delivery(pack(delivery))
     with pytest.raises(WireError):
         unpack_batch(pack(delivery))
@@ -132,7 +132,7 @@ def test_junk_is_refused(reader, kind):
 
 
 @pytest.mark.parametrize(("reader", "kind"), READERS)
-def test_junk_that_begins_well_is_refused(reader, kind):
+def test_junk_with_a_valid_start_is_refused(reader, kind):
     random = Random(2)
     for _ in range(MANY):
         head = bytes([0x90 + random.randrange(16), random.randrange(256), random.randrange(256)])
@@ -160,7 +160,7 @@ def test_mutations_are_refused_or_still_keep_the_promise(reader, kind, good):
 
 
 @pytest.mark.parametrize("cut", range(len(pack(Batch(7, (Frame(3, 1, 1, 900, b"abc"),))))))
-def test_a_part_of_a_message_is_none(cut):
+def test_a_truncated_message_is_refused(cut):
     with pytest.raises(WireError):
         unpack_batch(pack(Batch(7, (Frame(3, 1, 1, 900, b"abc"),)))[:cut])
 
@@ -208,7 +208,7 @@ WRONG = {
     "a map for a frame": (1, 0, ({"channel": 0, "payload": b""},)),
     "text for a payload": (1, 0, ((0, "aGVsbG8="),)),
     "numbers for a payload": (1, 0, ((0, (1, 2)),)),
-    "a channel that is not": (1, 0, ((2, b""),)),
+    "an unknown channel": (1, 0, ((2, b""),)),
     "a payload too long": (1, 0, ((0, b"x" * (MAX_PAYLOAD_B + 1)),)),
     "too many frames": (1, 0, ((0, b""),) * (MAX_OUTGOING + 1)),
     "an extension for a payload": (1, 0, ((0, msgpack.ExtType(5, b"")),)),
@@ -234,9 +234,9 @@ BOMBS = {
     "4 GiB of extension": b"\xc9\xff\xff\xff\xff\x05",
     "a short timestamp": b"\xd6\xff\x00\x00\x00\x01",
     "an empty timestamp": b"\xc7\x00\xff",
-    "text that is none": b"\xa2\xff\xfe",
+    "text that is not UTF-8": b"\xa2\xff\xfe",
     "a reserved byte": b"\xc1",
-    "no key twice": b"\x82\xc0\x00\xc0\x00",
+    "two keys of nil": b"\x82\xc0\x00\xc0\x00",
     "two messages": b"\x93\x01\x00\x90" * 2,
 }
 
@@ -256,7 +256,7 @@ def test_a_bomb_is_refused(data):
         (unpack_delivery, MAX_DELIVERY_B),
     ],
 )
-def test_what_is_too_large_is_not_even_decoded(reader, limit_b, monkeypatch):
+def test_a_message_that_is_too_long_is_not_decoded(reader, limit_b, monkeypatch):
     monkeypatch.setattr(msgpack, "unpackb", lambda *_, **__: pytest.fail("it was decoded"))
     with pytest.raises(WireError, match="oversize"):
         reader(bytes(limit_b + 1))
