@@ -11,17 +11,15 @@ from zlib import crc32
 import msgpack
 import msgspec
 
-from agent.messages import Beacon, Command, Gossip, Observation
+from agent.messages import MAX_PIECES, PIECE_B, Beacon, Command, Gossip, Observation
+from agent.qstructure.expression import MAX_EXPRESSION_LENGTH
 from agent.qstructure.formation import FormationSpec
+from netem.wire.channels import MAX_PAYLOAD_B
 
-MAX_RADIO_B = 1200
-"""What the radio carries in a frame, the seal included."""
 SEAL_B = 4
 MAX_MESSAGE_B = 4096
 MAX_OBSERVATION_B = 65536
 """Bodies sensed, and with them a mission: its formation and its frame's path."""
-MAX_FORMATION_B = 16 * 900
-MAX_EXPRESSION = 300
 
 _T = TypeVar("_T", bound=msgspec.Struct)
 _encode = msgspec.msgpack.Encoder().encode
@@ -47,8 +45,8 @@ def sealed(data: bytes) -> bytes:
 
 def unsealed(payload: bytes) -> bytes:
     """Return what was sealed, or raise :class:`RejectedError` where a bit was turned on the way."""
-    if len(payload) > MAX_RADIO_B:
-        raise RejectedError("oversize", f"{len(payload)} B where {MAX_RADIO_B} B are allowed")
+    if len(payload) > MAX_PAYLOAD_B:
+        raise RejectedError("oversize", f"{len(payload)} B where {MAX_PAYLOAD_B} B are allowed")
     data = payload[:-SEAL_B]
     if payload != sealed(data):
         raise RejectedError("corrupt", "the checksum does not fit")
@@ -90,7 +88,7 @@ def encode_formation(formation: FormationSpec) -> bytes:
 
 def decode_formation(data: bytes) -> FormationSpec:
     """Decode a formation that came over the radio, or raise :class:`RejectedError`."""
-    return decode(data, FormationSpec, MAX_FORMATION_B, max_text=MAX_EXPRESSION)
+    return decode(data, FormationSpec, MAX_PIECES * PIECE_B, max_text=MAX_EXPRESSION_LENGTH)
 
 
 _beacon = msgspec.msgpack.Decoder(Beacon).decode
@@ -101,12 +99,12 @@ _command = msgspec.msgpack.Decoder(Command).decode
 
 def decode_beacon(payload: bytes) -> Beacon:
     """Decode a frame of the local channel, or raise :class:`RejectedError`."""
-    return _typed(unsealed(payload), _beacon, MAX_RADIO_B)
+    return _typed(unsealed(payload), _beacon, MAX_PAYLOAD_B)
 
 
 def decode_gossip(payload: bytes) -> Gossip:
     """Decode a frame of the multihop channel, or raise :class:`RejectedError`."""
-    return _typed(unsealed(payload), _gossip, MAX_RADIO_B)
+    return _typed(unsealed(payload), _gossip, MAX_PAYLOAD_B)
 
 
 def decode_observation(data: bytes) -> Observation:

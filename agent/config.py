@@ -88,6 +88,11 @@ class Sensors(Table, frozen=True):
     sonar: Sonar = Sonar()
 
 
+DEFAULT_CAST_FAR_M = 0.5
+"""d_c2 [m] where neither the scenario nor the radio's range sets another (Lemma 7, E20)."""
+AvoidanceKind = Literal["constellation", "direct", "none"]
+
+
 class Control(Table, frozen=True):
     """The controller and the paper's distances [m]: d_ir, d_ob, d_s, d_c1, d_c2.
 
@@ -104,7 +109,7 @@ class Control(Table, frozen=True):
     clearance_m: Positive = 0.5
     cast_near_m: Positive = 0.05
     cast_far_m: Positive | None = None
-    avoidance: Literal["constellation", "direct", "none"] = "constellation"
+    avoidance: AvoidanceKind = "constellation"
 
 
 class Comms(Table, frozen=True):

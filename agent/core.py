@@ -7,13 +7,13 @@ the virtual clock) only carry bytes.
 from collections import Counter
 from collections.abc import Callable
 from math import dist, hypot, inf
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import msgspec
 
 from agent.checked_controller import CheckedController
 from agent.codec import RejectedError, decode_beacon, decode_gossip
-from agent.comms.broadcast import LOCAL, Broadcast, OwnState
+from agent.comms.broadcast import Broadcast, OwnState
 from agent.comms.gossip import Table
 from agent.comms.hierarchy import ALONE, Hierarchy
 from agent.comms.mission import Missions
@@ -36,6 +36,8 @@ from agent.messages import (
     Vector,
 )
 from agent.sensing.obstacle_perception import ObstaclePerception
+from netem.wire import channels
+from netem.wire.channels import Channel
 
 MAX_COST_MM = 2**31 - 1
 TIDY_S = 0.2
@@ -51,7 +53,7 @@ class Outbox(msgspec.Struct, frozen=True, gc=False):
     """What an agent says at the end of a step: to its vehicle, and (channel, payload) to all."""
 
     command: Command
-    frames: tuple[tuple[int, bytes], ...]
+    frames: tuple[tuple[Channel, bytes], ...]
 
 
 class Decoders(NamedTuple):
@@ -93,13 +95,16 @@ class Agent:
         self._tidy_at_s = 0.0
         self._record_age_s = 0.0
 
-    def receive(self, source: int, channel: int, payload: bytes, now_s: float) -> None:
+    def receive(self, source: int, channel: Channel, payload: bytes, now_s: float) -> None:
         """Take a frame heard from ``source``; what is not to be believed is counted, by cause."""
         try:
-            if channel == LOCAL:
-                self._hear_beacon(source, payload, now_s)
-            else:
-                self._hear_gossip(source, payload, now_s)
+            match channel:
+                case channels.LOCAL:
+                    self._hear_beacon(source, payload, now_s)
+                case channels.MULTIHOP:
+                    self._hear_gossip(source, payload, now_s)
+                case _:
+                    assert_never(channel)
         except RejectedError as error:
             self.rejected[error.cause] += 1
 

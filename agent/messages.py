@@ -96,6 +96,13 @@ class FramePath(Message, frozen=True):
 AT_HOME = FramePath(((0.0, 0.0, 0.0),))
 
 
+MAX_ORDER_B = 3000
+"""Longest formation in an operator's order, as msgpack [B]."""
+PIECE_B = 900
+"""Longest part of a mission in one frame [B]; the last part may be shorter."""
+MAX_PIECES = 16
+
+
 class Mission(Message, frozen=True):
     """What the team shall form, and where; the highest ``key`` wins everywhere.
 
@@ -105,7 +112,15 @@ class Mission(Message, frozen=True):
 
     key: Count
     frame: FramePath
-    formation: Annotated[bytes, Meta(max_length=3000)]
+    formation: Annotated[bytes, Meta(max_length=MAX_ORDER_B)]
+
+
+NO_ECHO_MM = 0xFFFF
+"""The range of a ray that meets nothing within the sensor's range."""
+MAX_OBSTACLE_POINTS = 32
+"""Most nearest points of obstacles in one observation."""
+PROXIMITY_RANGE_M = 2.0
+"""Reach of the proximity sensor [m]."""
 
 
 class Scan(Message, frozen=True):
@@ -137,7 +152,7 @@ class Observation(Message, frozen=True):
     velocity: Velocity
     yaw: Radians
     vehicles: Annotated[tuple[Position, ...], Meta(max_length=256)]
-    obstacles: Annotated[tuple[Position, ...], Meta(max_length=32)]
+    obstacles: Annotated[tuple[Position, ...], Meta(max_length=MAX_OBSTACLE_POINTS)]
     orders: Annotated[tuple[Mission, ...], Meta(max_length=4)]
     scans: Annotated[tuple[Scan, ...], Meta(max_length=2)]
 
@@ -244,8 +259,8 @@ class Piece(Message, frozen=True):
     """A part of a mission under way, path and formation: the ``index``-th of ``count``."""
 
     key: Count
-    index: Annotated[int, Meta(ge=0, lt=16)]
-    count: Annotated[int, Meta(ge=1, le=16)]
+    index: Annotated[int, Meta(ge=0, lt=MAX_PIECES)]
+    count: Annotated[int, Meta(ge=1, le=MAX_PIECES)]
     data: Annotated[bytes, Meta(max_length=1000)]
 
 

@@ -12,9 +12,8 @@ from agent.codec import encode, sealed
 from agent.comms.gossip import Table
 from agent.comms.hierarchy import ALONE, Standing
 from agent.messages import HOME, Beacon, Drift, Piece, Place, Pose, Record, Vector
+from netem.wire.channels import LOCAL, MULTIHOP, Channel
 
-LOCAL, MULTIHOP = 0, 1
-"""Channels of the radio."""
 MEMORY = 200
 """So many of the own beacons are remembered, for the echoes that may come."""
 MAX_ECHOES = 67
@@ -68,12 +67,12 @@ class Broadcast:
         echoes: tuple[tuple[int, int], ...],
         table: Table,
         pieces: Sequence[Piece] = (),
-    ) -> tuple[tuple[int, bytes], ...]:
+    ) -> tuple[tuple[Channel, bytes], ...]:
         """Return what is due now, as (channel, payload).
 
         pieces: of the mission, where somebody who is heard lacks it; they go with the next round.
         """
-        frames: list[tuple[int, bytes]] = []
+        frames: list[tuple[Channel, bytes]] = []
         if now_s >= self._next_beacon_s:
             self._next_beacon_s = now_s + self._beacon_period_s - 1e-9
             frames.append((LOCAL, sealed(encode(self._beacon(now_s, own, echoes)))))

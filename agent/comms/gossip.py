@@ -9,10 +9,11 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from math import inf
 from types import MappingProxyType
 
-from agent.codec import MAX_RADIO_B, SEAL_B, encode, sealed
+from agent.codec import SEAL_B, encode, sealed
 from agent.comms.unidentified_vehicles import Departed, Member
 from agent.controller import Peer
 from agent.messages import Beacon, Gossip, Piece, Place, Record
+from netem.wire.channels import MAX_PAYLOAD_B
 
 RELAYED_SILENCE_ROUNDS = 12
 """T_d = (2 D + 10) / (1 - loss) rounds: what of it is the same at any distance. The rest, for D
@@ -21,7 +22,7 @@ LAG_SMOOTHING = 0.25
 LEAST_RELAYED_SILENCE_S = 2.5
 NEVER = (-1, -1)
 NOBODY: Mapping[int, float] = MappingProxyType({})
-MAX_FRAME_B = MAX_RADIO_B - SEAL_B
+MAX_FRAME_B = MAX_PAYLOAD_B - SEAL_B
 FRAME_HEAD_B = 17
 """What a Gossip takes besides its records, with the greatest numbers it may hold."""
 MAX_KNOWN = 1024

@@ -16,13 +16,12 @@ import msgspec
 
 from agent.codec import RejectedError, decode, decode_formation, encode, encode_formation
 from agent.controller import Flown
-from agent.messages import AT_HOME, Beacon, Drift, FramePath, Message, Mission, Piece, Pose
+from agent.messages import AT_HOME, PIECE_B, Beacon, Drift, FramePath, Message, Mission, Piece, Pose
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from agent.qstructure.frame_path import Track
 from agent.qstructure.target_frame import Frame
 
 ORIGINS = 2**16
-PIECE_B = 900
 MAX_TOLD_B = 4 * PIECE_B
 FORWARD_S = 5.0
 """So long a frame that was only heard of is carried forward; then it is taken to stand."""

@@ -12,13 +12,13 @@ from agent.comms.unidentified_vehicles import NEIGHBOUR_M
 from agent.controller import Peer, Senses
 from agent.guidance.target_on_queue import TargetOnQueue
 from agent.messages import MAX_PLACES, Place, Vector
+from agent.qstructure.formation import NO_PLACES
 
 HELD_M = 0.2
 """Who claims a place and is nearer to it than this stands in it."""
 FREED_S = 1.0
 GROWN_S = 1.0
 """So long what a team takes for blocked may lag behind what it knows of new members."""
-NOTHING: frozenset[Place] = frozenset()
 
 
 class Blocked:
@@ -41,7 +41,7 @@ class Blocked:
         self._agents = len(team)
         self.seen = self._targets.blocked(senses.mission, len(team), senses.silent)
         if not (self.seen or senses.blocked or self._lately):
-            return NOTHING
+            return NO_PLACES
         return self._lasting(senses.now_s, self._found(senses, team))
 
     def _found(self, senses: Senses, team: Sequence[Peer]) -> frozenset[Place]:

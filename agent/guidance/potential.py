@@ -19,6 +19,7 @@ from agent.messages import Vector
 
 LEAST_GAP_M = 1e-3
 TARGET_FLOOR_M = 0.25
+"""E1: targets nearer than d_ob plus this are no equilibrium of the potential."""
 
 
 class Other(Protocol):

@@ -6,7 +6,7 @@ potentials (18)-(28), then move or turn. Plain floats throughout.
 
 from math import dist, hypot, pi, radians, sqrt
 
-from agent.config import AgentSetup
+from agent.config import DEFAULT_CAST_FAR_M, AgentSetup
 from agent.controller import Intent, Senses
 from agent.guidance.bobber import bobber, cast_zone
 from agent.guidance.cone import azimuth_error, cone_of
@@ -20,7 +20,6 @@ from agent.qstructure.target_frame import Frame
 
 GAIN = 2.0
 """c of (28) [1/s]."""
-CAST_FAR_M = 0.5
 AT_SLOT_M = 0.02
 """So near its slot an agent takes up the queue's orientation."""
 
@@ -35,7 +34,7 @@ class QStructure:
         self._cone = cone_of(vehicle)
         self._zone = cast_zone(
             self._cone,
-            control.cast_far_m or CAST_FAR_M,
+            control.cast_far_m or DEFAULT_CAST_FAR_M,
             vehicle.max_speed_mps,
             radians(vehicle.max_yaw_rate_dps),
         )

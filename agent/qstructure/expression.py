@@ -11,7 +11,7 @@ from typing import Any
 
 from simpleeval import InvalidExpression, SimpleEval
 
-MAX_LENGTH = 300
+MAX_EXPRESSION_LENGTH = 300
 
 
 def _power(base: float, exponent: float) -> float:
@@ -52,8 +52,8 @@ class Expression:
         self._evaluator = SimpleEval(
             operators=OPERATORS, functions=FUNCTIONS, names={**CONSTANTS, variable: 0.0}
         )
-        if len(text) > MAX_LENGTH:
-            raise ExpressionError(f"longer than {MAX_LENGTH} characters")
+        if len(text) > MAX_EXPRESSION_LENGTH:
+            raise ExpressionError(f"longer than {MAX_EXPRESSION_LENGTH} characters")
         try:
             self._tree = ast.parse(text.strip(), mode="eval").body
         except (SyntaxError, ValueError, MemoryError, RecursionError) as error:

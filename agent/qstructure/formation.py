@@ -27,7 +27,7 @@ from agent.qstructure.shape import ShapeError, ShapeSpec, Straight, shape_of
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
 
 
-NOTHING: frozenset[Place] = frozenset()
+NO_PLACES: frozenset[Place] = frozenset()
 
 
 class FormationError(ValueError):
@@ -127,7 +127,7 @@ class Formation:
         """Return the queues that a place belongs to: of a vertex, all that pass through it."""
         return self._through.get(place) or frozenset(place[:1])
 
-    def divide(self, agents: int, blocked: frozenset[Place] = NOTHING) -> tuple[int, ...]:
+    def divide(self, agents: int, blocked: frozenset[Place] = NO_PLACES) -> tuple[int, ...]:
         """Return how many agents each queue gets besides the common ones of shared vertices.
 
         Vertices first, then largest remainder over the capacities, ties to the queue named first
@@ -138,7 +138,7 @@ class Formation:
         return self._divide(agents, most, blocked)
 
     def _divide(
-        self, agents: int, most: list[float], blocked: frozenset[Place] = NOTHING
+        self, agents: int, most: list[float], blocked: frozenset[Place] = NO_PLACES
     ) -> tuple[int, ...]:
         """Divide with at most so many in each queue.
 
@@ -192,7 +192,7 @@ class Formation:
         except (CurveError, ExpressionError) as error:
             raise FormationError("queue", str(error)) from error
 
-    def _layout(self, agents: int, blocked: frozenset[Place] = NOTHING) -> Layout:
+    def _layout(self, agents: int, blocked: frozenset[Place] = NO_PLACES) -> Layout:
         counts = self.divide(agents, blocked)
         common = _but(self.common, blocked)[:agents]
         ordered = [(0, 0, place) for place in common]
@@ -262,7 +262,7 @@ class Formation:
                 own[places[0].queue].append(places[0])
         return [sorted(places) for places in own]
 
-    def _most(self, queue: int, blocked: frozenset[Place] = NOTHING) -> float:
+    def _most(self, queue: int, blocked: frozenset[Place] = NO_PLACES) -> float:
         """Return how many agents a queue can hold besides the common ones."""
         room = self.queues[queue].room
         if room is None:

@@ -6,9 +6,10 @@ from typing import Annotated, NamedTuple
 import msgspec
 from msgspec import Meta
 
-from agent.qstructure.expression import Expression, ExpressionError
+from agent.qstructure.expression import MAX_EXPRESSION_LENGTH, Expression, ExpressionError
 
-Angle = Annotated[float, Meta(ge=-1e4, le=1e4)] | Annotated[str, Meta(min_length=1, max_length=300)]
+Text = Annotated[str, Meta(min_length=1, max_length=MAX_EXPRESSION_LENGTH)]
+Angle = Annotated[float, Meta(ge=-1e4, le=1e4)] | Text
 ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
 
 

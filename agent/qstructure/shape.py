@@ -14,13 +14,13 @@ from msgspec import Meta
 
 from agent.messages import Metres, Vector
 from agent.qstructure.curve import CurveError, Walk
-from agent.qstructure.expression import Expression, ExpressionError
+from agent.qstructure.expression import MAX_EXPRESSION_LENGTH, Expression, ExpressionError
 
 Triple = tuple[Metres, Metres, Metres]
 Length = Annotated[float, Meta(gt=0, le=1e4)]
 Degrees = Annotated[float, Meta(ge=-1e4, le=1e4)]
 Points = Annotated[tuple[Triple, ...], Meta(min_length=2, max_length=256)]
-Text = Annotated[str, Meta(min_length=1, max_length=300)]
+Text = Annotated[str, Meta(min_length=1, max_length=MAX_EXPRESSION_LENGTH)]
 AHEAD_M = 1e-4
 
 

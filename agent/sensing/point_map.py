@@ -8,19 +8,17 @@ from array import array
 from collections.abc import Iterable, Sequence
 from math import atan2, cos, hypot, pi, sin
 
-from agent.messages import Scan, Vector
+from agent.messages import NO_ECHO_MM, PROXIMITY_RANGE_M, Scan, Vector
 from agent.sensing.ray_pattern import Grid, Pattern
 
 KEPT_S = 6.0
 VOXEL_M = 0.15
-NEAR_M = 2.0
 MOST_NEAR = 24
 MAX_POINTS = 2000
 PASSED_M = 0.3
 """An echo from so much farther shows that a point before it is gone."""
 MISSES = 2
 """So many rays that meet nothing show it too: one may have been a dropout."""
-NOTHING = 0xFFFF
 OWN_BODY_M = 0.3
 """A point so near to where a neighbour says it is, is that neighbour."""
 
@@ -64,7 +62,7 @@ class PointMap:
         if pattern.grid is not None:
             self._pass_through(pattern.grid, ranges, pattern.range_m, here, yaw)
         for axis, millimetres in zip(axes, ranges, strict=True):
-            if millimetres != NOTHING:
+            if millimetres != NO_ECHO_MM:
                 self._mark(axis, 0.001 * millimetres, here, now_s, others)
 
     def near(self, here: Vector, now_s: float) -> tuple[Vector, ...]:
@@ -78,7 +76,7 @@ class PointMap:
             u, v, w = point.at
             u, v, w = u - x, v - y, w - z
             square = u * u + v * v + w * w
-            if square < NEAR_M * NEAR_M and now_s - point.seen_s <= KEPT_S:
+            if square < PROXIMITY_RANGE_M * PROXIMITY_RANGE_M and now_s - point.seen_s <= KEPT_S:
                 found.append((square, (u, v, w)))
         found.sort()
         return tuple(relative for _, relative in found[:MOST_NEAR])
@@ -121,7 +119,7 @@ class PointMap:
 
 def _passed(point: Point, millimetres: int, away_m: float) -> bool:
     """Note what a ray met that looks at a point; return whether the point is gone."""
-    if millimetres == NOTHING:
+    if millimetres == NO_ECHO_MM:
         point.misses += 1
     else:
         point.misses = MISSES if 0.001 * millimetres > away_m + PASSED_M else 0

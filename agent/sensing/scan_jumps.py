@@ -6,12 +6,11 @@ anything.
 
 from array import array
 
-from agent.messages import Scan
+from agent.messages import NO_ECHO_MM, Scan
 
 LEAP_MM = 1000
 ECHOES = 8
 """Of fewer rays that met something twice nothing follows."""
-NOTHING = 0xFFFF
 SCANS = 3
 """So many leaps in a row make a sensor wrong, so many quiet scans right again."""
 
@@ -30,7 +29,7 @@ class ScanJumps:
         common = [
             abs(now - before) > LEAP_MM
             for now, before in zip(ranges, self._before, strict=False)
-            if NOTHING not in (now, before)
+            if NO_ECHO_MM not in (now, before)
         ]
         self._before = ranges
         if len(common) >= ECHOES:

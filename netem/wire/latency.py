@@ -14,7 +14,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from netem.wire.frame import CHANNELS, Count, Frame, unpack_typed
+from netem.wire.channels import CHANNELS
+from netem.wire.frame import Count, Frame, unpack_typed
 
 BINS_A_SLOT = 8
 SLOTS_SEEN = 32

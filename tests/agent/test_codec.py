@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from agent.codec import (
     MAX_MESSAGE_B,
     MAX_OBSERVATION_B,
-    MAX_RADIO_B,
     SEAL_B,
     RejectedError,
     decode_beacon,
@@ -37,6 +36,7 @@ from agent.messages import (
     Scan,
     Telemetry,
 )
+from netem.wire.channels import MAX_PAYLOAD_B
 
 MANY = 15_000
 VECTOR = (1.0, -2.5, 0.25)
@@ -97,8 +97,8 @@ DECODE = {
 LIMIT_B = {
     Observation: MAX_OBSERVATION_B,
     Command: MAX_MESSAGE_B,
-    Beacon: MAX_RADIO_B - SEAL_B,
-    Gossip: MAX_RADIO_B - SEAL_B,
+    Beacon: MAX_PAYLOAD_B - SEAL_B,
+    Gossip: MAX_PAYLOAD_B - SEAL_B,
 }
 KINDS = pytest.mark.parametrize("kind", GOOD, ids=lambda kind: kind.__name__)
 CAUSES = {"oversize", "garbage", "invalid"}

@@ -7,12 +7,12 @@ from random import Random
 import msgspec
 import pytest
 
-from agent.codec import MAX_RADIO_B, decode_command, encode, sealed, unsealed
-from agent.comms.broadcast import LOCAL, MULTIHOP
+from agent.codec import decode_command, encode, sealed, unsealed
 from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.core import Agent
 from agent.messages import Beacon, Gossip, Observation
 from agent.qstructure.formation import FormationSpec
+from netem.wire.channels import LOCAL, MAX_PAYLOAD_B, MULTIHOP
 from netem.wire.frame import Outgoing, Transmission, pack, unpack_transmission
 from tests.agent.comms.making import FAR, GREATEST, ORIGIN, UNLED, beacon, greatest_record, record
 
@@ -63,7 +63,7 @@ def airworthy(outbox, tick):
     assert hypot(*command.velocity[:2]) <= SPEED + 1e-9
     assert abs(command.velocity[2]) <= SPEED + 1e-9
     assert 0.0 <= command.yaw < 2.0 * pi + 1e-9
-    assert all(len(payload) <= MAX_RADIO_B for _, payload in outbox.frames)
+    assert all(len(payload) <= MAX_PAYLOAD_B for _, payload in outbox.frames)
     outgoing = tuple(Outgoing(channel, payload) for channel, payload in outbox.frames)
     transmission = Transmission(4 * tick, GREATEST, outgoing)
     assert unpack_transmission(pack(transmission)) == transmission

@@ -12,7 +12,8 @@ from netem.messages import MediumSetup
 from netem.random_draws import SHAPES, WIDEST, correlated
 from netem.range_index import LARGE, RangeIndex
 from netem.rate_queue import RateQueue
-from netem.wire.frame import LOCAL, MULTIHOP, Outgoing, Transmission
+from netem.wire.channels import LOCAL, MULTIHOP
+from netem.wire.frame import Outgoing, Transmission
 
 EDGE = PathLoss(3.0, 40.0, 70.0)
 

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from agent.config import Laser, Sensors, Sonar, Vehicle
+from agent.messages import NO_ECHO_MM
 from agent.sensing.ray_pattern import KINDS, pattern_of
 from worldsim.scenario.obstacle_tables import Sphere, Wall
 from worldsim.truth.obstacles import Obstacles
-from worldsim.truth.scanning_sensors import NOTHING, Scans
+from worldsim.truth.scanning_sensors import Scans
 
 BALL = Sphere(centre_m=(2.0, 0.0, 0.0), radius_m=0.5)
 WALL = Wall(from_m=(-9, 1.0, -5), to_m=(9, 1.0, -5), height_m=10.0, thickness_m=0.0002)
@@ -31,7 +32,7 @@ def read(looking, slot=0, tick=0, **more):
 
 
 def ranges(scan):
-    return [None if each == NOTHING else each / 1000 for each in array("H", scan.ranges)]
+    return [None if each == NO_ECHO_MM else each / 1000 for each in array("H", scan.ranges)]
 
 
 def test_a_ball_ahead_is_seen_in_the_middle_of_the_laser():

@@ -9,6 +9,7 @@ import numpy as np
 
 from netem.link import Cause, LinkModel, mean_loss, received
 from netem.random_draws import SHAPES
+from netem.wire.channels import LOCAL, Channel
 from worldsim.link_check.intervals import (
     KOLMOGOROV,
     Z,
@@ -43,7 +44,7 @@ class Finding(NamedTuple):
 Fly = Callable[..., Flight]
 
 
-def findings(link: LinkModel, seed: int, channel: int = 0) -> Iterator[Finding]:
+def findings(link: LinkModel, seed: int, channel: Channel = LOCAL) -> Iterator[Finding]:
     """Fly packets over a link, PACKETS for each parameter set, and compare."""
 
     def fly(model: LinkModel, **how: float) -> Flight:

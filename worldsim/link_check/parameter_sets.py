@@ -6,7 +6,7 @@ from typing import NamedTuple
 from netem.conditions import LinkModels, overlaid
 from netem.link import LinkModel
 from netem.link_keys import Conditions
-from netem.wire.frame import CHANNELS
+from netem.wire.channels import CHANNELS, NUMBERS, Channel
 from worldsim.scenario.tables import Scenario
 
 
@@ -14,7 +14,7 @@ class ParameterSet(NamedTuple):
     """One link model, where and when it holds in words, and the channel on which it is tried."""
 
     name: str
-    channel: int
+    channel: Channel
     link: LinkModel
 
 
@@ -36,9 +36,9 @@ def _conditions(scenario: Scenario) -> Iterator[tuple[str, Conditions]]:
 
 def _links(when: str, conditions: Conditions) -> Iterator[ParameterSet]:
     models = LinkModels(conditions)
-    for channel, name in enumerate(CHANNELS):
+    for channel, name in zip(NUMBERS, CHANNELS, strict=True):
         yield ParameterSet(f"{name}{when}", channel, models.of_channel(channel))
     for link in conditions.link:
-        for channel, name in enumerate(CHANNELS):
+        for channel, name in zip(NUMBERS, CHANNELS, strict=True):
             model = models.of_link(channel, link.source, link.to)
             yield ParameterSet(f"{link.source} to {link.to}, {name}{when}", channel, model)

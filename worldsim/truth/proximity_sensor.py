@@ -3,15 +3,12 @@
 import msgspec
 import numpy as np
 
-from agent.messages import Vector
+from agent.messages import MAX_OBSTACLE_POINTS, PROXIMITY_RANGE_M, Vector
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
 
-PROXIMITY_RANGE_M = 2.0
 LARGE = 40
 """From so many vehicles on, arrays are quicker."""
-MAX_POINTS = 32
-"""Of so many obstacles the nearest points are told at most: what an Observation holds."""
 
 
 class Sensed(msgspec.Struct, frozen=True, gc=False):
@@ -70,9 +67,9 @@ class ProximitySensor:
         found = []
         for row in range(len(looking)):
             near = np.flatnonzero(distance[row] <= PROXIMITY_RANGE_M)
-            if len(near) > MAX_POINTS:
+            if len(near) > MAX_OBSTACLE_POINTS:
                 order = np.argsort(distance[row, near], kind="stable")
-                near = np.sort(near[order[:MAX_POINTS]])
+                near = np.sort(near[order[:MAX_OBSTACLE_POINTS]])
             found.append(-distance[row, near, None] * away[row, near])
         return found
 

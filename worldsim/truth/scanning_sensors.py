@@ -10,13 +10,11 @@ from math import cos, sin
 import numpy as np
 
 from agent.config import Sensors, Vehicle
-from agent.messages import Scan
+from agent.messages import NO_ECHO_MM, Scan
 from agent.sensing.ray_pattern import KINDS, Pattern, pattern_of
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.raycast import cast, cast_at_spheres
 from worldsim.truth.vehicle import Floats
-
-NOTHING = 0xFFFF
 
 
 class Scanner:
@@ -79,7 +77,7 @@ class Scanner:
             ranges = np.where(generator.random(ranges.shape) < self._dropout, np.inf, ranges)
         met = np.isfinite(ranges)
         millimetres = np.rint(1000.0 * np.where(met, np.maximum(ranges, 0.0), 0.0))
-        told = np.where(met, np.minimum(millimetres, NOTHING - 1), NOTHING)
+        told = np.where(met, np.minimum(millimetres, NO_ECHO_MM - 1), NO_ECHO_MM)
         return told.astype("<u2").tobytes()
 
 

@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from agent.messages import Scan, Vector
+from agent.messages import PROXIMITY_RANGE_M, Scan, Vector
 from agent.sensing.ray_pattern import KINDS
-from worldsim.truth.proximity_sensor import PROXIMITY_RANGE_M, Sensed
+from worldsim.truth.proximity_sensor import Sensed
 
 Mode = Literal["stuck", "silent", "wrong"]
 SENSORS = ("proximity", *KINDS)

@@ -6,11 +6,12 @@ from math import inf
 import msgspec
 import pytest
 
-from agent.codec import MAX_RADIO_B, decode_beacon, decode_gossip, encode, sealed
-from agent.comms.broadcast import LOCAL, MAX_ECHOES, MULTIHOP, Broadcast, OwnState
+from agent.codec import decode_beacon, decode_gossip, encode, sealed
+from agent.comms.broadcast import MAX_ECHOES, Broadcast, OwnState
 from agent.comms.gossip import Table
 from agent.comms.hierarchy import Standing
 from agent.messages import Drift, Gossip, Place, Pose
+from netem.wire.channels import LOCAL, MAX_PAYLOAD_B, MULTIHOP
 from tests.agent.comms.making import FAR, GREATEST, LATE_S, ORIGIN, greatest_record, record
 
 STILL = OwnState(ORIGIN, ORIGIN, ORIGIN, None, 0.5)
@@ -82,7 +83,7 @@ def test_a_beacon_fits_its_frame_however_many_are_heard(neighbours):
     told = set()
     for tick in range(12):
         payload = voice.frames(LATE_S - 60.0 + tick, EXTREME, echoes, table)[0][1]
-        assert len(payload) <= MAX_RADIO_B
+        assert len(payload) <= MAX_PAYLOAD_B
         said = decode_beacon(payload)
         assert len(said.echoes) == min(neighbours, MAX_ECHOES)
         told.update(said.echoes)
@@ -97,14 +98,14 @@ def test_as_many_echoes_as_possible_fit_beside_the_greatest_numbers():
         extreme = msgspec.structs.replace(said, id=2**16 - 1, sequence=GREATEST, echoes=told)
         return len(sealed(encode(extreme)))
 
-    assert size_b(MAX_ECHOES) <= MAX_RADIO_B < size_b(MAX_ECHOES + 1)
+    assert size_b(MAX_ECHOES) <= MAX_PAYLOAD_B < size_b(MAX_ECHOES + 1)
 
 
 def test_the_whole_table_goes_out_each_round():
     table = heard(3, [greatest_record(1000 + k) for k in range(1000)])
     frames = speaker().frames(1.0, EXTREME, (), table)
     payloads = [payload for channel, payload in frames if channel == MULTIHOP]
-    assert max(map(len, payloads)) <= MAX_RADIO_B
+    assert max(map(len, payloads)) <= MAX_PAYLOAD_B
     told = [each.id for payload in payloads for each in decode_gossip(payload).records]
     assert told == [3, *range(1000, 2000)]
 

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agent.codec import MAX_RADIO_B, decode_gossip, encode
+from agent.codec import decode_gossip, encode
 from agent.comms.gossip import FRAME_HEAD_B, MAX_KNOWN, Table
 from agent.messages import Gossip, Place
+from netem.wire.channels import MAX_PAYLOAD_B
 from netem.wire.frame import MAX_OUTGOING
 from tests.agent.comms.making import (
     LATE_S,
@@ -209,7 +210,7 @@ def test_the_whole_table_fits_whatever_its_numbers(known):
     records = [greatest_record(2**16 - 1 - k) for k in range(known)]
     full = adopted(table(), *records, now_s=LATE_S)
     payloads = full.frames(greatest_record(OWN))
-    assert max(map(len, payloads)) <= MAX_RADIO_B
+    assert max(map(len, payloads)) <= MAX_PAYLOAD_B
     assert len(payloads) < MAX_OUTGOING
     told_of = [each for payload in payloads for each in decode_gossip(payload).records]
     assert told_of == [greatest_record(OWN), *reversed(records)]

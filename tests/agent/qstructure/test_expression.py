@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from agent.qstructure.expression import (
     CONSTANTS,
     FUNCTIONS,
-    MAX_LENGTH,
+    MAX_EXPRESSION_LENGTH,
     Expression,
     ExpressionError,
 )
@@ -45,7 +45,7 @@ NO_EXPRESSION = [
     *("s // 2", "s % 2", "s @ s", "~s", "s << 2", "s | 1", "s ^ 1", "(s := 2)", "*s"),
     *("'s'", "'a' * 3", "f'{s}'", "f'{1:>999999999}'", "b's'", "1j", "True", "None", "..."),
     *("max(1, 2, key=sin)", "min(*s)", "s[0]", "await s", "yield s", "1 < 2 < s", "(1, 2)"),
-    "s" + "+s" * MAX_LENGTH,
+    "s" + "+s" * MAX_EXPRESSION_LENGTH,
 ]
 
 

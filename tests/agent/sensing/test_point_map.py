@@ -6,8 +6,8 @@ from math import hypot, pi
 import pytest
 
 from agent.config import Laser, Sensors
-from agent.messages import Scan
-from agent.sensing.point_map import KEPT_S, MOST_NEAR, NOTHING, PointMap
+from agent.messages import NO_ECHO_MM, Scan
+from agent.sensing.point_map import KEPT_S, MOST_NEAR, PointMap
 from agent.sensing.ray_pattern import pattern_of
 
 SENSORS = Sensors(laser=Laser(rays=61))
@@ -16,7 +16,7 @@ AHEAD = 30
 
 
 def scan(**metres):
-    ranges = array("H", [NOTHING] * 61)
+    ranges = array("H", [NO_ECHO_MM] * 61)
     for ray, far in metres.items():
         ranges[int(ray[1:])] = round(1000 * far)
     return Scan(0, ranges.tobytes())
