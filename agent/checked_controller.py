@@ -7,13 +7,12 @@ from msgspec.structs import replace
 
 from agent.config import AgentSetup
 from agent.controller import Controller, Intent, Senses, load
-from agent.messages import Vector
+from agent.messages import MAX_ANGLE_RAD, MAX_FORCE, MAX_M, MAX_SPEED_MPS, Vector
 
 NUMBERS = 13
 """An intent's numbers besides its target: three vectors, two angles of tilt, yaw and force."""
-MAX_ANY = 100.0
-"""What no number of a command may exceed, but for positions and the force."""
-MAX_M, MAX_FORCE = 1e6, 1e9
+SMALL = min(MAX_SPEED_MPS, MAX_ANGLE_RAD)
+"""Numbers whose absolute values add up to no more than this are within every bound."""
 
 
 class FaultyControllerError(RuntimeError):
@@ -63,23 +62,23 @@ def plain(intent: Intent) -> Intent:
     target = () if intent.target is None else intent.target
     total = sum(map(abs, (*numbers, *target)))
     # As good as always: one look shows that all are plain, finite and small.
-    sound = type(total) is float and total <= MAX_ANY and intent.force >= 0.0
+    sound = type(total) is float and total <= SMALL and intent.force >= 0.0
     return intent if sound and len(numbers) == NUMBERS else _converted(intent)
 
 
 def _converted(intent: Intent) -> Intent:
     if intent.force < 0.0:
         raise ValueError(f"the Intent's force is {intent.force:g}; it is a magnitude, at least 0")
-    pitch, presence = _numbers("tilt", intent.tilt, 2, MAX_ANY)
+    pitch, roll = _numbers("tilt", intent.tilt, 2, MAX_ANGLE_RAD)
     return replace(
         intent,
-        wanted=_vector("wanted", intent.wanted, MAX_ANY),
-        velocity=_vector("velocity", intent.velocity, MAX_ANY),
-        yaw=_numbers("yaw", (intent.yaw,), 1, MAX_ANY)[0],
+        wanted=_vector("wanted", intent.wanted, MAX_SPEED_MPS),
+        velocity=_vector("velocity", intent.velocity, MAX_SPEED_MPS),
+        yaw=_numbers("yaw", (intent.yaw,), 1, MAX_ANGLE_RAD)[0],
         force=_numbers("force", (intent.force,), 1, MAX_FORCE)[0],
         heading_for=_vector("heading_for", intent.heading_for, MAX_M),
         target=None if intent.target is None else _vector("target", intent.target, MAX_M),
-        tilt=(pitch, presence),
+        tilt=(pitch, roll),
     )
 
 

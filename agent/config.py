@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from agent.messages import AT_HOME, FramePath
+from agent.messages import AT_HOME, AgentId, FramePath
 from agent.qstructure.formation import FormationSpec
 
 Positive = Annotated[float, Meta(gt=0, le=1e4)]
@@ -128,7 +128,7 @@ class AgentSetup(Table, frozen=True):
     process waits for what each of its slots brings.
     """
 
-    id: Annotated[int, Meta(ge=0, lt=2**16)]
+    id: AgentId
     incarnation: Annotated[int, Meta(ge=0)]
     tick_hz: Hertz
     slots_per_tick: Annotated[int, Meta(ge=1, le=64)]

@@ -22,10 +22,13 @@ from agent.comms.unidentified_vehicles import SAME_BODY_M, TellsOf, Unidentified
 from agent.config import AgentSetup
 from agent.controller import Intent, Peer, Senses
 from agent.guidance.safety_filter import TelemetryRow
-from agent.guidance.safety_monitor import STAND, Guard
+from agent.guidance.safety_monitor import Guard
 from agent.messages import (
     CAUSES,
+    MAX_COST_MM,
+    MAX_HEARD,
     MAX_PLACES,
+    ZERO,
     Beacon,
     Command,
     Gossip,
@@ -39,14 +42,11 @@ from agent.sensing.obstacle_perception import ObstaclePerception
 from netem.wire import channels
 from netem.wire.channels import Channel
 
-MAX_COST_MM = 2**31 - 1
 TIDY_S = 0.2
 """How often those who fell silent are looked for."""
 IMPLAUSIBLE = 4.0
 """Who says it flies so many times faster than any vehicle can is not believed: what a controller
 asks for may exceed a limit that the vehicle then keeps."""
-MAX_TOLD = 256
-"""So many neighbours are told of at most: a longer array makes a command that is refused."""
 
 
 class Outbox(msgspec.Struct, frozen=True, gc=False):
@@ -116,28 +116,30 @@ class Agent:
         intent = self._intent = self._controller.decide(senses)
         velocity = self._guard.safe(intent.velocity, senses, lambda: self._told(senses))
         if not self._obstacle_perception.trust.note(observation):
-            velocity = STAND
+            velocity = ZERO
         command = self._command(observation.slot, senses, intent, velocity)
         own = self._own_state(senses, velocity, intent)
         pieces = self._missions.pieces() if self._lagging else ()
         echoes = self._neighbours.echoes()
         frames = self._broadcast.frames(senses.now_s, own, echoes, self._table, pieces)
-        return Outbox(command, frames)
+        return Outbox(command=command, frames=frames)
 
     def _own_state(self, senses: Senses, velocity: Vector, intent: Intent) -> OwnState:
         missions = self._missions
+        frame, drift = missions.told(senses.now_s)
         return OwnState(
-            senses.position,
-            velocity,
-            intent.heading_for,
-            intent.place,
-            self._guard.speed_cap,
-            missions.flown.key,
-            missions.frame_key,
-            *missions.told(senses.now_s),
-            self._standing,
-            intent.blocked,
-            min(round(1000.0 * intent.cost_m), MAX_COST_MM),
+            position=senses.position,
+            velocity=velocity,
+            heading_for=intent.heading_for,
+            place=intent.place,
+            speed_cap=self._guard.speed_cap,
+            mission=missions.flown.key,
+            frame_key=missions.frame_key,
+            frame=frame,
+            drift=drift,
+            standing=self._standing,
+            blocked=intent.blocked,
+            cost_mm=min(round(1000.0 * intent.cost_m), MAX_COST_MM),
         )
 
     def _obey(self, mission: Mission) -> None:
@@ -174,19 +176,19 @@ class Agent:
             self._tidy(observation)
         place = self._intent.place if self._intent is not None else None
         cost_m = self._intent.cost_m if self._intent is not None else None
-        own = Peer(self.id, observation.position, place, cost_m)
+        own = Peer(id=self.id, position=observation.position, place=place, cost_m=cost_m)
         return Senses(
-            now_s,
-            observation.position,
-            observation.velocity,
-            observation.yaw,
-            observation.vehicles,
-            self._neighbours.heard(now_s, mission.key),
-            lambda: self._table.team(own, mission.key),
-            mission,
-            self._silent,
-            self._blocked,
-            self._obstacles(observation),
+            now_s=now_s,
+            position=observation.position,
+            velocity=observation.velocity,
+            yaw=observation.yaw,
+            vehicles=observation.vehicles,
+            neighbours=self._neighbours.heard(now_s, mission.key),
+            team=lambda: self._table.team(own, mission.key),
+            mission=mission,
+            silent=self._silent,
+            blocked=self._blocked,
+            obstacles=self._obstacles(observation),
         )
 
     def _obstacles(self, observation: Observation) -> tuple[Vector, ...]:
@@ -255,33 +257,34 @@ class Agent:
         x, y, z = senses.position
         return [
             TelemetryRow(
-                (b.position[0] - x, b.position[1] - y, b.position[2] - z),
-                max(0.0, senses.now_s - b.stamp_s),
-                b.speed_cap,
+                relative=(b.position[0] - x, b.position[1] - y, b.position[2] - z),
+                age_s=max(0.0, senses.now_s - b.stamp_s),
+                speed_cap=b.speed_cap,
             )
             for b in self._neighbours.beacons()
         ]
 
     def _command(self, slot: int, senses: Senses, intent: Intent, velocity: Vector) -> Command:
+        rejected = [(CAUSES.index(cause), count) for cause, count in sorted(self.rejected.items())]
         telemetry = Telemetry(
-            intent.wanted,
-            intent.force,
-            intent.target,
-            intent.place,
-            self._neighbours.sorted_ids[:MAX_TOLD],
-            tuple([(CAUSES.index(cause), n) for cause, n in sorted(self.rejected.items())]),
-            self._missions.flown.key,
-            self._standing.tier,
-            self._standing.parent,
-            self._standing.role,
-            self._record_age_s,
+            wanted=intent.wanted,
+            force=intent.force,
+            target=intent.target,
+            place=intent.place,
+            heard=self._neighbours.sorted_ids[:MAX_HEARD],
+            rejected=tuple(rejected),
+            mission=self._missions.flown.key,
+            tier=self._standing.tier,
+            parent=self._standing.parent,
+            role=self._standing.role,
+            record_age_s=self._record_age_s,
         )
         return Command(
-            slot,
-            self._incarnation,
-            slot + self._command_slots,
-            velocity,
-            intent.yaw,
-            intent.tilt,
-            telemetry,
+            slot=slot,
+            incarnation=self._incarnation,
+            expires_slot=slot + self._command_slots,
+            velocity=velocity,
+            yaw=intent.yaw,
+            tilt=intent.tilt,
+            telemetry=telemetry,
         )

@@ -11,17 +11,26 @@ import msgspec
 from msgspec import Meta
 
 Vector = tuple[float, float, float]
+ZERO: Vector = (0.0, 0.0, 0.0)
 
-Metres = Annotated[float, Meta(ge=-1e6, le=1e6)]
-Speed = Annotated[float, Meta(ge=-100, le=100)]
+MAX_M, MAX_SPEED_MPS, MAX_ANGLE_RAD, MAX_FORCE = 1e6, 100.0, 100.0, 1e9
+MAX_COST_MM = 2**31 - 1
+MAX_HEARD = 256
+"""Most neighbours in one telemetry, and most vehicles in one observation."""
+AGENT_IDS = 2**16
+"""Number of agent ids: 0 to AGENT_IDS - 1."""
+
+Metres = Annotated[float, Meta(ge=-MAX_M, le=MAX_M)]
+Speed = Annotated[float, Meta(ge=-MAX_SPEED_MPS, le=MAX_SPEED_MPS)]
 Seconds = Annotated[float, Meta(ge=0, le=1e9)]
-Radians = Annotated[float, Meta(ge=-100, le=100)]
+Radians = Annotated[float, Meta(ge=-MAX_ANGLE_RAD, le=MAX_ANGLE_RAD)]
 Count = Annotated[int, Meta(ge=0, lt=2**53)]
-AgentId = Annotated[int, Meta(ge=0, lt=2**16)]
+AgentId = Annotated[int, Meta(ge=0, lt=AGENT_IDS)]
+ParentId = Annotated[int, Meta(ge=-1, lt=AGENT_IDS)]
 Index = Annotated[int, Meta(ge=-1, lt=2**15)]
 
 Position = tuple[Metres, Metres, Metres]
-Cost = Annotated[int, Meta(ge=0, lt=2**31)]
+Cost = Annotated[int, Meta(ge=0, le=MAX_COST_MM)]
 MAX_PLACES = 8
 Places = Annotated[tuple[tuple[Index, Index], ...], Meta(max_length=MAX_PLACES)]
 Velocity = tuple[Speed, Speed, Speed]
@@ -63,7 +72,7 @@ class Pose(NamedTuple):
     yaw: Radians
 
 
-HOME = Pose(0.0, 0.0, 0.0, 0.0)
+HOME = Pose(x=0.0, y=0.0, z=0.0, yaw=0.0)
 
 
 class Drift(NamedTuple):
@@ -93,7 +102,7 @@ class FramePath(Message, frozen=True):
     waits_s: Annotated[tuple[Seconds, ...], Meta(max_length=16)] = ()
 
 
-AT_HOME = FramePath(((0.0, 0.0, 0.0),))
+AT_HOME = FramePath(waypoints=(ZERO,))
 
 
 MAX_ORDER_B = 3000
@@ -151,7 +160,7 @@ class Observation(Message, frozen=True):
     position: Position
     velocity: Velocity
     yaw: Radians
-    vehicles: Annotated[tuple[Position, ...], Meta(max_length=256)]
+    vehicles: Annotated[tuple[Position, ...], Meta(max_length=MAX_HEARD)]
     obstacles: Annotated[tuple[Position, ...], Meta(max_length=MAX_OBSTACLE_POINTS)]
     orders: Annotated[tuple[Mission, ...], Meta(max_length=4)]
     scans: Annotated[tuple[Scan, ...], Meta(max_length=2)]
@@ -169,15 +178,15 @@ class Telemetry(Message, frozen=True):
     """
 
     wanted: Velocity
-    force: Annotated[float, Meta(ge=0, le=1e9)]
+    force: Annotated[float, Meta(ge=0, le=MAX_FORCE)]
     target: Position | None
     place: tuple[Index, Index] | None
-    heard: Annotated[tuple[AgentId, ...], Meta(max_length=256)]
+    heard: Annotated[tuple[AgentId, ...], Meta(max_length=MAX_HEARD)]
     rejected: Rejections
     mission: Count
     tier: Index
-    parent: Annotated[int, Meta(ge=-1, lt=2**16)]
-    role: Annotated[int, Meta(ge=0, lt=4)]
+    parent: ParentId
+    role: Annotated[int, Meta(ge=0, lt=len(ROLES))]
     record_age_s: Seconds = 0.0
 
 
@@ -229,7 +238,7 @@ class Beacon(Message, frozen=True):
     frame: Pose
     drift: Drift | None
     tier: Index
-    parent: Annotated[int, Meta(ge=-1, lt=2**16)]
+    parent: ParentId
     root: Count
     blocked: Places
 

@@ -26,5 +26,8 @@ class Controls:
         """Step on an observation: say one command and one transmission."""
         outbox = self.core.step(observation)
         self._command(encode(outbox.command))
-        frames = tuple(Outgoing(channel, payload) for channel, payload in outbox.frames)
-        self._radio(pack(Transmission(observation.slot, self._incarnation, frames)))
+        frames = tuple(
+            Outgoing(channel=channel, payload=payload) for channel, payload in outbox.frames
+        )
+        sent = Transmission(slot=observation.slot, incarnation=self._incarnation, frames=frames)
+        self._radio(pack(sent))

@@ -85,37 +85,43 @@ class Broadcast:
 
     def _beacon(self, now_s: float, own: OwnState, echoes: tuple[tuple[int, int], ...]) -> Beacon:
         sequence = self._numbered(now_s)
+        queue, rank, cost_mm = own.claim
         return Beacon(
-            self._id,
-            self._incarnation,
-            sequence,
-            now_s,
-            own.position,
-            own.velocity,
-            own.heading_for,
-            *own.claim,
-            own.speed_cap,
-            _in_turns(echoes, sequence),
-            own.mission,
-            own.frame_key,
-            own.frame,
-            own.drift,
-            own.standing.tier,
-            own.standing.parent,
-            own.standing.root,
-            own.blocked,
+            id=self._id,
+            incarnation=self._incarnation,
+            sequence=sequence,
+            stamp_s=now_s,
+            position=own.position,
+            velocity=own.velocity,
+            target=own.heading_for,
+            queue=queue,
+            rank=rank,
+            cost_mm=cost_mm,
+            speed_cap=own.speed_cap,
+            echoes=_in_turns(echoes, sequence),
+            mission=own.mission,
+            frame_key=own.frame_key,
+            frame=own.frame,
+            drift=own.drift,
+            tier=own.standing.tier,
+            parent=own.standing.parent,
+            root=own.standing.root,
+            blocked=own.blocked,
         )
 
     def _record(self, now_s: float, own: OwnState) -> Record:
+        queue, rank, cost_mm = own.claim
         return Record(
-            self._id,
-            self._incarnation,
-            self.sequence,
-            now_s,
-            own.position,
-            *own.claim,
-            own.mission,
-            own.blocked,
+            id=self._id,
+            incarnation=self._incarnation,
+            version=self.sequence,
+            stamp_s=now_s,
+            position=own.position,
+            queue=queue,
+            rank=rank,
+            cost_mm=cost_mm,
+            mission=own.mission,
+            blocked=own.blocked,
         )
 
     def _numbered(self, now_s: float) -> int:

@@ -8,8 +8,10 @@ version of a record is its subject's beacon sequence, so a beacon heard directly
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from math import inf
 from types import MappingProxyType
+from typing import assert_never
 
 from agent.codec import SEAL_B, encode, sealed
+from agent.comms.neighbours import NO_VERSION
 from agent.comms.unidentified_vehicles import Departed, Member
 from agent.controller import Peer
 from agent.messages import Beacon, Gossip, Piece, Place, Record
@@ -20,7 +22,6 @@ RELAYED_SILENCE_ROUNDS = 12
 hops at that loss, is twice the age at which a subject's records are measured to come."""
 LAG_SMOOTHING = 0.25
 LEAST_RELAYED_SILENCE_S = 2.5
-NEVER = (-1, -1)
 NOBODY: Mapping[int, float] = MappingProxyType({})
 MAX_FRAME_B = MAX_PAYLOAD_B - SEAL_B
 FRAME_HEAD_B = 17
@@ -46,7 +47,7 @@ class Table:
     def adopt_beacon(self, beacon: Beacon) -> None:
         """Take what a neighbour said of itself just now."""
         who, version = beacon.id, (beacon.incarnation, beacon.sequence)
-        if version > self._last.get(who, NEVER) and (who in self._newest or self._has_room):
+        if version > self._last.get(who, NO_VERSION) and (who in self._newest or self._has_room):
             self._last[who] = version
             self._newest[who] = beacon
 
@@ -60,7 +61,7 @@ class Table:
         earliest_s = now_s - self._relayed_silence_s / (1.0 - 2.0 * LAG_SMOOTHING)
         for record in gossip.records:
             who, version = record.id, (record.incarnation, record.version)
-            if version <= self._last.get(who, NEVER):
+            if version <= self._last.get(who, NO_VERSION):
                 continue
             plausible = who != self._own_id and earliest_s <= record.stamp_s <= latest_s
             if plausible and (who in self._newest or self._has_room):
@@ -79,21 +80,23 @@ class Table:
         :meth:`Neighbours.forget_silent`. One of whom others tell later than that, or who never was
         a neighbour, may be silent for as long as relays take.
         """
-        lag_s = self._lag_s
-        gone = [
-            who
-            for who, newest in self._newest.items()
-            if (
-                who not in heard
-                if isinstance(newest, Beacon)
-                else newest.stamp_s <= lost.get(who, -inf)
-                or now_s - newest.stamp_s > self._relayed_silence_s + 2.0 * lag_s.get(who, 0.0)
-            )
-        ]
+        gone = []
+        for who, newest in self._newest.items():
+            match newest:
+                case Beacon():
+                    silent = who not in heard
+                case Record():
+                    limit_s = self._relayed_silence_s + 2.0 * self._lag_s.get(who, 0.0)
+                    silent = newest.stamp_s <= lost.get(who, -inf)
+                    silent = silent or now_s - newest.stamp_s > limit_s
+                case _:
+                    assert_never(newest)
+            if silent:
+                gone.append(who)
         departed = []
         for who in gone:
             last = self._newest.pop(who)
-            departed.append(Departed(last.position, last.stamp_s))
+            departed.append(Departed(position=last.position, stamp_s=last.stamp_s))
             self._lag_s.pop(who, None)
         return departed
 
@@ -106,13 +109,17 @@ class Table:
         for who, newest in self._newest.items():
             placed = newest.queue >= 0 and newest.mission == mission
             place = Place(newest.queue, newest.rank) if placed else None
-            peers.append(Peer(who, newest.position, place, newest.cost_mm / 1000.0))
+            cost_m = newest.cost_mm / 1000.0
+            peers.append(Peer(id=who, position=newest.position, place=place, cost_m=cost_m))
         peers.sort()
         return tuple(peers)
 
     def members(self, now_s: float) -> list[Member]:
         """Return where each member last said it was, and how long ago."""
-        return [Member(newest.position, now_s - newest.stamp_s) for newest in self._newest.values()]
+        return [
+            Member(position=newest.position, age_s=now_s - newest.stamp_s)
+            for newest in self._newest.values()
+        ]
 
     def blocked(self, mission: int) -> frozenset[Place]:
         """Return the places that others see taken by a silent body (E18)."""
@@ -125,8 +132,14 @@ class Table:
         pieces: of a mission that somebody lacks; each travels in a frame of its own.
         """
         records = [own, *(_record(self._newest[who]) for who in sorted(self._newest))]
-        said = [Gossip(self._own_id, own.stamp_s, chunk, None) for chunk in _chunks(records)]
-        said += [Gossip(self._own_id, own.stamp_s, (), piece) for piece in pieces]
+        said = [
+            Gossip(id=self._own_id, stamp_s=own.stamp_s, records=chunk, piece=None)
+            for chunk in _chunks(records)
+        ]
+        said += [
+            Gossip(id=self._own_id, stamp_s=own.stamp_s, records=(), piece=piece)
+            for piece in pieces
+        ]
         return [sealed(encode(gossip)) for gossip in said]
 
     @property
@@ -135,20 +148,24 @@ class Table:
 
 
 def _record(newest: Beacon | Record) -> Record:
-    if isinstance(newest, Record):
-        return newest
-    return Record(
-        newest.id,
-        newest.incarnation,
-        newest.sequence,
-        newest.stamp_s,
-        newest.position,
-        newest.queue,
-        newest.rank,
-        newest.cost_mm,
-        newest.mission,
-        newest.blocked,
-    )
+    match newest:
+        case Record():
+            return newest
+        case Beacon():
+            return Record(
+                id=newest.id,
+                incarnation=newest.incarnation,
+                version=newest.sequence,
+                stamp_s=newest.stamp_s,
+                position=newest.position,
+                queue=newest.queue,
+                rank=newest.rank,
+                cost_mm=newest.cost_mm,
+                mission=newest.mission,
+                blocked=newest.blocked,
+            )
+        case _:
+            assert_never(newest)
 
 
 def _chunks(records: Sequence[Record]) -> Iterator[tuple[Record, ...]]:

@@ -27,7 +27,7 @@ class Standing(NamedTuple):
     role: int
 
 
-ALONE = Standing(-1, -1, 0, DISTRESS)
+ALONE = Standing(tier=-1, parent=-1, root=0, role=DISTRESS)
 
 
 class Hierarchy:
@@ -48,12 +48,13 @@ class Hierarchy:
         named = any(beacon.parent == self._own_id for beacon in queue)
         if vertex:
             self._parent = -1
-            return Standing(0, -1, sequence, VERTEX)
+            return Standing(tier=0, parent=-1, root=sequence, role=VERTEX)
         parent = self._best(now_s, queue)
         self._parent = parent.id if parent is not None else -1
         if parent is None:
             return ALONE
-        return Standing(parent.tier + 1, parent.id, parent.root, SUB_VERTEX if named else MEMBER)
+        role = SUB_VERTEX if named else MEMBER
+        return Standing(tier=parent.tier + 1, parent=parent.id, root=parent.root, role=role)
 
     def _watch_roots(self, now_s: float, queue: Sequence[Beacon]) -> None:
         known = self._advanced

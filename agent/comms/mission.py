@@ -12,16 +12,29 @@ the newest stamp wins, and everybody carries the frame forward from there by its
 
 from __future__ import annotations
 
+from typing import assert_never
+
 import msgspec
 
 from agent.codec import RejectedError, decode, decode_formation, encode, encode_formation
 from agent.controller import Flown
-from agent.messages import AT_HOME, PIECE_B, Beacon, Drift, FramePath, Message, Mission, Piece, Pose
+from agent.messages import (
+    AGENT_IDS,
+    AT_HOME,
+    PIECE_B,
+    Beacon,
+    Drift,
+    FramePath,
+    Message,
+    Mission,
+    Piece,
+    Pose,
+)
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from agent.qstructure.frame_path import Track
 from agent.qstructure.target_frame import Frame
 
-ORIGINS = 2**16
+ORIGINS = AGENT_IDS
 MAX_TOLD_B = 4 * PIECE_B
 FORWARD_S = 5.0
 """So long a frame that was only heard of is carried forward; then it is taken to stand."""
@@ -97,10 +110,13 @@ class Missions:
 
     def pieces(self) -> list[Piece]:
         """Return the present mission in pieces, for those who lag behind."""
-        told = encode(_Told(self._path, self._encoded))
+        told = encode(_Told(frame=self._path, formation=self._encoded))
         parts = [told[at : at + PIECE_B] for at in range(0, len(told), PIECE_B)]
         key = self.flown.key
-        return [Piece(key, index, len(parts), part) for index, part in enumerate(parts)]
+        return [
+            Piece(key=key, index=index, count=len(parts), data=part)
+            for index, part in enumerate(parts)
+        ]
 
     def _is_news(self, beacon: Beacon) -> bool:
         """Whether a beacon knows better where the frame is: by a newer mission, or a newer look."""
@@ -108,9 +124,13 @@ class Missions:
         if key != self.frame_key or drift is None:
             return key > self.frame_key
         mine = self._frame
-        if isinstance(mine, Track) or mine.drift is None:
-            return False
-        return drift.stamp_s > mine.drift.stamp_s
+        match mine:
+            case Track():
+                return False
+            case Glimpse():
+                return mine.drift is not None and drift.stamp_s > mine.drift.stamp_s
+            case _:
+                assert_never(mine)
 
     def glimpse(self, beacon: Beacon) -> None:
         """Take the frame from a beacon where that is news, before its mission has come.
@@ -135,7 +155,8 @@ class Missions:
                 self._resting = frame, Pose(*frame.origin, frame.yaw)
             return self._resting[1], None
         pose = Pose(*frame.origin, frame.yaw)
-        return pose, Drift(now_s, *frame.velocity, frame.yaw_rate)
+        x, y, z = frame.velocity
+        return pose, Drift(stamp_s=now_s, x=x, y=y, z=z, yaw_rate=frame.yaw_rate)
 
     def _adopt(self, key: int, path: FramePath, encoded: bytes) -> None:
         if key <= self.flown.key:

@@ -16,7 +16,8 @@ MAX_AGE_S = 5.0
 FORWARD_S = 1.0
 """A position is carried forward along its velocity for this long at most."""
 LEAST_SILENCE_S = 1.5
-NONE_YET = (-1, -1)
+NO_VERSION = (-1, -1)
+"""(incarnation, sequence) of a sender not heard so far: lower than any."""
 FALSE_ALARM = log(1e-6)
 HEARD_BY_OTHERS = 0.25
 """Share of T_lost by which others hear the last word of one who is gone later than oneself."""
@@ -84,7 +85,7 @@ class Neighbours:
         if who == self._own_id:
             raise RejectedError("spoofed", "a beacon under one's own id")
         known = self._known.get(who)
-        if key <= (known.key if known is not None else self._last.get(who, NONE_YET)):
+        if key <= (known.key if known is not None else self._last.get(who, NO_VERSION)):
             raise RejectedError("replay", f"sequence {key} of {who} is not new")
         age_s = now_s - beacon.stamp_s
         if age_s < -self._slack_s:
@@ -150,7 +151,16 @@ class Neighbours:
             u, v, w = velocity = beacon.velocity
             position = (x + along * u, y + along * v, z + along * w)
             place = known.place if beacon.mission == mission else None
-            heard.append(Heard(beacon.id, age_s, position, velocity, beacon.target, place))
+            heard.append(
+                Heard(
+                    id=beacon.id,
+                    age_s=age_s,
+                    position=position,
+                    velocity=velocity,
+                    target=beacon.target,
+                    place=place,
+                )
+            )
         return tuple(heard)
 
     def behind(self, mission: int) -> bool:

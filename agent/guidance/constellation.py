@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from math import cos, inf, pi, sin, sqrt
 from typing import Protocol
 
-from agent.messages import Vector
+from agent.messages import ZERO, Vector
 
 LINES = 8
 AGENTS = 4
@@ -42,12 +42,12 @@ def _default_lines() -> list[list[Vector]]:
         [
             (
                 ahead + k * along,
-                (aside + k * out) * cos(presence),
-                (aside + k * out) * sin(presence),
+                (aside + k * out) * cos(roll),
+                (aside + k * out) * sin(roll),
             )
             for k in range(AGENTS)
         ]
-        for presence in rolls
+        for roll in rolls
     ]
 
 
@@ -75,7 +75,7 @@ class Constellation:
         """Return what the lines add to Omega [m; world axes]; see Avoidance."""
         near = [p for p in points if p[0] * p[0] + p[1] * p[1] + p[2] * p[2] < self._near]
         if not near:
-            return (0.0, 0.0, 0.0)
+            return ZERO
         c, s = cos(yaw), sin(yaw)
         x = y = z = 0.0
         for line in DEFAULT:

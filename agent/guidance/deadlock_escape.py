@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from math import cos, dist, hypot, sin
 
 from agent.controller import Heard, Senses
-from agent.messages import Vector
+from agent.messages import ZERO, Vector
 
 ARRIVED_M = 0.12
 PROGRESS_M = 0.05
@@ -140,7 +140,7 @@ def _tangent(body: Vector, yaw: float, side: float) -> Vector:
 
 def _leaning(way: Vector, point: Vector) -> Vector:
     """Return the side round a point to which the way leans, or up where it leans nowhere."""
-    n = _way((0.0, 0.0, 0.0), point)
+    n = _way(ZERO, point)
     along = n[0] * way[0] + n[1] * way[1] + n[2] * way[2]
     lean = (way[0] - along * n[0], way[1] - along * n[1], way[2] - along * n[2])
     if hypot(*lean) > LEANS:
@@ -150,13 +150,13 @@ def _leaning(way: Vector, point: Vector) -> Vector:
 
 def _next_side(side: Vector, point: Vector) -> Vector:
     """Return the side to try next: a quarter round the line to the point."""
-    n, t = _way((0.0, 0.0, 0.0), point), _across(side, point)
+    n, t = _way(ZERO, point), _across(side, point)
     return (n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0])
 
 
 def _across(direction: Vector, body: Vector) -> Vector:
     """Return the unit vector across the line to a body that is nearest to a direction."""
-    n = _way((0.0, 0.0, 0.0), body)
+    n = _way(ZERO, body)
     along = n[0] * direction[0] + n[1] * direction[1] + n[2] * direction[2]
     t = (
         direction[0] - along * n[0],

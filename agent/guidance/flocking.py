@@ -13,7 +13,7 @@ from agent.config import AgentSetup
 from agent.controller import Heard, Intent, Senses
 from agent.guidance.cone import cone_of
 from agent.guidance.movement import saturated, steer
-from agent.messages import Vector
+from agent.messages import ZERO, Vector
 
 APART = 4.0
 """Speed away for each metre that another is nearer than ``spacing_m`` [1/s]."""
@@ -35,7 +35,7 @@ class Flocking:
         """Return what to do now: the mean of what each neighbour asks for; alone, hover."""
         x, y, z = senses.position
         pulls = [self._pull(senses.position, other) for other in senses.neighbours]
-        pull = mean(pulls) if pulls else (0.0, 0.0, 0.0)
+        pull = mean(pulls) if pulls else ZERO
         wanted = saturated(pull, *self._limits)
         velocity, yaw = steer(wanted, senses.yaw, self._cone)
         ahead = (x + wanted[0], y + wanted[1], z + wanted[2])

@@ -15,7 +15,7 @@ from agent.guidance.deadlock_escape import Dodge
 from agent.guidance.movement import DEAD_BAND_MPS, saturated, steer
 from agent.guidance.potential import Potential
 from agent.guidance.slot_selection import Choice
-from agent.messages import Vector
+from agent.messages import ZERO, Vector
 from agent.qstructure.target_frame import Frame
 
 GAIN = 2.0
@@ -59,13 +59,13 @@ class QStructure:
         if mine is not None and dist(q, q_toq) < AT_SLOT_M and velocity == wanted:
             attitude = mine.slot.attitude
             yaw = self._heading(yaw, attitude.yaw, velocity, frame)
-            tilt = (attitude.pitch or 0.0, attitude.presence or 0.0)
+            tilt = (attitude.pitch or 0.0, attitude.roll or 0.0)
         return Intent(
-            wanted,
-            velocity,
-            yaw % (2.0 * pi),
-            GAIN * sqrt(x * x + y * y + z * z),
-            q_tg,
+            wanted=wanted,
+            velocity=velocity,
+            yaw=yaw % (2.0 * pi),
+            force=GAIN * sqrt(x * x + y * y + z * z),
+            heading_for=q_tg,
             target=q_toq if mine is not None else None,
             place=mine.place if mine is not None else None,
             tilt=tilt,
@@ -77,7 +77,7 @@ class QStructure:
     def _cleared(self, senses: Senses) -> Vector:
         """Return what surfaces near by add to Omega [m]; silent while one goes round them."""
         if self._avoidance is None:
-            return (0.0, 0.0, 0.0)
+            return ZERO
         return self._avoidance.omega(senses.yaw, senses.obstacles)
 
     def _heading(self, yaw: float, asked: float | None, velocity: Vector, frame: Frame) -> float:

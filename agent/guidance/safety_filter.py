@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from agent.guidance.cone import Cone, azimuth_error
 from agent.guidance.movement import DEAD_BAND_MPS
-from agent.messages import Vector
+from agent.messages import ZERO, Vector
 
 SHARE = 0.18
 """Share of the gap that one vehicle of a pair may close within H: 2 * SHARE <= 1/e."""
@@ -40,7 +40,7 @@ class Bound(NamedTuple):
     away: Vector
     limit: float
     aside: float = inf
-    coming: Vector = (0.0, 0.0, 0.0)
+    coming: Vector = ZERO
 
 
 class RangingFilter:

@@ -24,13 +24,12 @@ from agent.guidance.safety_filter import (
     limited,
     shortened,
 )
-from agent.messages import Vector
+from agent.messages import ZERO, Vector
 from agent.sensing.ray_pattern import KINDS
 from agent.sensing.surface_motion import Motion
 
 BRAKING = 0.25
 """Share of the gap that one vehicle of bounded acceleration may close until it stands."""
-STAND = (0.0, 0.0, 0.0)
 SCANNED_M = 0.05
 """So much farther one stays from points that were scanned: noise, and a coarse pattern."""
 CREEP = 0.3
@@ -100,7 +99,7 @@ class Guard:
                 return forward_retreat(bounds, senses.yaw, self._sway, *self._speeds)
             return forward_kept(wanted, bounds, senses.yaw, self._sway)
         if self._accelerates and self._too_fast(senses.velocity, bounds):
-            return STAND
+            return ZERO
         if comes:
             return retreated(wanted, bounds, *self._speeds)
         return limited(wanted, bounds, senses.yaw, self._cone)

@@ -10,8 +10,8 @@ from itertools import pairwise
 from math import atan2, dist, hypot, inf, remainder, tau
 from typing import NamedTuple
 
-from agent.messages import FramePath, Vector
-from agent.qstructure.target_frame import REST, Frame
+from agent.messages import ZERO, FramePath, Vector
+from agent.qstructure.target_frame import Frame
 
 LEVEL_M = 1e-6
 """A leg that goes less far than this horizontally has no azimuth: the frame keeps its yaw."""
@@ -23,7 +23,7 @@ class _Stretch(NamedTuple):
     from_s: float
     origin: Vector
     yaw: float
-    velocity: Vector = REST
+    velocity: Vector = ZERO
     yaw_rate: float = 0.0
 
     def at(self, time_s: float) -> Frame:
@@ -70,7 +70,7 @@ def _stretches(path: FramePath) -> list[_Stretch]:
         turn = headings[index] - yaw
         if turn != 0.0:
             rate = path.turn_rate if turn > 0.0 else -path.turn_rate
-            found.append(_Stretch(time_s, here, yaw, REST, rate))
+            found.append(_Stretch(time_s, here, yaw, ZERO, rate))
             time_s, yaw = time_s + turn / rate, headings[index]
         there = path.waypoints[index + 1]
         lasts_s = dist(here, there) / path.speed

@@ -29,7 +29,7 @@ class Attitude(NamedTuple):
 
     yaw: float | None = None
     pitch: float | None = None
-    presence: float | None = None
+    roll: float | None = None
 
 
 FREE = Attitude()

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta
 
-from agent.messages import Metres, Vector
+from agent.messages import ZERO, Metres, Vector
 from agent.qstructure.curve import CurveError, Walk
 from agent.qstructure.expression import MAX_EXPRESSION_LENGTH, Expression, ExpressionError
 
@@ -146,7 +146,7 @@ def shape_of(spec: ShapeSpec) -> Shape | Straight:
 def _ray(spec: Ray) -> Straight:
     if hypot(*spec.direction) < 1e-9:
         raise ShapeError("direction", "must not be of zero length")
-    return Straight([(0.0, 0.0, 0.0), spec.direction])
+    return Straight([ZERO, spec.direction])
 
 
 def _polyline(spec: Polyline) -> Straight:

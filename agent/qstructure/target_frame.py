@@ -2,9 +2,7 @@
 
 from math import cos, sin
 
-from agent.messages import Vector
-
-REST = (0.0, 0.0, 0.0)
+from agent.messages import ZERO, Vector
 
 
 class Frame:
@@ -17,16 +15,16 @@ class Frame:
 
     def __init__(
         self,
-        origin: Vector = (0.0, 0.0, 0.0),
+        origin: Vector = ZERO,
         yaw: float = 0.0,
-        velocity: Vector = REST,
+        velocity: Vector = ZERO,
         yaw_rate: float = 0.0,
     ) -> None:
         self.origin = origin
         self.yaw = yaw
         self.velocity = velocity
         self.yaw_rate = yaw_rate
-        self.moves = yaw_rate != 0.0 or velocity != REST
+        self.moves = yaw_rate != 0.0 or velocity != ZERO
         self._cos = cos(yaw)
         self._sin = sin(yaw)
 

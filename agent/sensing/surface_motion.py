@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from math import dist, sqrt
 from typing import NamedTuple
 
-from agent.messages import Vector
+from agent.messages import ZERO, Vector
 
 SAME_POINT_M = 0.3
 """Nearer than this to the point before, it is on the same surface."""
@@ -18,7 +18,6 @@ LOST_S = 0.3
 """After so long without a reading nothing is known of how points move."""
 LEAST_MPS = 0.02
 SMOOTHING_S = 0.5
-REST = (0.0, 0.0, 0.0)
 SURE = 3.0
 """Standard deviations of the noise's speed below which a point is taken to stand."""
 
@@ -59,7 +58,7 @@ class Motion:
         if all(dot(seen.velocity, seen.away) <= self._least for seen in self._seen):
             return ()
         return tuple(
-            seen.velocity if dot(seen.velocity, seen.away) > self._least else REST
+            seen.velocity if dot(seen.velocity, seen.away) > self._least else ZERO
             for seen in self._seen
         )
 
@@ -69,7 +68,7 @@ class Motion:
         at, away = (here[0] + x, here[1] + y, here[2] + z), (-x / r, -y / r, -z / r)
         last = min(before, key=lambda seen: dist(seen.at, at), default=None)
         if last is None or dist(last.at, at) > SAME_POINT_M:
-            return _Seen(at, away, REST)
+            return _Seen(at, away, ZERO)
         missed = _came_nearer(last, at, away) / dt - dot(last.velocity, away)
         if self._smooths:
             missed *= min(1.0, dt / SMOOTHING_S)

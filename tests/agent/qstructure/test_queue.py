@@ -123,8 +123,8 @@ def test_angles_follow_the_arc_length_and_what_is_left_out_is_free():
     turning = Orientation(OrientationSpec(yaw_deg="10*d", roll_deg=-5))
     queue = Queue("Q", [(0, 0, 0)], shape_of(Ray((0, 3, 0))), 0.5, turning)
     for s in queue.members(5):
-        yaw, pitch, presence = queue.attitude(s)
+        yaw, pitch, roll = queue.attitude(s)
         assert yaw == pytest.approx(s * 10.0 * pi / 180.0)
         assert pitch is None
-        assert presence == pytest.approx(-5.0 * pi / 180.0)
+        assert roll == pytest.approx(-5.0 * pi / 180.0)
     assert straight((0, 0, 0), (5, 0, 0)).attitude(1.0) == (None, None, None)
