@@ -8,7 +8,7 @@ import pytest
 
 from agent.config import Laser, Sensors, Sonar, Vehicle
 from agent.messages import NO_ECHO_MM
-from agent.sensing.ray_pattern import KINDS, pattern_of
+from agent.sensing.ray_pattern import SCANNERS, pattern_of
 from worldsim.scenario.obstacle_tables import Sphere, Wall
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.scanning_sensors import Scans
@@ -22,7 +22,7 @@ HERE = np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.0], [np.nan] * 3])
 YAW = np.array([0.0, pi / 2, np.nan])
 
 
-def scans(sensors=Sensors(), kinds=KINDS, obstacles=(), seed=1):  # noqa: B008
+def scans(sensors=Sensors(), kinds=SCANNERS, obstacles=(), seed=1):  # noqa: B008
     vehicles = [Vehicle(sensors=kinds)] * 3
     return Scans(vehicles, sensors, seed, 20.0, Obstacles(obstacles))
 
@@ -102,7 +102,7 @@ def test_it_scans_at_its_rate_and_only_who_carries_it():
     assert not scans(kinds=("proximity",)).any
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SCANNERS)
 def test_a_pattern_is_of_unit_vectors(kind):
     pattern = pattern_of(kind, Sensors(laser=Laser(rings=5, elevation_deg=60)), 20.0)
     for beam in pattern.beams:

@@ -11,7 +11,7 @@ import numpy as np
 
 from agent.config import Sensors, Vehicle
 from agent.messages import NO_ECHO_MM, Scan
-from agent.sensing.ray_pattern import KINDS, Pattern, pattern_of
+from agent.sensing.ray_pattern import SCANNERS, Pattern, pattern_of
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.raycast import cast, cast_at_spheres
 from worldsim.truth.vehicle import Floats
@@ -98,7 +98,7 @@ class Scans:
                 Scanner(pattern_of(kind, sensors, tick_hz), sensors, seed, bodies, obstacles),
                 frozenset(row for row, each in enumerate(vehicles) if kind in each.sensors),
             )
-            for kind in KINDS
+            for kind in SCANNERS
         ]
         self.any = any(carriers for _, carriers in self._carriers)
 

@@ -8,11 +8,11 @@ from typing import Literal
 import numpy as np
 
 from agent.messages import PROXIMITY_RANGE_M, Scan, Vector
-from agent.sensing.ray_pattern import KINDS
+from agent.sensing.ray_pattern import SCANNERS
 from worldsim.truth.proximity_sensor import Sensed
 
 Mode = Literal["stuck", "silent", "wrong"]
-SENSORS = ("proximity", *KINDS)
+SENSORS = ("proximity", *SCANNERS)
 NOTHING = Sensed(())
 SALT = 1 << 60
 
@@ -52,7 +52,7 @@ class SensorFaults:
         return tuple(scan for scan in told if scan is not None)
 
     def _scan(self, agent: int, true: Scan, slot: int) -> Scan | None:
-        name = KINDS[true.kind]
+        name = SCANNERS[true.kind]
         mode = self._modes.get((agent, name))
         if mode == "silent":
             return None
