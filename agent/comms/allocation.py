@@ -93,10 +93,8 @@ def _has_gainful_exchange(
         if peer.id != own_id:
             theirs = slots[held[peer.id]]
             now = kept + _squared_distance(peer.position, theirs)
-            if (
-                now - _squared_distance(me, theirs) - _squared_distance(peer.position, mine)
-                > GAIN_M2
-            ):
+            saved = now - _squared_distance(me, theirs) - _squared_distance(peer.position, mine)
+            if saved > GAIN_M2:
                 return True
     return False
 

@@ -41,8 +41,8 @@ def sensor_health(patterns=(), ranging=True, noisy=(PROXIMITY, 0)):
 
 
 def test_an_unchanged_reading_of_a_moving_vehicle_is_distrusted_until_it_changes():
-    watch, body = sensor_health(), ((1.0, 0.0, 0.0),)
-    trusted = [watch.update(observation(tick, 0.01 * tick, body)) for tick in range(8)]
+    watch, vehicle = sensor_health(), ((1.0, 0.0, 0.0),)
+    trusted = [watch.update(observation(tick, 0.01 * tick, vehicle)) for tick in range(8)]
     assert trusted == [True] * 4 + [False] * 4
     assert watch.update(observation(9, 0.1, ((0.9, 0.0, 0.0),)))
 
@@ -78,13 +78,13 @@ def test_missing_scans_are_noticed():
     assert watch.update(observation(21, 0.5, scans=(NONE,)))
 
 
-@pytest.mark.parametrize(("bodies", "trusted"), [((), False), (((1.0, 0.1, 0.0),), True)])
-def test_a_neighbour_near_by_must_be_sensed(bodies, trusted):
+@pytest.mark.parametrize(("vehicles", "trusted"), [((), False), (((1.0, 0.1, 0.0),), True)])
+def test_a_neighbour_near_by_must_be_sensed(vehicles, trusted):
     watch = sensor_health()
     for look in range(LOOKS):
         there = beacon(1, look, stamp_s=0.01 * look, at=(1.0, 0.0, 0.0))
-        watch.compare(observation(0, vehicles=bodies), [there])
-    assert watch.update(observation(0, vehicles=bodies)) is trusted
+        watch.compare(observation(0, vehicles=vehicles), [there])
+    assert watch.update(observation(0, vehicles=vehicles)) is trusted
 
 
 def test_old_beacons_and_far_neighbours_prove_nothing():
@@ -99,7 +99,7 @@ def test_old_beacons_and_far_neighbours_prove_nothing():
 
 
 def test_a_blind_sensor_is_trusted_again_once_it_senses_a_neighbour():
-    watch, body = sensor_health(), ((1.0, 0.0, 0.0),)
+    watch, vehicle = sensor_health(), ((1.0, 0.0, 0.0),)
     there, gone = (beacon(1, 1, stamp_s=0.0, at=(x, 0.0, 0.0)) for x in (1.0, 5.0))
     for look in range(LOOKS):
         speaking = beacon(1, look, stamp_s=0.01 * look, at=(1.0, 0.0, 0.0))
@@ -109,8 +109,8 @@ def test_a_blind_sensor_is_trusted_again_once_it_senses_a_neighbour():
         assert not watch.update(observation(0))
     for _ in range(LOOKS):
         assert not watch.update(observation(0))
-        watch.compare(observation(0, vehicles=body), [there])
-    assert watch.update(observation(0, vehicles=body))
+        watch.compare(observation(0, vehicles=vehicle), [there])
+    assert watch.update(observation(0, vehicles=vehicle))
 
 
 def test_jumping_scans_are_wrong_and_quiet_ones_are_right_again():
