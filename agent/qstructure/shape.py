@@ -163,7 +163,7 @@ def _shape_of(spec: ShapeSpec) -> Shape | Straight:
 
 def _ray(spec: Ray) -> Straight:
     if hypot(*spec.direction) < 1e-9:
-        raise ShapeError("direction", "its length must not be 0")
+        raise ShapeError("direction", "must not have zero length")
     return Straight([ZERO, spec.direction])
 
 
