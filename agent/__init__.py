@@ -1,1 +1,1 @@
-"""What flies: one agent of the team, a pure core and the process shell round it."""
+"""One agent of the team: its pure core, and the process shells around it."""

@@ -1,4 +1,4 @@
-"""A controller at work: what it wants is checked, and what goes wrong in it bears its name."""
+"""A controller whose intents are checked and whose failures name the controller and the agent."""
 
 from collections.abc import Iterable
 from math import isfinite
@@ -7,48 +7,49 @@ from msgspec.structs import replace
 
 from agent.config import AgentSetup
 from agent.controller import Controller, Intent, Senses, load
-from agent.messages import Vector
+from agent.messages import MAX_ANGLE_RAD, MAX_FORCE, MAX_M, MAX_SPEED_MPS, Vector
 
 NUMBERS = 13
-"""An intent's numbers besides its target: three vectors, two angles of tilt, yaw and force."""
-MAX_ANY = 100.0
-"""What no number of a command may exceed, but for positions and the force."""
-MAX_M, MAX_FORCE = 1e6, 1e9
+"""Numbers in an intent besides its target: three vectors, two tilt angles, yaw and force."""
+SMALL = min(MAX_SPEED_MPS, MAX_ANGLE_RAD)
+"""Numbers whose absolute values add up to no more than this are within every bound."""
 
 
 class FaultyControllerError(RuntimeError):
-    """A controller that failed at its work; the text names it, its agent and what happened."""
+    """A controller failed; the text names the controller, the agent, the time and the error."""
 
 
 class CheckedController:
-    """One agent's controller. Raises ControllerError if it cannot be had.
+    """One agent's controller. Raises ControllerError if it cannot be loaded.
 
-    Whatever the controller raises, here or in ``decide``, is raised as FaultyControllerError.
+    Any error of the controller's constructor or ``decide`` is raised as FaultyControllerError.
     """
 
     def __init__(self, setup: AgentSetup) -> None:
-        self._who = f"controller {setup.control.controller!r} of agent {setup.id}"
-        kind = load(setup.control.controller)
+        self._label = f"controller {setup.control.controller!r} of agent {setup.id}"
+        controller_class = load(setup.control.controller)
         try:
-            self._controller: Controller = kind(setup)
+            self._controller: Controller = controller_class(setup)
         except Exception as error:
-            raise self._fault("when it was made", error) from error
+            raise self._fault("in its constructor", error) from error
 
     def decide(self, senses: Senses) -> Intent:
-        """Return what the controller wants, in plain floats within the bounds of a command."""
+        """Return the controller's intent, in plain floats within the bounds of a command."""
         try:
             return plain(self._controller.decide(senses))
         except Exception as error:
             raise self._fault(f"at {senses.now_s:g} s", error) from error
 
     def _fault(self, when: str, error: Exception) -> FaultyControllerError:
-        return FaultyControllerError(f"{self._who} failed {when}: {type(error).__name__}: {error}")
+        return FaultyControllerError(
+            f"{self._label} failed {when}: {type(error).__name__}: {error}"
+        )
 
 
 def plain(intent: Intent) -> Intent:
-    """Return an intent in plain floats, numpy's being welcome.
+    """Return an intent in plain floats; numpy's numbers are converted.
 
-    Raises TypeError for what is no Intent, ValueError for numbers that no command may hold.
+    Raises TypeError if it is not an Intent, ValueError for numbers outside a command's bounds.
     """
     if not isinstance(intent, Intent):
         raise TypeError(f"decide returned {type(intent).__name__}, not an Intent")
@@ -62,24 +63,24 @@ def plain(intent: Intent) -> Intent:
     )
     target = () if intent.target is None else intent.target
     total = sum(map(abs, (*numbers, *target)))
-    # As good as always: one look shows that all are plain, finite and small.
-    sound = type(total) is float and total <= MAX_ANY and intent.force >= 0.0
+    # The fast path, nearly always taken: one sum shows that all are plain, finite and small.
+    sound = type(total) is float and total <= SMALL and intent.force >= 0.0
     return intent if sound and len(numbers) == NUMBERS else _converted(intent)
 
 
 def _converted(intent: Intent) -> Intent:
     if intent.force < 0.0:
         raise ValueError(f"the Intent's force is {intent.force:g}; it is a magnitude, at least 0")
-    pitch, presence = _numbers("tilt", intent.tilt, 2, MAX_ANY)
+    pitch, roll = _numbers("tilt", intent.tilt, 2, MAX_ANGLE_RAD)
     return replace(
         intent,
-        wanted=_vector("wanted", intent.wanted, MAX_ANY),
-        velocity=_vector("velocity", intent.velocity, MAX_ANY),
-        yaw=_numbers("yaw", (intent.yaw,), 1, MAX_ANY)[0],
+        wanted=_vector("wanted", intent.wanted, MAX_SPEED_MPS),
+        velocity=_vector("velocity", intent.velocity, MAX_SPEED_MPS),
+        yaw=_numbers("yaw", (intent.yaw,), 1, MAX_ANGLE_RAD)[0],
         force=_numbers("force", (intent.force,), 1, MAX_FORCE)[0],
         heading_for=_vector("heading_for", intent.heading_for, MAX_M),
         target=None if intent.target is None else _vector("target", intent.target, MAX_M),
-        tilt=(pitch, presence),
+        tilt=(pitch, roll),
     )
 
 

@@ -1,7 +1,6 @@
-"""Bytes to messages and back, with everything checked that can be checked without a state.
+"""Encoding and decoding of messages, with every check that needs no state.
 
-Decoding is a pure function of the bytes: :func:`decode_radio` may be memoised by whoever feeds
-several agents in one process.
+Decoding is a pure function of the bytes, so a process that feeds several agents may memoise it.
 """
 
 from collections.abc import Callable
@@ -11,24 +10,22 @@ from zlib import crc32
 import msgpack
 import msgspec
 
-from agent.messages import Beacon, Command, Gossip, Observation
+from agent.messages import MAX_PIECES, PIECE_B, Beacon, Command, Gossip, Observation
+from agent.qstructure.expression import MAX_EXPRESSION_LENGTH
 from agent.qstructure.formation import FormationSpec
+from netem.wire.channels import MAX_PAYLOAD_B
 
-MAX_RADIO_B = 1200
-"""What the radio carries in a frame, the seal included."""
-SEAL_B = 4
+CHECKSUM_B = 4
 MAX_MESSAGE_B = 4096
 MAX_OBSERVATION_B = 65536
-"""Bodies sensed, and with them a mission: its formation and its frame's path."""
-MAX_FORMATION_B = 16 * 900
-MAX_EXPRESSION = 300
+"""Sensed vehicles, scans, and with them a mission: its formation and its frame's path."""
 
 _T = TypeVar("_T", bound=msgspec.Struct)
 _encode = msgspec.msgpack.Encoder().encode
 
 
 class RejectedError(ValueError):
-    """A message that is refused; ``cause`` is the name it is counted under."""
+    """A rejected message; ``cause`` is one of messages.CAUSES, under which it is counted."""
 
     def __init__(self, cause: str, detail: str) -> None:
         super().__init__(f"{cause}: {detail}")
@@ -36,30 +33,30 @@ class RejectedError(ValueError):
 
 
 def encode(message: msgspec.Struct) -> bytes:
-    """Encode any message of ours as msgpack."""
+    """Encode any message as msgpack."""
     return _encode(message)
 
 
-def sealed(data: bytes) -> bytes:
-    """Return what the radio carries: bytes, and a checksum (crc32) after them."""
-    return data + crc32(data).to_bytes(SEAL_B, "little")
+def add_checksum(data: bytes) -> bytes:
+    """Return a radio payload: the data, followed by its crc32."""
+    return data + crc32(data).to_bytes(CHECKSUM_B, "little")
 
 
-def unsealed(payload: bytes) -> bytes:
-    """Return what was sealed, or raise :class:`RejectedError` where a bit was turned on the way."""
-    if len(payload) > MAX_RADIO_B:
-        raise RejectedError("oversize", f"{len(payload)} B where {MAX_RADIO_B} B are allowed")
-    data = payload[:-SEAL_B]
-    if payload != sealed(data):
-        raise RejectedError("corrupt", "the checksum does not fit")
+def strip_checksum(payload: bytes) -> bytes:
+    """Return a radio payload's data; raise :class:`RejectedError` if its checksum is wrong."""
+    if len(payload) > MAX_PAYLOAD_B:
+        raise RejectedError("oversize", f"{len(payload)} B where {MAX_PAYLOAD_B} B are allowed")
+    data = payload[:-CHECKSUM_B]
+    if payload != add_checksum(data):
+        raise RejectedError("corrupt", "the checksum does not match")
     return data
 
 
 def decode(data: bytes, kind: type[_T], max_bytes: int = MAX_MESSAGE_B, max_text: int = 64) -> _T:
     """Decode and check one message, or raise :class:`RejectedError`.
 
-    The limits are those of a hostile radio: no extension types, short arrays and strings, every
-    number finite and in its range, no field missing and none too many.
+    The limits assume a hostile radio: no extension types, short arrays and strings, every number
+    finite and in its range, and exactly the fields of the message.
     """
     if len(data) > max_bytes:
         raise RejectedError("oversize", f"{len(data)} B where {max_bytes} B are allowed")
@@ -89,8 +86,8 @@ def encode_formation(formation: FormationSpec) -> bytes:
 
 
 def decode_formation(data: bytes) -> FormationSpec:
-    """Decode a formation that came over the radio, or raise :class:`RejectedError`."""
-    return decode(data, FormationSpec, MAX_FORMATION_B, max_text=MAX_EXPRESSION)
+    """Decode a formation received over the radio, or raise :class:`RejectedError`."""
+    return decode(data, FormationSpec, MAX_PIECES * PIECE_B, max_text=MAX_EXPRESSION_LENGTH)
 
 
 _beacon = msgspec.msgpack.Decoder(Beacon).decode
@@ -100,22 +97,22 @@ _command = msgspec.msgpack.Decoder(Command).decode
 
 
 def decode_beacon(payload: bytes) -> Beacon:
-    """Decode a frame of the local channel, or raise :class:`RejectedError`."""
-    return _typed(unsealed(payload), _beacon, MAX_RADIO_B)
+    """Decode a payload of the local channel, or raise :class:`RejectedError`."""
+    return _typed(strip_checksum(payload), _beacon, MAX_PAYLOAD_B)
 
 
 def decode_gossip(payload: bytes) -> Gossip:
-    """Decode a frame of the multihop channel, or raise :class:`RejectedError`."""
-    return _typed(unsealed(payload), _gossip, MAX_RADIO_B)
+    """Decode a payload of the multihop channel, or raise :class:`RejectedError`."""
+    return _typed(strip_checksum(payload), _gossip, MAX_PAYLOAD_B)
 
 
 def decode_observation(data: bytes) -> Observation:
-    """Decode what the world tells a vehicle, or raise :class:`RejectedError`."""
+    """Decode the world's message to an agent, or raise :class:`RejectedError`."""
     return _typed(data, _observation, MAX_OBSERVATION_B)
 
 
 def decode_command(data: bytes) -> Command:
-    """Decode what an agent commands, or raise :class:`RejectedError`."""
+    """Decode an agent's message to the world, or raise :class:`RejectedError`."""
     return _typed(data, _command, MAX_MESSAGE_B)
 
 

@@ -1,33 +1,35 @@
-"""What an agent is told once, before it flies: tables of the scenario, as they stand there."""
+"""Configuration of one agent: the scenario's tables, as they stand there."""
 
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
-from agent.messages import AT_HOME, FramePath
+from agent.messages import AT_HOME, AgentId, FramePath
 from agent.qstructure.formation import FormationSpec
 
 Positive = Annotated[float, Meta(gt=0, le=1e4)]
 Hertz = Annotated[float, Meta(gt=0, le=1000)]
 Noise = Annotated[float, Meta(ge=0, le=1)]
+VehicleKind = Literal["kinematic", "accelerating", "forward"]
+AvoidanceKind = Literal["constellation", "direct", "none"]
 
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A table of the scenario: unknown keys are refused."""
+    """Base of the scenario's tables; unknown keys are rejected."""
 
 
 class Vehicle(Table, frozen=True):
-    """The vehicle's limits and senses.
+    """The vehicle's limits and sensors.
 
-    kind: "kinematic" takes up any velocity at once; "accelerating" changes it by max_accel_mps2 at
-    most; "forward" flies where it points, climbs and turns, and cannot move sideways or back.
+    kind: "kinematic" takes up any velocity at once; "accelerating" changes its velocity by at most
+    max_accel_mps2; "forward" flies only where it points, climbs and turns.
 
-    max_turn_deg: theta, half angle of the cast-zone in azimuth; to the left and to the right it may
-    differ. max_tilt_deg: how far it can roll and pitch at its slot; 0: it stays level.
+    max_turn_deg: theta, half angle of the cast-zone in azimuth; each side may have its own value.
+    max_tilt_deg: largest roll and pitch at its slot; 0: it stays level.
     """
 
-    kind: Literal["kinematic", "accelerating", "forward"] = "kinematic"
+    kind: VehicleKind = "kinematic"
     radius_m: Annotated[float, Meta(gt=0, le=100)] = 0.1
     max_speed_mps: Annotated[float, Meta(gt=0, le=50)] = 0.5
     max_climb_mps: Annotated[float, Meta(gt=0, le=50)] = 0.5
@@ -52,7 +54,7 @@ class Proximity(Table, frozen=True):
 class Laser(Table, frozen=True):
     """A scanner: ``rays`` over ``field_deg`` ahead, in ``rings`` spread over +-elevation_deg.
 
-    noise_m: normal, along the ray; dropout_percent: rays that meet something and tell nothing.
+    noise_m: normal, along the ray; dropout_percent: share of the echoes that are lost.
     """
 
     range_m: Annotated[float, Meta(gt=0, le=60)] = 4.0
@@ -66,9 +68,9 @@ class Laser(Table, frozen=True):
 
 
 class Sonar(Table, frozen=True):
-    """A ring of sonars, and with ``up_down`` one upwards and one downwards.
+    """A level ring of sonars; with ``up_down`` one more looks upwards and one downwards.
 
-    Each tells the distance to the nearest thing within its beam, not where in it.
+    Each measures the distance to the nearest surface within its beam, not the direction.
     """
 
     range_m: Annotated[float, Meta(gt=0, le=60)] = 2.0
@@ -81,20 +83,24 @@ class Sonar(Table, frozen=True):
 
 
 class Sensors(Table, frozen=True):
-    """What each kind of sensor is like."""
+    """The properties of each kind of sensor."""
 
     proximity: Proximity = Proximity()
     laser: Laser = Laser()
     sonar: Sonar = Sonar()
 
 
+DEFAULT_CAST_FAR_M = 0.5
+"""d_c2 [m] where neither the scenario nor the radio's range sets another (Lemma 7, E20)."""
+
+
 class Control(Table, frozen=True):
     """The controller and the paper's distances [m]: d_ir, d_ob, d_s, d_c1, d_c2.
 
-    avoidance: what leads round obstacles before the filter has to: the bent lines of Algorithm 3, a
-    repulsion straight from what is near, or nothing but the dodge.
-    clearance_m: from a vehicle's centre to an obstacle's surface, what the safety filter keeps.
-    ``cast_far_m`` left out follows from the range (Lemma 7, E20).
+    avoidance: what leads round obstacles before the safety filter has to stop the vehicle: the bent
+    lines of Algorithm 3, a direct repulsion from each near point, or only the escape manoeuvre.
+    clearance_m: distance from a vehicle's centre to an obstacle's surface that the safety filter
+    keeps. ``cast_far_m`` left out follows from the range (Lemma 7, E20).
     """
 
     controller: Annotated[str, Meta(min_length=1, max_length=200)] = "q_structure"
@@ -104,35 +110,30 @@ class Control(Table, frozen=True):
     clearance_m: Positive = 0.5
     cast_near_m: Positive = 0.05
     cast_far_m: Positive | None = None
-    avoidance: Literal["constellation", "direct", "none"] = "constellation"
+    avoidance: AvoidanceKind = "constellation"
 
 
 class Comms(Table, frozen=True):
-    """How often each channel is used [Hz]; ``multihop_hz`` 0 is off."""
+    """Rate of each channel [Hz]; ``multihop_hz`` 0 is off."""
 
     local_hz: Hertz = 20.0
     multihop_hz: Annotated[float, Meta(ge=0, le=1000)] = 2.0
 
 
 class AgentSetup(Table, frozen=True):
-    """All that one agent is told.
+    """The whole configuration of one agent."""
 
-    command_ticks: for how many ticks a command is valid; H of docs/method.md follows from it.
-    fleet_max_speed_mps: the fastest vehicle's limit, which is what the others must reckon with.
-    frame: where the target's frame goes, until a mission says otherwise. lockstep: whether its
-    process waits for what each of its slots brings.
-    """
-
-    id: Annotated[int, Meta(ge=0, lt=2**16)]
-    incarnation: Annotated[int, Meta(ge=0)]
+    id: AgentId
+    incarnation: Annotated[int, Meta(ge=0)]  # which process of this agent, counted from 0
     tick_hz: Hertz
     slots_per_tick: Annotated[int, Meta(ge=1, le=64)]
     command_ticks: Annotated[int, Meta(ge=1, le=10)]
+    """Life of a command [ticks]; H of docs/method.md follows from it."""
     vehicle: Vehicle
-    fleet_max_speed_mps: Positive
+    fleet_max_speed_mps: Positive  # limit of the fleet's fastest vehicle
     control: Control
     comms: Comms
     formation: FormationSpec
     sensor: Sensors = Sensors()
-    frame: FramePath = AT_HOME
-    lockstep: bool = False
+    frame: FramePath = AT_HOME  # path of the target's frame until a mission sets another
+    lockstep: bool = False  # whether the process waits for the inbox of each of its slots

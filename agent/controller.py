@@ -1,9 +1,9 @@
-"""The interface a controller implements; the Q-structure is one, a user brings another.
+"""The interface that a controller implements: a built-in one, or a user's own.
 
 A controller is a class that takes an :class:`~agent.config.AgentSetup` and has ``decide``. It owns
-no socket, clock, thread or global random state: time is in what it senses. The agent around it
-keeps the neighbours, applies the safety filter to what the controller wants, and talks to radio
-and vehicle.
+no socket, clock, thread or global random state; the only time is in its senses. The agent around it
+tracks the neighbours, applies the safety filter to the intent, and talks to the radio and the
+vehicle.
 """
 
 from collections.abc import Callable
@@ -23,95 +23,76 @@ BUILT_IN = {
     "flocking": "agent.guidance.flocking:Flocking",
 }
 ENTRY_POINTS = "qswarm.controllers"
-"""The entry-point group under which another package names its controllers."""
+"""The entry-point group in which an installed package names its controllers."""
 
 
 class ControllerError(ValueError):
-    """A controller that cannot be had; the text says why."""
+    """A controller that cannot be loaded; the text says why."""
 
 
 class Heard(msgspec.Struct, frozen=True, gc=False, order=True):
-    """A neighbour heard directly, brought forward to now.
-
-    position [m; world frame]: as told plus velocity times age; target [m; world frame]: where it
-    is heading right now (q_tg); age_s: how old what it told is.
-    """
+    """A neighbour heard directly, extrapolated to now."""
 
     id: int
-    age_s: float
-    position: Vector
-    velocity: Vector
-    target: Vector
-    place: Place | None
+    age_s: float  # age of its last beacon [s]
+    position: Vector  # last reported position plus velocity times age [m; world frame]
+    velocity: Vector  # as reported [m/s; world frame]
+    target: Vector  # its immediate target q_tg, as reported [m; world frame]
+    place: Place | None  # the place that it claims
 
 
 class Peer(msgspec.Struct, frozen=True, gc=False, order=True):
-    """A member of the team as far as known, oneself included; told directly or passed on.
-
-    position [m; world frame]: where it last said it was; cost_m: how far from its place it was when
-    it first claimed it, as it says.
-    """
+    """A known member of the team, the own agent included; heard directly or through others."""
 
     id: int
-    position: Vector
-    place: Place | None
+    position: Vector  # last reported [m; world frame]
+    place: Place | None  # the place that it claims
     cost_m: float | None = None
+    """Reported distance to its place when it first claimed it [m]."""
 
 
 class Flown(NamedTuple):
-    """The mission an agent flies: its key, the formation, and the target's frame."""
+    """The mission that an agent flies at present."""
 
     key: int
     formation: Formation
-    frame: Frame
+    frame: Frame  # the target's frame at present
 
 
 class Senses(msgspec.Struct, frozen=True, gc=False):
-    """What a controller decides on: own pose, what is heard, who is known, what is near.
+    """Everything that a controller decides on."""
 
-    vehicles: bodies within the proximity sensor, relative to the own centre [m; world axes].
-    obstacles: nearest points of what else is near, relative likewise.
-    team(): all members known, sorted by id; gathered when it is asked for. mission: what the team
-    shall form. silent: where bodies stand from which nothing is heard [m; world frame]; blocked:
-    places that others see taken by such a body (E18).
-    """
-
-    now_s: float
-    position: Vector
-    velocity: Vector
-    yaw: float
+    now_s: float  # simulated time, the same for all agents [s]
+    position: Vector  # own [m; world frame]
+    velocity: Vector  # own [m/s; world frame]
+    yaw: float  # own [rad; world frame]
     vehicles: tuple[Vector, ...]
-    neighbours: tuple[Heard, ...]
-    team: Callable[[], tuple[Peer, ...]]
+    """Vehicles within the proximity sensor's range, relative to the own centre [m; world axes]."""
+    neighbours: tuple[Heard, ...]  # sorted by id
+    team: Callable[[], tuple[Peer, ...]]  # all known members, sorted by id; gathered when called
     mission: Flown
-    silent: tuple[Vector, ...] = ()
+    silent: tuple[Vector, ...] = ()  # unidentified vehicles [m; world frame] (E18)
     blocked: frozenset[Place] = frozenset()
+    """Places that others see taken by an unidentified vehicle (E18)."""
     obstacles: tuple[Vector, ...] = ()
+    """Near points of obstacles, relative to the own centre [m; world axes]."""
 
 
 class Intent(msgspec.Struct, frozen=True, gc=False):
-    """What a controller wants, before the safety filter.
+    """What a controller wants, before the safety filter."""
 
-    wanted [m/s; world frame]: the velocity it would like, whatever its heading; velocity: what it
-    asks for now, given that a vehicle may have to turn first; yaw [rad]: the heading it asks for;
-    force: |u_i| of (28) before saturation; heading_for: its immediate target q_tg [m];
-    target: its target-on-queue [m] and ``place`` its place in the formation, if it has any; cost_m:
-    how far it was from there when it first claimed it, which decides a contest; tilt:
-    pitch and roll it asks for [rad]; vertex: whether it is a queue-vertex agent there; blocked: the
-    places that it sees taken by a silent body.
-    """
-
-    wanted: Vector
-    velocity: Vector
-    yaw: float
-    force: float
-    heading_for: Vector
-    target: Vector | None = None
-    place: Place | None = None
-    tilt: tuple[float, float] = (0.0, 0.0)
+    wanted: Vector  # desired velocity whatever the heading [m/s; world frame]
+    velocity: Vector  # velocity to fly now; a vehicle may have to turn first [m/s; world frame]
+    yaw: float  # heading to turn to [rad; world frame]
+    force: float  # |u_i| of (28) before saturation [m/s]
+    heading_for: Vector  # immediate target q_tg [m; world frame]
+    target: Vector | None = None  # target-on-queue [m; world frame]
+    place: Place | None = None  # the claimed place in the formation
+    tilt: tuple[float, float] = (0.0, 0.0)  # pitch and roll [rad]
     cost_m: float = 0.0
-    vertex: bool = False
-    blocked: tuple[Place, ...] = ()
+    """Distance to the place when it was first claimed [m]; it decides a contest."""
+    vertex: bool = False  # whether the agent is a queue-vertex agent at its place
+    blocked: tuple[Place, ...] = ()  # places seen taken by an unidentified vehicle (E18)
 
 
 class Controller(Protocol):
@@ -120,18 +101,20 @@ class Controller(Protocol):
     def __init__(self, setup: AgentSetup) -> None: ...
 
     def decide(self, senses: Senses) -> Intent:
-        """Return what to do now."""
+        """Return the intent for this tick."""
 
 
 def load(name: str) -> type[Controller]:
     """Return the controller class of a built-in name, an entry point or ``package.module:Class``.
 
-    Raises :class:`ControllerError` where there is none.
+    Raises :class:`ControllerError` if there is none.
     """
-    module_name, _, class_name = _where(name).partition(":")
+    module_name, _, class_name = _import_path(name).partition(":")
     if not module_name or not class_name:
         known = ", ".join([*BUILT_IN, *(each.name for each in entry_points(group=ENTRY_POINTS))])
-        raise ControllerError(f"{name!r} is neither known ({known}) nor 'package.module:Class'")
+        raise ControllerError(
+            f"{name!r} is neither a known controller ({known}) nor 'package.module:Class'"
+        )
     try:
         found = getattr(import_module(module_name), class_name)
     except (ImportError, AttributeError, ValueError) as error:
@@ -141,8 +124,8 @@ def load(name: str) -> type[Controller]:
     return found  # type: ignore[no-any-return]
 
 
-def _where(name: str) -> str:
-    """Return ``package.module:Class`` of a controller's name; a name that is not known stays."""
+def _import_path(name: str) -> str:
+    """Return ``package.module:Class`` of a known name; any other name stays as it is."""
     if name in BUILT_IN:
         return BUILT_IN[name]
     return next((each.value for each in entry_points(group=ENTRY_POINTS, name=name)), name)

@@ -1,31 +1,39 @@
-"""One agent, whole: it hears, believes or doubts, decides, commands and speaks.
+"""One agent's core: it receives frames, checks them, decides, commands and broadcasts.
 
-A pure state machine: time comes with the observation. The shells around it (a process on Zenoh,
-the virtual clock) only carry bytes.
+A pure state machine: the time comes with each observation. The shells around it (a process on
+Zenoh, or virtual time) only carry bytes.
 """
 
 from collections import Counter
 from collections.abc import Callable
 from math import dist, hypot, inf
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import msgspec
 
 from agent.checked_controller import CheckedController
 from agent.codec import RejectedError, decode_beacon, decode_gossip
-from agent.comms.broadcast import LOCAL, Broadcast, OwnState
-from agent.comms.gossip import Table
-from agent.comms.hierarchy import ALONE, Hierarchy
+from agent.comms.broadcast import Broadcast, OwnState
+from agent.comms.gossip import RecordTable
+from agent.comms.hierarchy import IN_DISTRESS, Hierarchy
 from agent.comms.mission import Missions
 from agent.comms.neighbours import Neighbours
-from agent.comms.unidentified_vehicles import SAME_BODY_M, TellsOf, UnidentifiedVehicles
+from agent.comms.unidentified_vehicles import (
+    SAME_VEHICLE_M,
+    ReportsVehicle,
+    Surroundings,
+    UnidentifiedVehicles,
+)
 from agent.config import AgentSetup
 from agent.controller import Intent, Peer, Senses
-from agent.guidance.safety_filter import TelemetryRow
-from agent.guidance.safety_monitor import STAND, Guard
+from agent.guidance.safety_filter import NeighbourReport
+from agent.guidance.safety_monitor import SafetyMonitor
 from agent.messages import (
     CAUSES,
+    MAX_COST_MM,
+    MAX_HEARD,
     MAX_PLACES,
+    ZERO,
     Beacon,
     Command,
     Gossip,
@@ -36,33 +44,32 @@ from agent.messages import (
     Vector,
 )
 from agent.sensing.obstacle_perception import ObstaclePerception
+from netem.wire import channels
+from netem.wire.channels import Channel
 
-MAX_COST_MM = 2**31 - 1
-TIDY_S = 0.2
-"""How often those who fell silent are looked for."""
-IMPLAUSIBLE = 4.0
-"""Who says it flies so many times faster than any vehicle can is not believed: what a controller
-asks for may exceed a limit that the vehicle then keeps."""
-MAX_TOLD = 256
-"""So many neighbours are told of at most: a longer array makes a command that is refused."""
+HOUSEKEEPING_S = 0.2
+"""Period of what need not be done every tick [s]."""
+IMPLAUSIBLE_SPEEDS = 4.0
+"""A reported speed of more than so many times the fleet's limit is rejected. Reported speeds may
+exceed the limit: a controller may ask for more than its vehicle then flies."""
 
 
 class Outbox(msgspec.Struct, frozen=True, gc=False):
-    """What an agent says at the end of a step: to its vehicle, and (channel, payload) to all."""
+    """An agent's output of one step: for its vehicle, and for its radio."""
 
     command: Command
-    frames: tuple[tuple[int, bytes], ...]
+    frames: tuple[tuple[Channel, bytes], ...]  # (channel, payload)
 
 
 class Decoders(NamedTuple):
-    """How payloads become messages; memoising ones may stand in where one process feeds many."""
+    """Decoders of radio payloads; a process that feeds many agents may pass memoising ones."""
 
     beacon: Callable[[bytes], Beacon] = decode_beacon
     gossip: Callable[[bytes], Gossip] = decode_gossip
 
 
 class Agent:
-    """One agent of the team. Raises ControllerError if its controller cannot be had."""
+    """One agent of the team. Raises ControllerError if its controller cannot be loaded."""
 
     def __init__(self, setup: AgentSetup, decoders: Decoders = Decoders()) -> None:  # noqa: B008
         tick_s = 1.0 / setup.tick_hz
@@ -72,211 +79,228 @@ class Agent:
         self._incarnation = setup.incarnation
         self._decode_beacon, self._decode_gossip = decoders.beacon, decoders.gossip
         self._slack_s = 2.0 * tick_s
-        self._implausible2 = (IMPLAUSIBLE * setup.fleet_max_speed_mps) ** 2
+        self._implausible2 = (IMPLAUSIBLE_SPEEDS * setup.fleet_max_speed_mps) ** 2
         self._command_slots = setup.command_ticks * setup.slots_per_tick
         self._controller = CheckedController(setup)
         self._neighbours = Neighbours(setup.id, comms.local_hz, self._slack_s)
-        self._table = Table(setup.id, comms.multihop_hz)
+        self._table = RecordTable(setup.id, comms.multihop_hz)
         round_s = 1.0 / comms.multihop_hz if comms.multihop_hz > 0.0 else inf
         self._broadcast = Broadcast(setup.id, setup.incarnation, 1.0 / comms.local_hz, round_s)
-        self._guard = Guard(setup)
-        self._obstacle_perception = ObstaclePerception(setup)
+        self._safety_monitor = SafetyMonitor(setup)
+        self._perception = ObstaclePerception(setup)
         self._missions = Missions(setup.id, setup.formation, setup.control.spacing_m, setup.frame)
         self._hierarchy = Hierarchy(setup.id)
-        self._standing = ALONE
-        self._bodies = UnidentifiedVehicles(setup.fleet_max_speed_mps)
-        self._silent: tuple[Vector, ...] = ()
+        self._hierarchy_state = IN_DISTRESS
+        self._unidentified_vehicles = UnidentifiedVehicles(setup.fleet_max_speed_mps)
+        self._unidentified: tuple[Vector, ...] = ()
         self._blocked: frozenset[Place] = frozenset()
         self._intent: Intent | None = None
-        self._lagging = False
-        self._beside_m = 0.5 * setup.control.spacing_m + SAME_BODY_M
-        self._tidy_at_s = 0.0
+        self._neighbour_lacks_mission = False
+        self._blocks_within_m = 0.5 * setup.control.spacing_m + SAME_VEHICLE_M
+        self._housekeeping_at_s = 0.0
         self._record_age_s = 0.0
 
-    def receive(self, source: int, channel: int, payload: bytes, now_s: float) -> None:
-        """Take a frame heard from ``source``; what is not to be believed is counted, by cause."""
+    def receive(self, source: int, channel: Channel, payload: bytes, now_s: float) -> None:
+        """Take a frame heard from ``source``; a rejected one is counted by its cause."""
         try:
-            if channel == LOCAL:
-                self._hear_beacon(source, payload, now_s)
-            else:
-                self._hear_gossip(source, payload, now_s)
+            match channel:
+                case channels.LOCAL:
+                    self._receive_beacon(source, payload, now_s)
+                case channels.MULTIHOP:
+                    self._receive_gossip(source, payload, now_s)
+                case _:
+                    assert_never(channel)
         except RejectedError as error:
             self.rejected[error.cause] += 1
 
     def step(self, observation: Observation) -> Outbox:
-        """Decide one tick from what is sensed now and was heard so far."""
+        """Decide one tick from the observation and the frames received so far."""
         for mission in observation.orders:
-            self._obey(mission)
+            self._accept_order(mission)
         senses = self._senses(observation)
         intent = self._intent = self._controller.decide(senses)
-        velocity = self._guard.safe(intent.velocity, senses, lambda: self._told(senses))
-        if not self._obstacle_perception.trust.note(observation):
-            velocity = STAND
-        command = self._command(observation.slot, senses, intent, velocity)
+        velocity = self._safety_monitor.safe_velocity(
+            intent.velocity, senses, lambda: self._neighbour_reports(senses)
+        )
+        if not self._perception.sensor_health.update(observation):
+            velocity = ZERO
+        command = self._command(observation.slot, intent, velocity)
         own = self._own_state(senses, velocity, intent)
-        pieces = self._missions.pieces() if self._lagging else ()
+        pieces = self._missions.pieces() if self._neighbour_lacks_mission else ()
         echoes = self._neighbours.echoes()
         frames = self._broadcast.frames(senses.now_s, own, echoes, self._table, pieces)
-        return Outbox(command, frames)
+        return Outbox(command=command, frames=frames)
 
     def _own_state(self, senses: Senses, velocity: Vector, intent: Intent) -> OwnState:
         missions = self._missions
+        frame, drift = missions.frame_report(senses.now_s)
         return OwnState(
-            senses.position,
-            velocity,
-            intent.heading_for,
-            intent.place,
-            self._guard.speed_cap,
-            missions.flown.key,
-            missions.frame_key,
-            *missions.told(senses.now_s),
-            self._standing,
-            intent.blocked,
-            min(round(1000.0 * intent.cost_m), MAX_COST_MM),
+            position=senses.position,
+            velocity=velocity,
+            heading_for=intent.heading_for,
+            place=intent.place,
+            speed_cap=self._safety_monitor.speed_cap,
+            mission=missions.flown.key,
+            frame_key=missions.frame_key,
+            frame=frame,
+            drift=drift,
+            hierarchy=self._hierarchy_state,
+            blocked=intent.blocked,
+            cost_mm=min(round(1000.0 * intent.cost_m), MAX_COST_MM),
         )
 
-    def _obey(self, mission: Mission) -> None:
+    def _accept_order(self, mission: Mission) -> None:
         try:
-            self._missions.order(mission)
+            self._missions.accept_order(mission)
         except RejectedError as error:
             self.rejected[error.cause] += 1
 
-    def _hear_beacon(self, source: int, payload: bytes, now_s: float) -> None:
+    def _receive_beacon(self, source: int, payload: bytes, now_s: float) -> None:
         beacon = self._decode_beacon(payload)
         if beacon.id != source:
-            raise RejectedError("spoofed", f"{source} says it is {beacon.id}")
+            raise RejectedError("spoofed", f"a beacon of agent {source} with the id {beacon.id}")
         u, v, w = beacon.velocity
         if u * u + v * v + w * w > self._implausible2:
-            raise RejectedError("speed", f"{source} says it flies at {hypot(u, v, w):.1f} m/s")
-        self._neighbours.hear(beacon, now_s, self._broadcast.sent_s)
+            raise RejectedError("speed", f"agent {source} reports {hypot(u, v, w):.1f} m/s")
+        self._neighbours.receive(beacon, now_s, self._broadcast.sent_s)
         self._table.adopt_beacon(beacon)
         if beacon.drift is not None or beacon.frame_key != self._missions.frame_key:
-            self._missions.glimpse(beacon)
+            self._missions.receive_frame(beacon)
 
-    def _hear_gossip(self, source: int, payload: bytes, now_s: float) -> None:
+    def _receive_gossip(self, source: int, payload: bytes, now_s: float) -> None:
         gossip = self._decode_gossip(payload)
         if gossip.id != source:
-            raise RejectedError("spoofed", f"{source} says it is {gossip.id}")
+            raise RejectedError("spoofed", f"gossip of agent {source} with the id {gossip.id}")
         self._table.adopt(gossip, now_s, self._slack_s)
         if gossip.piece is not None:
-            self._missions.hear(gossip.piece)
+            self._missions.receive(gossip.piece)
 
     def _senses(self, observation: Observation) -> Senses:
         now_s = observation.time_s
         mission = self._missions.flown_at(now_s)
-        if now_s >= self._tidy_at_s:
-            self._tidy_at_s = now_s + TIDY_S
-            self._tidy(observation)
+        if now_s >= self._housekeeping_at_s:
+            self._housekeeping_at_s = now_s + HOUSEKEEPING_S
+            self._do_housekeeping(observation)
         place = self._intent.place if self._intent is not None else None
         cost_m = self._intent.cost_m if self._intent is not None else None
-        own = Peer(self.id, observation.position, place, cost_m)
+        own = Peer(id=self.id, position=observation.position, place=place, cost_m=cost_m)
         return Senses(
-            now_s,
-            observation.position,
-            observation.velocity,
-            observation.yaw,
-            observation.vehicles,
-            self._neighbours.heard(now_s, mission.key),
-            lambda: self._table.team(own, mission.key),
-            mission,
-            self._silent,
-            self._blocked,
-            self._obstacles(observation),
+            now_s=now_s,
+            position=observation.position,
+            velocity=observation.velocity,
+            yaw=observation.yaw,
+            vehicles=observation.vehicles,
+            neighbours=self._neighbours.heard(now_s, mission.key),
+            team=lambda: self._table.team(own, mission.key),
+            mission=mission,
+            silent=self._unidentified,
+            blocked=self._blocked,
+            obstacles=self._obstacles(observation),
         )
 
     def _obstacles(self, observation: Observation) -> tuple[Vector, ...]:
-        """Return what is known of obstacles near by; neighbours' bodies are none."""
-        if not self._obstacle_perception.scanning:
+        """Return the known points of near obstacles, without neighbours' vehicles."""
+        if not self._perception.scanning:
             return observation.obstacles
         heard = [beacon.position for beacon in self._neighbours.beacons()]
-        return self._obstacle_perception.near(observation, heard)
+        return self._perception.near_points(observation, heard)
 
-    def _tidy(self, observation: Observation) -> None:
-        """Look after what need not be looked at every tick: who is gone, and one's standing."""
+    def _do_housekeeping(self, observation: Observation) -> None:
+        """Update what need not be updated every tick: departures, blocked places, hierarchy."""
         now_s = observation.time_s
         lost = self._neighbours.forget_silent(now_s)
         departed = self._table.forget_silent(now_s, self._neighbours.ids, lost)
         beacons = self._neighbours.beacons()
-        here, team = observation.position, self._table.members(now_s)
+        team = self._table.members(now_s)
         self._record_age_s = max((member.age_s for member in team), default=0.0)
-        sensed = observation.vehicles
-        self._silent = self._bodies.look(
-            now_s, here, sensed, beacons, team, departed, self._teller(1 + len(team))
+        self._unidentified = self._unidentified_vehicles.update(
+            Surroundings(
+                now_s=now_s,
+                position=observation.position,
+                sensed=observation.vehicles,
+                beacons=beacons,
+                team=team,
+                departed=departed,
+                reports_vehicle=self._reports_vehicle(1 + len(team)),
+            )
         )
-        self._obstacle_perception.trust.compare(observation, beacons)
-        self._lagging = self._neighbours.behind(self._missions.flown.key)
+        self._perception.sensor_health.compare(observation, beacons)
+        self._neighbour_lacks_mission = self._neighbours.any_behind(self._missions.flown.key)
         self._blocked = self._table.blocked(self._missions.flown.key)
         vertex = self._intent is not None and self._intent.vertex
-        queue = self._on_my_queue()
-        self._standing = self._hierarchy.stand(now_s, self._broadcast.sequence, vertex, queue)
+        self._hierarchy_state = self._hierarchy.update(
+            now_s, self._broadcast.sequence, vertex, self._beacons_of_own_queue()
+        )
 
-    def _teller(self, agents: int) -> TellsOf:
-        """Return what says whether a neighbour tells of a silent body, in a team of that size.
+    def _reports_vehicle(self, agents: int) -> ReportsVehicle:
+        """Return a function: whether a neighbour reports an unidentified vehicle at a position.
 
-        It tells of places, each taken by a body within d_ir / 2, and of a few at most; one who
-        flies another mission cannot be asked.
+        agents: size of the team. A beacon names places, each taken by a vehicle within d_ir / 2,
+        and at most MAX_PLACES of them. A neighbour that flies another mission contradicts nothing.
         """
         mission = self._missions.flown
 
-        def tells_of(witness: Beacon, body: Vector) -> bool:
+        def reports_vehicle(witness: Beacon, vehicle: Vector) -> bool:
             if witness.mission != mission.key or len(witness.blocked) >= MAX_PLACES:
                 return True
-            slots = [mission.formation.slot(Place(*told), agents) for told in witness.blocked]
+            slots = [mission.formation.slot(Place(*place), agents) for place in witness.blocked]
             return any(
-                slot is None or dist(mission.frame.to_world(slot.point), body) <= self._beside_m
+                slot is None
+                or dist(mission.frame.to_world(slot.point), vehicle) <= self._blocks_within_m
                 for slot in slots
             )
 
-        return tells_of
+        return reports_vehicle
 
-    def _on_my_queue(self) -> list[Beacon]:
-        """Return the last beacons of those heard on the own queue, its vertex agents included."""
+    def _beacons_of_own_queue(self) -> list[Beacon]:
+        """Return the last beacons heard of the own queue, its vertex agents included."""
         mission = self._missions.flown
         if self._intent is None or self._intent.place is None:
             return []
-        mine, formation = mission.formation.queues_of(self._intent.place), mission.formation
+        own, formation = mission.formation.queues_of(self._intent.place), mission.formation
         return [
             beacon
             for beacon in self._neighbours.beacons()
             if beacon.mission == mission.key
             and (
-                beacon.queue in mine
-                or not mine.isdisjoint(formation.queues_of((beacon.queue, beacon.rank)))
+                beacon.queue in own
+                or not own.isdisjoint(formation.queues_of((beacon.queue, beacon.rank)))
             )
         ]
 
-    def _told(self, senses: Senses) -> list[TelemetryRow]:
-        """Return what neighbours last told of themselves, not carried forward."""
+    def _neighbour_reports(self, senses: Senses) -> list[NeighbourReport]:
+        """Return the last report of each neighbour, not extrapolated."""
         x, y, z = senses.position
         return [
-            TelemetryRow(
-                (b.position[0] - x, b.position[1] - y, b.position[2] - z),
-                max(0.0, senses.now_s - b.stamp_s),
-                b.speed_cap,
+            NeighbourReport(
+                relative=(b.position[0] - x, b.position[1] - y, b.position[2] - z),
+                age_s=max(0.0, senses.now_s - b.stamp_s),
+                speed_cap=b.speed_cap,
             )
             for b in self._neighbours.beacons()
         ]
 
-    def _command(self, slot: int, senses: Senses, intent: Intent, velocity: Vector) -> Command:
+    def _command(self, slot: int, intent: Intent, velocity: Vector) -> Command:
+        rejected = [(CAUSES.index(cause), count) for cause, count in sorted(self.rejected.items())]
         telemetry = Telemetry(
-            intent.wanted,
-            intent.force,
-            intent.target,
-            intent.place,
-            self._neighbours.sorted_ids[:MAX_TOLD],
-            tuple([(CAUSES.index(cause), n) for cause, n in sorted(self.rejected.items())]),
-            self._missions.flown.key,
-            self._standing.tier,
-            self._standing.parent,
-            self._standing.role,
-            self._record_age_s,
+            wanted=intent.wanted,
+            force=intent.force,
+            target=intent.target,
+            place=intent.place,
+            heard=self._neighbours.sorted_ids[:MAX_HEARD],
+            rejected=tuple(rejected),
+            mission=self._missions.flown.key,
+            tier=self._hierarchy_state.tier,
+            parent=self._hierarchy_state.parent,
+            role=self._hierarchy_state.role,
+            record_age_s=self._record_age_s,
         )
         return Command(
-            slot,
-            self._incarnation,
-            slot + self._command_slots,
-            velocity,
-            intent.yaw,
-            intent.tilt,
-            telemetry,
+            slot=slot,
+            incarnation=self._incarnation,
+            expires_slot=slot + self._command_slots,
+            velocity=velocity,
+            yaw=intent.yaw,
+            tilt=intent.tilt,
+            telemetry=telemetry,
         )

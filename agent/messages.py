@@ -1,8 +1,8 @@
-"""What an agent hears, sees, says and commands.
+"""Messages of an agent: observations, radio frames, commands and telemetry.
 
-Everything is in SI units and in the world frame (x, y horizontal, z up) unless a field says
-otherwise. Angles are radians, yaw counted from +x towards +y. Numbers are checked when a message
-is decoded: finite, and within the bounds given here.
+Unless a field says otherwise, numbers are in SI units and in the world frame (x, y horizontal, z
+up). Yaw is counted from +x towards +y. Decoding checks every number: it is finite and within the
+bounds given here.
 """
 
 from typing import Annotated, NamedTuple
@@ -11,39 +11,49 @@ import msgspec
 from msgspec import Meta
 
 Vector = tuple[float, float, float]
+ZERO: Vector = (0.0, 0.0, 0.0)
 
-Metres = Annotated[float, Meta(ge=-1e6, le=1e6)]
-Speed = Annotated[float, Meta(ge=-100, le=100)]
+MAX_M, MAX_SPEED_MPS, MAX_ANGLE_RAD, MAX_FORCE = 1e6, 100.0, 100.0, 1e9
+MAX_COST_MM = 2**31 - 1
+MAX_HEARD = 256
+"""Most neighbours in one telemetry, and most vehicles in one observation."""
+AGENT_IDS = 2**16
+"""Number of agent ids: 0 to AGENT_IDS - 1."""
+
+Metres = Annotated[float, Meta(ge=-MAX_M, le=MAX_M)]
+Speed = Annotated[float, Meta(ge=-MAX_SPEED_MPS, le=MAX_SPEED_MPS)]
 Seconds = Annotated[float, Meta(ge=0, le=1e9)]
-Radians = Annotated[float, Meta(ge=-100, le=100)]
+Radians = Annotated[float, Meta(ge=-MAX_ANGLE_RAD, le=MAX_ANGLE_RAD)]
 Count = Annotated[int, Meta(ge=0, lt=2**53)]
-AgentId = Annotated[int, Meta(ge=0, lt=2**16)]
+AgentId = Annotated[int, Meta(ge=0, lt=AGENT_IDS)]
+ParentId = Annotated[int, Meta(ge=-1, lt=AGENT_IDS)]
+"""An agent id, or -1 for no parent."""
 Index = Annotated[int, Meta(ge=-1, lt=2**15)]
+"""A queue, a rank or a tier; -1 for none."""
 
 Position = tuple[Metres, Metres, Metres]
-Cost = Annotated[int, Meta(ge=0, lt=2**31)]
+Velocity = tuple[Speed, Speed, Speed]
+Cost = Annotated[int, Meta(ge=0, le=MAX_COST_MM)]
 MAX_PLACES = 8
 Places = Annotated[tuple[tuple[Index, Index], ...], Meta(max_length=MAX_PLACES)]
-Velocity = tuple[Speed, Speed, Speed]
-
+"""Some places, each (queue, rank)."""
 
 ROLES = ("member", "sub-vertex", "vertex", "distress")
-"""An agent's role in its queue; a sub-vertex is a member whom another follows."""
-
+"""Roles of an agent in its queue. A sub-vertex is a member that another agent follows."""
 
 CAUSES = (
     *("oversize", "corrupt", "garbage", "invalid", "spoofed", "replay", "future", "old", "offset"),
     *("mission", "observation", "batch", "speed"),
 )
-"""Why a message is refused; RejectedError has the causes of those heard by radio."""
+"""Causes for which an agent rejects a message; see RejectedError."""
 CauseIndex = Annotated[int, Meta(ge=0, lt=len(CAUSES))]
 Rejections = Annotated[tuple[tuple[CauseIndex, Count], ...], Meta(max_length=len(CAUSES))]
 
 
 class Place(NamedTuple):
-    """A place in a formation: the rank-th slot of a queue, rank 0 at the queue's first vertex.
+    """A place in a formation: rank 0 is the queue's first vertex.
 
-    A vertex that queues share is one place: that of the first of these queues.
+    A vertex shared by several queues is one place, named after the first of these queues.
     """
 
     queue: int
@@ -51,208 +61,193 @@ class Place(NamedTuple):
 
 
 class Message(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
-    """A message: immutable, encoded as an array, refused when it has a field too many."""
+    """Base of all messages: immutable, encoded as an array, rejected with a field too many."""
 
 
 class Pose(NamedTuple):
-    """Where the target's frame stands [m; world frame], and its yaw [rad]."""
+    """Pose of the target's frame in the world frame."""
 
-    x: Metres
-    y: Metres
-    z: Metres
-    yaw: Radians
+    x: Metres  # [m]
+    y: Metres  # [m]
+    z: Metres  # [m]
+    yaw: Radians  # [rad]
 
 
-HOME = Pose(0.0, 0.0, 0.0, 0.0)
+HOME = Pose(x=0.0, y=0.0, z=0.0, yaw=0.0)
 
 
 class Drift(NamedTuple):
-    """How a frame moves that was at its pose at ``stamp_s`` [s]: [m/s; world frame], [rad/s]."""
+    """Velocity of a frame, and the time at which it had the pose that goes with it."""
 
-    stamp_s: Seconds
-    x: Speed
-    y: Speed
-    z: Speed
-    yaw_rate: Annotated[float, Meta(ge=-100, le=100)]
+    stamp_s: Seconds  # Observation time [s]
+    x: Speed  # [m/s; world frame]
+    y: Speed  # [m/s; world frame]
+    z: Speed  # [m/s; world frame]
+    yaw_rate: Annotated[float, Meta(ge=-100, le=100)]  # [rad/s]
 
 
 class FramePath(Message, frozen=True):
-    """Where the target's frame goes: from waypoint to waypoint [m; world frame].
+    """Path of the target's frame from waypoint to waypoint; with one waypoint it rests there.
 
-    One waypoint: it stands there. speed [m/s]; start_s: when it leaves the first one, in the
-    Observation's time. turn_rate: how fast its yaw turns into the direction of the next leg
-    [rad/s]; 0: it does not. yaw [rad] is added to that direction, or is all there is. waits_s: how
-    long it waits at each waypoint [s].
+    With a turn_rate above 0 the yaw turns into the direction of each next leg, and ``yaw`` is added
+    to that direction. Otherwise ``yaw`` is the whole yaw.
     """
 
-    waypoints: Annotated[tuple[Position, ...], Meta(min_length=1, max_length=16)]
-    speed: Annotated[float, Meta(gt=0, le=100)] = 0.25
-    start_s: Seconds = 0.0
-    yaw: Radians = 0.0
-    turn_rate: Annotated[float, Meta(ge=0, le=100)] = 0.0
-    waits_s: Annotated[tuple[Seconds, ...], Meta(max_length=16)] = ()
+    waypoints: Annotated[tuple[Position, ...], Meta(min_length=1, max_length=16)]  # [m; world]
+    speed: Annotated[float, Meta(gt=0, le=100)] = 0.25  # along the legs [m/s]
+    start_s: Seconds = 0.0  # departure from the first waypoint, in Observation time [s]
+    yaw: Radians = 0.0  # [rad]
+    turn_rate: Annotated[float, Meta(ge=0, le=100)] = 0.0  # [rad/s]
+    waits_s: Annotated[tuple[Seconds, ...], Meta(max_length=16)] = ()  # at each waypoint [s]
 
 
-AT_HOME = FramePath(((0.0, 0.0, 0.0),))
+AT_HOME = FramePath(waypoints=(ZERO,))
+"""The frame rests at the world's origin."""
+
+MAX_ORDER_B = 3000
+"""Longest formation in an operator's order, as msgpack [B]."""
+PIECE_B = 900
+"""Longest part of a mission in one frame [B]; the last part may be shorter."""
+MAX_PIECES = 16
 
 
 class Mission(Message, frozen=True):
-    """What the team shall form, and where; the highest ``key`` wins everywhere.
+    """The formation that the team forms, and the path of its frame; the highest ``key`` wins."""
 
-    key: 0 in an order means: whatever comes next. formation: a FormationSpec as msgpack; empty
-    where the formation stays as it is and only the frame moves.
-    """
-
-    key: Count
+    key: Count  # 0 in an order: the agent chooses the next key
     frame: FramePath
-    formation: Annotated[bytes, Meta(max_length=3000)]
+    formation: Annotated[bytes, Meta(max_length=MAX_ORDER_B)]
+    """A FormationSpec as msgpack; empty where the formation stays and only the frame moves."""
+
+
+NO_ECHO_MM = 0xFFFF
+"""The range of a ray that meets nothing within the sensor's range."""
+MAX_OBSTACLE_POINTS = 32
+"""Most nearest points of obstacles in one observation."""
+PROXIMITY_RANGE_M = 2.0
+"""Reach of the proximity sensor [m]."""
 
 
 class Scan(Message, frozen=True):
-    """What a scanning sensor met: for each ray or beam, in the order of its pattern, how far.
+    """One scan of a scanning sensor: the range of each ray or beam, in the order of its pattern."""
 
-    kind: index of agent.sensing.ray_pattern.KINDS. ranges: unsigned 16-bit little-endian [mm];
-    65535: nothing, within its range.
-    """
-
-    kind: Annotated[int, Meta(ge=0, lt=8)]
+    kind: Annotated[int, Meta(ge=0, lt=8)]  # index of agent.sensing.ray_pattern.SCANNERS
     ranges: Annotated[bytes, Meta(max_length=60_000)]
+    """Unsigned 16-bit little-endian [mm]; NO_ECHO_MM: nothing within the sensor's range."""
 
 
 class Observation(Message, frozen=True):
-    """What one vehicle senses at the start of one of its slots; never the truth about others.
+    """What one vehicle senses at the start of one of its slots.
 
-    position [m], velocity [m/s], yaw [rad] are the vehicle's own.
-    vehicles: other vehicles within the proximity sensor's 2 m, as positions relative to this
-    vehicle's centre [m; axes of the world frame]. A body has no name.
-    obstacles: of each obstacle within the sensor's 2 m the nearest point of its surface, relative
-    likewise; of more than 32, the nearest.
-    scans: of sensors that scan, those made at this time.
-    orders: missions that an operator gives to this agent, for the whole team.
+    It never holds the truth about others: a sensed vehicle has no id.
     """
 
     slot: Count
-    time_s: Seconds
-    position: Position
-    velocity: Velocity
-    yaw: Radians
-    vehicles: Annotated[tuple[Position, ...], Meta(max_length=256)]
-    obstacles: Annotated[tuple[Position, ...], Meta(max_length=32)]
+    time_s: Seconds  # simulated time, the same for all vehicles [s]
+    position: Position  # own centre [m; world frame]
+    velocity: Velocity  # own [m/s; world frame]
+    yaw: Radians  # own [rad; world frame]
+    vehicles: Annotated[tuple[Position, ...], Meta(max_length=MAX_HEARD)]
+    """Other vehicles within PROXIMITY_RANGE_M, relative to the own centre [m; world axes]."""
+    obstacles: Annotated[tuple[Position, ...], Meta(max_length=MAX_OBSTACLE_POINTS)]
+    """The nearest surface point of each obstacle within PROXIMITY_RANGE_M, relative to the own
+    centre [m; world axes]; of more than MAX_OBSTACLE_POINTS, the nearest."""
     orders: Annotated[tuple[Mission, ...], Meta(max_length=4)]
-    scans: Annotated[tuple[Scan, ...], Meta(max_length=2)]
+    """Missions that an operator gives to this agent, for the whole team."""
+    scans: Annotated[tuple[Scan, ...], Meta(max_length=2)]  # scans made at this time
 
 
 class Telemetry(Message, frozen=True):
-    """What an agent tells about its own reasons, for the recording and the judge.
+    """An agent's internal state, for the recording and the judge."""
 
-    wanted: velocity before the safety filter [m/s]; force: |u_i| of (28) before saturation;
-    target: its target-on-queue [m]; place: where in the formation it means to be; heard: ids
-    heard directly of late; rejected: messages refused so far, (index of CAUSES, how many) each;
-    mission: the key of the one it flies; tier, parent: its standing in its queue (see Beacon), -1
-    for none; role: index of ROLES;
-    record_age_s: the age of the oldest record it keeps of a member, when it last looked.
-    """
-
-    wanted: Velocity
-    force: Annotated[float, Meta(ge=0, le=1e9)]
-    target: Position | None
-    place: tuple[Index, Index] | None
-    heard: Annotated[tuple[AgentId, ...], Meta(max_length=256)]
-    rejected: Rejections
-    mission: Count
-    tier: Index
-    parent: Annotated[int, Meta(ge=-1, lt=2**16)]
-    role: Annotated[int, Meta(ge=0, lt=4)]
-    record_age_s: Seconds = 0.0
+    wanted: Velocity  # velocity before the safety filter [m/s; world frame]
+    force: Annotated[float, Meta(ge=0, le=MAX_FORCE)]  # |u_i| of (28) before saturation [m/s]
+    target: Position | None  # target-on-queue [m; world frame]
+    place: tuple[Index, Index] | None  # (queue, rank) that it claims
+    heard: Annotated[tuple[AgentId, ...], Meta(max_length=MAX_HEARD)]  # ids heard directly
+    rejected: Rejections  # (index of CAUSES, number of messages) since the start
+    mission: Count  # key of the mission that it flies
+    tier: Index  # see Beacon
+    parent: ParentId  # see Beacon
+    role: Annotated[int, Meta(ge=0, lt=len(ROLES))]  # index of ROLES
+    record_age_s: Seconds = 0.0  # age of the oldest team record at the last housekeeping [s]
 
 
 class Command(Message, frozen=True):
-    """What a vehicle shall do from now until ``expires_slot``; then it stops and hovers.
+    """What a vehicle flies from now until ``expires_slot``; then it stops and hovers."""
 
-    tilt: pitch and roll to take up [rad], nose up and right side down positive; vehicles that
-    cannot, stay level.
-    """
-
-    slot: Count
+    slot: Count  # slot of the observation that it answers
     incarnation: Count
     expires_slot: Count
-    velocity: Velocity
-    yaw: Radians
+    velocity: Velocity  # [m/s; world frame]
+    yaw: Radians  # heading to turn to [rad; world frame]
     tilt: tuple[Radians, Radians]
+    """Pitch and roll [rad], nose up and right side down positive; ignored by level vehicles."""
     telemetry: Telemetry
 
 
 class Beacon(Message, frozen=True):
-    """The local channel's broadcast (E22): heard directly, never forwarded.
-
-    stamp_s: the sender's Observation time. target: where it is heading right now, q_tg of the
-    paper, which the potential of (22) needs. queue, rank: the place it claims, -1 for none;
-    cost_mm: how far from there it was when it first claimed it, by which a contest is decided.
-    speed_cap: it promises to stay below this speed for the next 3 s [m/s].
-    echoes: for each neighbour the last sequence heard of it.
-    mission: the key of the one it flies; frame: where the target's frame is, by the mission of
-    ``frame_key``, which may be a newer one that is still on its way; drift: how it moves, None
-    where it stands for good. tier: 0 for a
-    queue-vertex agent, else its parent's + 1, -1 in distress. parent: whom it follows, -1 for none;
-    root: the vertex agent's sequence as it came down the tiers (E15).
-    """
+    """The local channel's broadcast (E22): heard directly, never forwarded."""
 
     id: AgentId
     incarnation: Count
     sequence: Count
-    stamp_s: Seconds
-    position: Position
-    velocity: Velocity
+    stamp_s: Seconds  # the sender's Observation time [s]
+    position: Position  # [m; world frame]
+    velocity: Velocity  # [m/s; world frame]
     target: Position
-    queue: Index
-    rank: Index
+    """Immediate target, q_tg of the paper, which (22) needs [m; world frame]."""
+    queue: Index  # of the claimed place, -1 for none
+    rank: Index  # of the claimed place, -1 for none
     cost_mm: Cost
+    """Distance to the claimed place when it was first claimed [mm]; it decides a contest."""
     speed_cap: Annotated[float, Meta(ge=0, le=100)]
+    """The sender promises to stay below this speed for the next 3 s [m/s]."""
     echoes: Annotated[tuple[tuple[AgentId, Count], ...], Meta(max_length=128)]
-    mission: Count
+    """(id, last sequence heard) of each neighbour."""
+    mission: Count  # key of the mission that the sender flies
     frame_key: Count
-    frame: Pose
-    drift: Drift | None
-    tier: Index
-    parent: Annotated[int, Meta(ge=-1, lt=2**16)]
-    root: Count
-    blocked: Places
+    """Key of the mission that ``frame`` belongs to; it may be newer than ``mission``, which then is
+    still on its way."""
+    frame: Pose  # of the target's frame
+    drift: Drift | None  # velocity of the target's frame; None where it rests for good
+    tier: Index  # 0: queue-vertex agent; else the parent's tier + 1; -1: in distress
+    parent: ParentId  # the agent that it follows, -1 for none
+    root: Count  # the vertex agent's sequence as it came down the tiers (E15)
+    blocked: Places  # places that the sender sees taken by an unidentified vehicle (E18)
 
 
 class Record(Message, frozen=True):
-    """What one agent last said of itself, passed on over the multihop channel (E24).
+    """One agent's statement about itself, passed on over the multihop channel (E24).
 
-    Only its subject writes it; ``version`` grows with each writing. stamp_s is the subject's
-    Observation time at the writing. queue, rank, cost_mm: the place it claims, as in Beacon;
-    mission: the mission in which that is a place. blocked: places that it sees taken by a silent
-    body (E18).
+    Only its subject writes it; ``version`` grows with each writing.
     """
 
     id: AgentId
     incarnation: Count
     version: Count
-    stamp_s: Seconds
-    position: Position
-    queue: Index
-    rank: Index
-    cost_mm: Cost
-    mission: Count
-    blocked: Places
+    stamp_s: Seconds  # the subject's Observation time at the writing [s]
+    position: Position  # [m; world frame]
+    queue: Index  # see Beacon
+    rank: Index  # see Beacon
+    cost_mm: Cost  # see Beacon [mm]
+    mission: Count  # key of the mission in which (queue, rank) is a place
+    blocked: Places  # see Beacon
 
 
 class Piece(Message, frozen=True):
-    """A part of a mission under way, path and formation: the ``index``-th of ``count``."""
+    """A part of an encoded mission (path and formation): number ``index`` of ``count``."""
 
-    key: Count
-    index: Annotated[int, Meta(ge=0, lt=16)]
-    count: Annotated[int, Meta(ge=1, le=16)]
+    key: Count  # of the mission
+    index: Annotated[int, Meta(ge=0, lt=MAX_PIECES)]
+    count: Annotated[int, Meta(ge=1, le=MAX_PIECES)]
     data: Annotated[bytes, Meta(max_length=1000)]
 
 
 class Gossip(Message, frozen=True):
-    """One frame of the multihop channel: some records, its sender's own among them or not."""
+    """One frame of the multihop channel: some records of the sender's table, or a piece."""
 
-    id: AgentId
-    stamp_s: Seconds
+    id: AgentId  # the sender
+    stamp_s: Seconds  # the sender's Observation time [s]
     records: Annotated[tuple[Record, ...], Meta(max_length=64)]
     piece: Piece | None

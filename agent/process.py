@@ -1,6 +1,6 @@
-"""One agent as a process: its core between its vehicle and its radio, paced by observations.
+"""One agent as a process: it connects the core to the vehicle and the radio.
 
-The process reads no clock: what time it is comes with each observation.
+Observations pace the process and carry the time; the core reads no clock.
 """
 
 import sys
@@ -29,27 +29,27 @@ LISTEN_EVERY_S = 0.005
 MAX_SETUP_B = 256 * 1024
 
 
-class GoneError(RuntimeError):
-    """The world does not answer, or has said nothing for so long that it must be gone."""
+class WorldGoneError(RuntimeError):
+    """The world does not answer, or has been silent for too long."""
 
 
 def run(
     agent: int, run_name: str, connect: str, patient: bool = False, users: Path | None = None
 ) -> int:
-    """Fly one agent, and say in one line what stood in its way; return the exit status."""
+    """Fly one agent; print an error in one line to stderr. Returns the exit status."""
     try:
         keys = Keys(run_name)
     except ValueError as error:
-        return _said(agent, error, 2)
+        return _failed(agent, error, 2)
     try:
         return fly(agent, keys, connect, patient, users)
-    except (GoneError, LockstepError) as error:
-        return _said(agent, error, 1)
+    except (WorldGoneError, LockstepError) as error:
+        return _failed(agent, error, 1)
     except (AccessError, SessionError, RefusedError, ControllerError) as error:
-        return _said(agent, error, 2)
+        return _failed(agent, error, 2)
 
 
-def _said(agent: int, error: Exception, status: int) -> int:
+def _failed(agent: int, error: Exception, status: int) -> int:
     print(f"agent-{agent}: {error}", file=sys.stderr)
     return status
 
@@ -59,11 +59,10 @@ def fly(
 ) -> int:
     """Fly one agent of a run until the run is over; return 0.
 
-    patient: whether it may be silent for long and is still there. users: the file of passwords,
-    where the router wants one. Raises SessionError without a router, AccessError without a
-    password, RefusedError when the world has no such agent, ControllerError when its controller
-    cannot be had, GoneError when the world is not there, LockstepError when somebody speaks out
-    of turn.
+    patient: whether the session survives a long pause of this process. users: the file of
+    passwords, if the router wants one. Raises SessionError without a router, AccessError without a
+    password, RefusedError if the world has no such agent, ControllerError if its controller cannot
+    be loaded, WorldGoneError if the world is not there, LockstepError for a message out of turn.
     """
     login = login_of(users, agent_name(agent)) if users is not None else None
     with open_client(connect, long_lease=patient, login=login) as session:
@@ -71,61 +70,65 @@ def fly(
         bus = Bus(session, keys)
         setup = _setup(bus, agent, keys.run, stop)
         if setup is not None:
-            _fly(bus, setup, keys.run, stop)
+            _run_shell(bus, setup, keys.run, stop)
     return 0
 
 
 def _setup(bus: Bus, agent: int, run: str, stop: StopRequest) -> AgentSetup | None:
     """Ask the world for this agent's setup until it answers; None when asked to stop."""
     deadline = time.monotonic() + SETUP_WITHIN_S
-    say_once = _once(f"agent-{agent} waits for the world of run {run!r}")
+    print_waiting = _printed_once(f"agent-{agent} waits for the world of run {run!r}")
     while not stop.requested:
         answer = bus.query("setup", agent, b"", timeout_s=2.0)
         if answer is not None:
-            return _checked(answer)
+            return _checked_setup(answer)
         if time.monotonic() > deadline:
-            raise GoneError(f"the world of run {run!r} has not come within {SETUP_WITHIN_S:g} s")
-        say_once()
+            raise WorldGoneError(
+                f"the world of run {run!r} did not answer within {SETUP_WITHIN_S:g} s"
+            )
+        print_waiting()
         time.sleep(ASK_EVERY_S)
     return None
 
 
-def _checked(answer: bytes) -> AgentSetup:
+def _checked_setup(answer: bytes) -> AgentSetup:
     if len(answer) > MAX_SETUP_B:
-        raise GoneError(f"the world sent a setup of {len(answer)} B; {MAX_SETUP_B} B are allowed")
+        raise WorldGoneError(
+            f"the world sent a setup of {len(answer)} B; {MAX_SETUP_B} B are allowed"
+        )
     try:
         return msgspec.json.decode(answer, type=AgentSetup)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise GoneError(f"the world sent a setup that cannot be read: {error}") from error
+        raise WorldGoneError(f"the world sent a setup that cannot be decoded: {error}") from error
 
 
-def _fly(bus: Bus, setup: AgentSetup, run: str, stop: StopRequest) -> None:
+def _run_shell(bus: Bus, setup: AgentSetup, run: str, stop: StopRequest) -> None:
     observations, ending = (
         bus.subscriber("observation", setup.id),
         RunEnd(bus.subscriber("over"), stop),
     )
     shell = LockstepAgent(bus, setup, ending) if setup.lockstep else FreeRunningAgent(bus, setup)
-    _wait_for_ears(bus, ending)
+    _wait_for_listener(bus, ending)
     bus.declare_alive(f"agent-{setup.id}")
     print(f"agent-{setup.id} flies in run {run!r}", flush=True)
     try:
-        _steer(shell, observations, run, ending)
+        _step_until_over(shell, observations, run, ending)
         shell.report()
     except RunOverError:
-        print(f"agent-{setup.id}: the run is over, within a slot", flush=True)
+        print(f"agent-{setup.id}: the run ended within a slot", flush=True)
     print(f"agent-{setup.id} is done", flush=True)
 
 
-def _wait_for_ears(bus: Bus, ending: RunEnd) -> None:
-    """In lockstep, wait until somebody listens to what this agent says."""
+def _wait_for_listener(bus: Bus, ending: RunEnd) -> None:
+    """In lockstep, wait until another process listens to this agent's messages."""
     deadline = time.monotonic() + SETUP_WITHIN_S
     while not bus.matched and not ending():
         if time.monotonic() > deadline:
-            raise GoneError(f"nobody listens within {SETUP_WITHIN_S:g} s")
+            raise WorldGoneError(f"no process listened within {SETUP_WITHIN_S:g} s")
         time.sleep(LISTEN_EVERY_S)
 
 
-def _steer(
+def _step_until_over(
     shell: FreeRunningAgent | LockstepAgent, observations: Subscriber, run: str, ending: RunEnd
 ) -> None:
     """Step on each observation until the run is over.
@@ -138,18 +141,19 @@ def _steer(
         data = observations.wait(WAIT_S)
         if data is not None:
             silent_s = 0.0
-            shell.see(data)
+            shell.observe(data)
             continue
         silent_s += WAIT_S
         if silent_s > SILENCE_S:
-            raise GoneError(f"the world of run {run!r} has been silent for {SILENCE_S:g} s")
+            raise WorldGoneError(f"the world of run {run!r} was silent for {SILENCE_S:g} s")
 
 
-def _once(text: str) -> Callable[[], None]:
+def _printed_once(text: str) -> Callable[[], None]:
+    """Return a function that prints the text at its first call only."""
     pending = [text]
 
-    def say() -> None:
+    def print_pending() -> None:
         while pending:
             print(pending.pop(), flush=True)
 
-    return say
+    return print_pending

@@ -1,4 +1,4 @@
-"""What an agent is told before it flies, under the name that a controller of one's own imports."""
+"""The import path of AgentSetup for users' controllers; see agent.config."""
 
 from agent.config import AgentSetup
 

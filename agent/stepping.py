@@ -1,4 +1,4 @@
-"""One step of an agent: frames and one observation in, one command and one transmission out."""
+"""One step of an agent: frames and an observation in, a command and a transmission out."""
 
 from agent.codec import encode
 from agent.config import AgentSetup
@@ -8,23 +8,28 @@ from netem.wire.bus import Put
 from netem.wire.frame import Batch, Outgoing, Transmission, pack
 
 
-class Controls:
-    """A core, and where what it decides goes."""
+class AgentStepper:
+    """Runs an agent's core and publishes its commands and transmissions."""
 
     def __init__(self, setup: AgentSetup, command: Put, radio: Put) -> None:
         self.core = Agent(setup)
         self._incarnation = setup.incarnation
-        self._command = command
-        self._radio = radio
+        self._put_command = command
+        self._put_transmission = radio
 
-    def hear(self, batch: Batch, now_s: float) -> None:
-        """Take the frames of a batch."""
+    def receive(self, batch: Batch, now_s: float) -> None:
+        """Hand the frames of a batch to the core. now_s: Observation time [s]."""
         for frame in batch.frames:
             self.core.receive(frame.source, frame.channel, frame.payload, now_s)
 
     def step(self, observation: Observation) -> None:
-        """Step on an observation: say one command and one transmission."""
+        """Step on an observation; publish one command and one transmission."""
         outbox = self.core.step(observation)
-        self._command(encode(outbox.command))
-        frames = tuple(Outgoing(channel, payload) for channel, payload in outbox.frames)
-        self._radio(pack(Transmission(observation.slot, self._incarnation, frames)))
+        self._put_command(encode(outbox.command))
+        frames = tuple(
+            Outgoing(channel=channel, payload=payload) for channel, payload in outbox.frames
+        )
+        transmission = Transmission(
+            slot=observation.slot, incarnation=self._incarnation, frames=frames
+        )
+        self._put_transmission(pack(transmission))

@@ -15,7 +15,7 @@ import msgspec
 from netem.faults import FaultOrder, Flap, Heal, Jam, LastingFault, Partition, Position
 from netem.link import LinkModel
 from netem.link_keys import RATE_KEYS, Conditions, DirectedLink, LinkKeys
-from netem.wire.frame import CHANNELS
+from netem.wire.channels import CHANNELS
 
 _Keys = TypeVar("_Keys", bound=LinkKeys)
 UNNAMED = -1

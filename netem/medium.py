@@ -28,13 +28,12 @@ from netem.link import (
 from netem.messages import MediumCounters, MediumSetup, packets_of
 from netem.range_index import InRange, RangeIndex
 from netem.rate_queue import RateQueue
+from netem.wire.channels import CHANNELS, MAX_PAYLOAD_B
 from netem.wire.frame import (
     BATCH_HEAD_B,
-    CHANNELS,
     FRAME_HEAD_B,
     MAX_BATCH_B,
     MAX_FRAMES,
-    MAX_PAYLOAD_B,
     Frame,
     Transmission,
 )

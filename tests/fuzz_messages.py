@@ -17,13 +17,13 @@ import msgspec
 
 from agent.codec import (
     RejectedError,
+    add_checksum,
     decode_beacon,
     decode_command,
     decode_gossip,
     decode_observation,
     encode,
-    sealed,
-    unsealed,
+    strip_checksum,
 )
 from agent.core import Agent
 from agent.messages import Observation
@@ -62,7 +62,7 @@ class Target(NamedTuple):
     name: str
     take: Callable[[bytes], Any]
     whole: list[bytes]
-    sealed: bool = False
+    checksum: bool = False
 
 
 class Fuzz:
@@ -111,8 +111,8 @@ class Fuzz:
         if kind < 0.1:
             return random.randbytes(random.randrange(0, 120))
         data = bytearray(random.choice(target.whole))
-        if target.sealed:
-            data = bytearray(unsealed(bytes(data)))
+        if target.checksum:
+            data = bytearray(strip_checksum(bytes(data)))
         for _ in range(random.randrange(1, 5)):
             data[random.randrange(len(data))] = random.randrange(256)
         if kind < 0.2:
@@ -120,7 +120,7 @@ class Fuzz:
         elif kind < 0.3:
             data += random.choice(target.whole)
         whole = bytes(data)
-        return sealed(whole) if target.sealed and kind < 0.9 else whole
+        return add_checksum(whole) if target.checksum and kind < 0.9 else whole
 
 
 def _targets(
@@ -142,8 +142,8 @@ def _targets(
     return [
         Target("observation", decode_observation, [encode(each) for _, each in observations]),
         Target("command", decode_command, [encode(outbox.command) for outbox in outboxes]),
-        Target("beacon", lambda data: core.receive(3, 0, data, 2.5), beacons, sealed=True),
-        Target("gossip", lambda data: core.receive(3, 1, data, 2.5), gossips, sealed=True),
+        Target("beacon", lambda data: core.receive(3, 0, data, 2.5), beacons, checksum=True),
+        Target("gossip", lambda data: core.receive(3, 1, data, 2.5), gossips, checksum=True),
         Target("transmission", unpack_transmission, [pack(sent)]),
         Target("batch", unpack_batch, [batch]),
         Target("delivery", unpack_delivery, [pack(Delivery(3, heard, tuple(range(len(heard)))))]),

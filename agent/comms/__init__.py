@@ -1,1 +1,1 @@
-"""What an agent knows of the others: neighbours heard, knowledge passed on, places shared out."""
+"""Communication: neighbours, gossip, missions, hierarchy, and the allocation of places."""

@@ -1,8 +1,8 @@
-"""Who takes which place: one assignment that every agent solves over the agents it knows (E24).
+"""Allocation of places: every agent solves one assignment over the agents it knows (E24).
 
-The least sum of squared distances, where a place is cheaper by ``hysteresis_m2`` for the agent
-that claims it. Agents that know the same find the same, with no negotiation and nobody in charge;
-agents that know less find nearly the same, and the claims heard mend the rest.
+It minimises the sum of squared distances; a place is cheaper by ``hysteresis_m2`` for the agent
+that claims it. Agents with the same knowledge find the same assignment, without negotiation or a
+leader. Agents with less knowledge find nearly the same, and the claims they hear settle the rest.
 """
 
 from collections.abc import Container, Sequence
@@ -14,38 +14,38 @@ from agent.messages import Place, Vector
 
 HYSTERESIS_M2 = 0.5
 CONFLICT_M = 0.05
-"""Two that claim one place: the nearer by more than this keeps the claim, else the lower id."""
+"""Of two agents that claim one place, the nearer by more than this keeps it, else the lower id."""
 GAIN_M2 = 1e-9
 UNPLACED_M2 = 0.0
-"""What it costs to have no place: the same for all, so that the nearest get the places."""
+"""Cost of having no place: the same for every agent, so that the nearest get the places."""
 ROUNDING = 1e-12
-"""An exchange saves this share of what it costs at least: far from home, sums of squares round by
-more than GAIN_M2, and two exchanges that seem to save something could undo each other for ever."""
+"""Least saving of an exchange, as a share of its cost before. Far from the origin, sums of squares
+round by more than GAIN_M2, and two exchanges that seem to save could undo each other for ever."""
 
 
-def allot(
+def allocate(
     team: Sequence[Peer],
     places: Sequence[Place],
     slots: Sequence[Vector],
     hysteresis_m2: float = HYSTERESIS_M2,
-    concerned: Container[int] | None = None,
+    exchange_ids: Container[int] | None = None,
 ) -> dict[int, Place | None]:
-    """Return a place for each member of the team, by id; None where there are too few.
+    """Return the place of each team member, by id; None where there are too few places.
 
-    team: sorted by id; places, slots [m; world frame]: as many as the team has members, or fewer;
-    in the same order in every agent. Claims come first, then the nearest pairs, then pairwise
-    exchanges until none saves anything. concerned: ids of those whose exchanges are looked at
-    besides those of members without an undisputed claim; everybody's when left out.
+    team: sorted by id. places and their slots [m; world frame]: at most as many as team members, in
+    the same order in every agent. Claims come first, then the nearest pairs, then pairwise
+    exchanges until none saves anything. exchange_ids: members whose exchanges are tried in addition
+    to those of members without an undisputed claim; None: all members.
     """
     claims = _undisputed(team, {place: column for column, place in enumerate(places)}, slots)
     costs = _Costs([peer.position for peer in team], slots, claims, hysteresis_m2)
-    chosen = _filled(claims, costs)
-    looked_at = {
+    chosen = _filled_greedily(claims, costs)
+    to_try = {
         chosen[row]
         for row, peer in enumerate(team)
-        if concerned is None or claims[row] is None or peer.id in concerned
+        if exchange_ids is None or claims[row] is None or peer.id in exchange_ids
     }
-    _exchange(chosen, costs, looked_at)
+    _exchange(chosen, costs, to_try)
     return {
         peer.id: places[column] if column < len(places) else None
         for peer, column in zip(team, chosen, strict=True)
@@ -55,21 +55,21 @@ def allot(
 def own_place(
     own_id: int, team: Sequence[Peer], places: Sequence[Place], slots: Sequence[Vector]
 ) -> Place | None:
-    """Return one member's place much as :func:`allot` gives it, without solving what is settled.
+    """Return one member's place, nearly as :func:`allocate` gives it but at less cost.
 
-    Exchanges are looked at where they concern oneself, or who has no undisputed claim, or whom
-    these displace. Two others with claims see for themselves what they would save, and say so.
-    Where everybody has one, that is a matter of N steps.
+    It tries only exchanges of this member, of members without an undisputed claim, and of those
+    whom these displace. Two other members with claims find their own exchange and announce it. If
+    the claims share out all places, the cost is N steps.
     """
-    held = _settled(team, places)
-    if held is not None and not _gains(own_id, team, held, slots):
+    held = _columns_if_settled(team, places)
+    if held is not None and not _has_gainful_exchange(own_id, team, held, slots):
         return places[held[own_id]]
-    concerned = (own_id,) if held is None else None
-    return allot(team, places, slots, concerned=concerned)[own_id]
+    exchange_ids = (own_id,) if held is None else None
+    return allocate(team, places, slots, exchange_ids=exchange_ids)[own_id]
 
 
-def _settled(team: Sequence[Peer], places: Sequence[Place]) -> dict[int, int] | None:
-    """Return the column each member claims, by id, if the claims share out all places."""
+def _columns_if_settled(team: Sequence[Peer], places: Sequence[Place]) -> dict[int, int] | None:
+    """Return each member's claimed column, by id; None unless the claims share out all places."""
     if len(places) != len(team):
         return None
     column_of = {place: column for column, place in enumerate(places)}
@@ -82,26 +82,27 @@ def _settled(team: Sequence[Peer], places: Sequence[Place]) -> dict[int, int] | 
     return held
 
 
-def _gains(
+def _has_gainful_exchange(
     own_id: int, team: Sequence[Peer], held: dict[int, int], slots: Sequence[Vector]
 ) -> bool:
-    """Whether an exchange between oneself and another would save something."""
+    """Whether an exchange between the own agent and another would save something."""
     me = next(peer.position for peer in team if peer.id == own_id)
     mine = slots[held[own_id]]
-    kept = _square(me, mine) - 2.0 * HYSTERESIS_M2
+    kept = _squared_distance(me, mine) - 2.0 * HYSTERESIS_M2
     for peer in team:
         if peer.id != own_id:
             theirs = slots[held[peer.id]]
-            now = kept + _square(peer.position, theirs)
-            if now - _square(me, theirs) - _square(peer.position, mine) > GAIN_M2:
+            now = kept + _squared_distance(peer.position, theirs)
+            saved = now - _squared_distance(me, theirs) - _squared_distance(peer.position, mine)
+            if saved > GAIN_M2:
                 return True
     return False
 
 
 class _Costs:
-    """What columns cost rows [m^2]: squared distances, less the hysteresis for who claims one.
+    """Cost of each column (place) for each row (member) [m^2], computed on demand.
 
-    Found where it is asked for.
+    It is the squared distance, less the hysteresis for the row that claims the column.
     """
 
     def __init__(
@@ -118,25 +119,25 @@ class _Costs:
         self._rows: dict[int, list[float]] = {}
 
     def row(self, row: int) -> list[float]:
-        """Return what every column costs one row."""
+        """Return the cost of every column for one row [m^2]."""
         found = self._rows.get(row)
         if found is None:
             found = self._rows[row] = self._row(row)
         return found
 
     def of(self, row: int, column: int) -> float:
-        """Return what a column costs a row."""
+        """Return the cost of one column for one row [m^2]."""
         known = self._rows.get(row)
         if known is not None:
             return known[column]
         if column >= len(self._slots):
             return UNPLACED_M2
-        cost = _square(self._positions[row], self._slots[column])
+        cost = _squared_distance(self._positions[row], self._slots[column])
         return cost - self.hysteresis_m2 if self._claims[row] == column else cost
 
     def _row(self, row: int) -> list[float]:
         nowhere = [UNPLACED_M2] * (len(self._positions) - len(self._slots))
-        found = _squares(self._positions[row], self._slots) + nowhere
+        found = _squared_distances(self._positions[row], self._slots) + nowhere
         claimed = self._claims[row]
         if claimed is not None:
             found[claimed] -= self.hysteresis_m2
@@ -146,11 +147,11 @@ class _Costs:
 def _undisputed(
     team: Sequence[Peer], column_of: dict[Place, int], slots: Sequence[Vector]
 ) -> list[int | None]:
-    """Return each row's claim, with at most one row to a column.
+    """Return each row's claim, with at most one row for a column.
 
-    The nearer keeps a claim, if by more than noise, else the lower id. How near is what each says
-    of the moment it claimed: what is known of the other's present position is old, and each of
-    two in flight would find itself the nearer.
+    The nearer row keeps a claim if the difference exceeds noise, else the lower id. The distances
+    compared are those each reported of the moment it claimed: known positions of others are old,
+    and each of two agents in flight would find itself the nearer.
     """
     holder: dict[int, int] = {}
     kept: list[int | None] = [None] * len(team)
@@ -161,7 +162,10 @@ def _undisputed(
         rival = holder.get(column)
         if rival is not None:
             slot = slots[column]
-            if _cost_m(peer, slot) >= _cost_m(team[rival], slot) - CONFLICT_M:
+            if (
+                _claimed_distance_m(peer, slot)
+                >= _claimed_distance_m(team[rival], slot) - CONFLICT_M
+            ):
                 continue
             kept[rival] = None
         holder[column] = row
@@ -169,16 +173,16 @@ def _undisputed(
     return kept
 
 
-def _cost_m(peer: Peer, slot: Vector) -> float:
-    return sqrt(_square(peer.position, slot)) if peer.cost_m is None else peer.cost_m
+def _claimed_distance_m(peer: Peer, slot: Vector) -> float:
+    return sqrt(_squared_distance(peer.position, slot)) if peer.cost_m is None else peer.cost_m
 
 
-def _filled(claims: Sequence[int | None], costs: _Costs) -> list[int]:
-    """Return a column for every row: the claimed one, else greedily the nearest pair first."""
+def _filled_greedily(claims: Sequence[int | None], costs: _Costs) -> list[int]:
+    """Return a column for every row: the claimed one, else the nearest pairs first."""
     chosen = list(claims)
     taken = {column for column in claims if column is not None}
     free = [column for column in range(len(claims)) if column not in taken]
-    nearest = [(*_cheapest(costs.row(row), free), row) for row in _open(claims)]
+    nearest = [(*_cheapest(costs.row(row), free), row) for row in _rows_without_claim(claims)]
     heapify(nearest)
     while nearest:
         _, column, row = nearest[0]
@@ -192,21 +196,21 @@ def _filled(claims: Sequence[int | None], costs: _Costs) -> list[int]:
     return [column for column in chosen if column is not None]
 
 
-def _open(claims: Sequence[int | None]) -> list[int]:
+def _rows_without_claim(claims: Sequence[int | None]) -> list[int]:
     """Return the rows without a claim."""
     return [row for row, column in enumerate(claims) if column is None]
 
 
 def _cheapest(costs: Sequence[float], columns: Sequence[int]) -> tuple[float, int]:
-    """Return the least cost of some columns, and the first of which it is."""
+    """Return the least cost among some columns, and the first column that has it."""
     return min([(costs[column], column) for column in columns])
 
 
 def _exchange(chosen: list[int], costs: _Costs, pending: set[int]) -> None:
     """Exchange the columns of two rows wherever that saves something, until nothing does.
 
-    pending: the columns looked at, and after them those exchanged; in the order of the columns, not
-    of the rows: who is called what decides nothing.
+    pending: the columns to try; exchanged columns are tried again. The order is that of the
+    columns, so that agent ids decide nothing.
     """
     holders = sorted(range(len(chosen)), key=chosen.__getitem__)
     held = [costs.of(row, column) for column, row in enumerate(holders)]
@@ -225,12 +229,12 @@ def _exchange(chosen: list[int], costs: _Costs, pending: set[int]) -> None:
 
 
 def _best_exchange(column: int, holders: list[int], held: list[float], costs: _Costs) -> int | None:
-    """Return the column that its holder best exchanges this one for; None where none saves.
+    """Return the column whose exchange with this one saves most; None where none saves.
 
-    holders: the row of each column; held: what it costs that row [m^2].
+    holders: the row of each column; held: the column's cost for that row [m^2].
     """
     mine, kept = costs.row(holders[column]), held[column]
-    # What lies farther saves nothing: a cost is at least minus the hysteresis.
+    # A farther column saves nothing: a cost is at least minus the hysteresis.
     bound = kept + costs.hysteresis_m2
     near = [
         other
@@ -246,11 +250,11 @@ def _best_exchange(column: int, holders: list[int], held: list[float], costs: _C
     return found
 
 
-def _squares(here: Vector, there: Sequence[Vector]) -> list[float]:
+def _squared_distances(here: Vector, there: Sequence[Vector]) -> list[float]:
     x, y, z = here
     return [(dx := x - a) * dx + (dy := y - b) * dy + (dz := z - c) * dz for a, b, c in there]
 
 
-def _square(a: Vector, b: Vector) -> float:
+def _squared_distance(a: Vector, b: Vector) -> float:
     dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return dx * dx + dy * dy + dz * dz

@@ -1,6 +1,7 @@
-"""What an agent says, and when: beacons on the local channel, its table on the multihop one.
+"""Broadcasting: beacons on the local channel, the record table on the multihop channel.
 
-Fig. 3's two layers: high frequency to whoever hears it, low frequency to be passed on.
+These are the two layers of Fig. 3: high frequency to all agents in range, and low frequency to be
+passed on.
 """
 
 from collections.abc import Sequence
@@ -8,45 +9,45 @@ from math import inf
 
 import msgspec
 
-from agent.codec import encode, sealed
-from agent.comms.gossip import Table
-from agent.comms.hierarchy import ALONE, Standing
+from agent.codec import add_checksum, encode
+from agent.comms.gossip import RecordTable
+from agent.comms.hierarchy import IN_DISTRESS, HierarchyState
 from agent.messages import HOME, Beacon, Drift, Piece, Place, Pose, Record, Vector
+from netem.wire.channels import LOCAL, MULTIHOP, Channel
 
-LOCAL, MULTIHOP = 0, 1
-"""Channels of the radio."""
-MEMORY = 200
-"""So many of the own beacons are remembered, for the echoes that may come."""
+REMEMBERED_BEACONS = 200
+"""How many own sending times are kept, for echoes that may come."""
 MAX_ECHOES = 67
-"""So many fit beside the greatest numbers of a Beacon: 317 B with its seal, and 13 B each."""
+"""Most echoes that fit a frame: a Beacon takes up to 317 B with its checksum, an echo 13 B."""
 
 
 class OwnState(msgspec.Struct, frozen=True, gc=False):
-    """What an agent says of itself: SI units, world frame; see Beacon."""
+    """What an agent reports about itself; see Beacon."""
 
-    position: Vector
-    velocity: Vector
-    heading_for: Vector
+    position: Vector  # [m; world frame]
+    velocity: Vector  # [m/s; world frame]
+    heading_for: Vector  # immediate target q_tg [m; world frame]
     place: Place | None
-    speed_cap: float
+    speed_cap: float  # promised for the next 3 s [m/s]
     mission: int = 0
     frame_key: int = 0
     frame: Pose = HOME
     drift: Drift | None = None
-    standing: Standing = ALONE
+    hierarchy: HierarchyState = IN_DISTRESS
     blocked: tuple[Place, ...] = ()
-    cost_mm: int = 0
+    cost_mm: int = 0  # [mm]
 
     @property
     def claim(self) -> tuple[int, int, int]:
-        """Queue and rank claimed, -1 for none, and the claim's cost [mm]."""
+        """Queue and rank of the claimed place, -1 for none, and the claim's cost [mm]."""
         return (*self.place, self.cost_mm) if self.place is not None else (-1, -1, 0)
 
 
 class Broadcast:
-    """An agent's side of both channels; it numbers the beacons and remembers when each was sent.
+    """An agent's sending side of both channels.
 
-    beacon_period_s, round_period_s: of the two channels [s]; infinite for a channel that is off.
+    It numbers the beacons (``sequence``) and remembers when each was sent (``sent_s``). The periods
+    of the two channels are in [s]; infinite for a channel that is off.
     """
 
     def __init__(
@@ -66,17 +67,17 @@ class Broadcast:
         now_s: float,
         own: OwnState,
         echoes: tuple[tuple[int, int], ...],
-        table: Table,
+        table: RecordTable,
         pieces: Sequence[Piece] = (),
-    ) -> tuple[tuple[int, bytes], ...]:
-        """Return what is due now, as (channel, payload).
+    ) -> tuple[tuple[Channel, bytes], ...]:
+        """Return the frames due now, as (channel, payload).
 
-        pieces: of the mission, where somebody who is heard lacks it; they go with the next round.
+        pieces: of the mission, if a neighbour lacks it; they go out with the next multihop round.
         """
-        frames: list[tuple[int, bytes]] = []
+        frames: list[tuple[Channel, bytes]] = []
         if now_s >= self._next_beacon_s:
             self._next_beacon_s = now_s + self._beacon_period_s - 1e-9
-            frames.append((LOCAL, sealed(encode(self._beacon(now_s, own, echoes)))))
+            frames.append((LOCAL, add_checksum(encode(self._beacon(now_s, own, echoes)))))
         if now_s >= self._next_round_s:
             self._next_round_s = now_s + self._round_period_s - 1e-9
             frames.extend(
@@ -85,49 +86,55 @@ class Broadcast:
         return tuple(frames)
 
     def _beacon(self, now_s: float, own: OwnState, echoes: tuple[tuple[int, int], ...]) -> Beacon:
-        sequence = self._numbered(now_s)
+        sequence = self._next_sequence(now_s)
+        queue, rank, cost_mm = own.claim
         return Beacon(
-            self._id,
-            self._incarnation,
-            sequence,
-            now_s,
-            own.position,
-            own.velocity,
-            own.heading_for,
-            *own.claim,
-            own.speed_cap,
-            _in_turns(echoes, sequence),
-            own.mission,
-            own.frame_key,
-            own.frame,
-            own.drift,
-            own.standing.tier,
-            own.standing.parent,
-            own.standing.root,
-            own.blocked,
+            id=self._id,
+            incarnation=self._incarnation,
+            sequence=sequence,
+            stamp_s=now_s,
+            position=own.position,
+            velocity=own.velocity,
+            target=own.heading_for,
+            queue=queue,
+            rank=rank,
+            cost_mm=cost_mm,
+            speed_cap=own.speed_cap,
+            echoes=_echoes_of_turn(echoes, sequence),
+            mission=own.mission,
+            frame_key=own.frame_key,
+            frame=own.frame,
+            drift=own.drift,
+            tier=own.hierarchy.tier,
+            parent=own.hierarchy.parent,
+            root=own.hierarchy.root,
+            blocked=own.blocked,
         )
 
     def _record(self, now_s: float, own: OwnState) -> Record:
+        queue, rank, cost_mm = own.claim
         return Record(
-            self._id,
-            self._incarnation,
-            self.sequence,
-            now_s,
-            own.position,
-            *own.claim,
-            own.mission,
-            own.blocked,
+            id=self._id,
+            incarnation=self._incarnation,
+            version=self.sequence,
+            stamp_s=now_s,
+            position=own.position,
+            queue=queue,
+            rank=rank,
+            cost_mm=cost_mm,
+            mission=own.mission,
+            blocked=own.blocked,
         )
 
-    def _numbered(self, now_s: float) -> int:
+    def _next_sequence(self, now_s: float) -> int:
         self.sequence += 1
         self.sent_s[self.sequence] = now_s
-        self.sent_s.pop(self.sequence - MEMORY, None)
+        self.sent_s.pop(self.sequence - REMEMBERED_BEACONS, None)
         return self.sequence
 
 
-def _in_turns(echoes: tuple[tuple[int, int], ...], turn: int) -> tuple[tuple[int, int], ...]:
-    """Return as many echoes as fit a beacon; where that is not all, others in each turn."""
+def _echoes_of_turn(echoes: tuple[tuple[int, int], ...], turn: int) -> tuple[tuple[int, int], ...]:
+    """Return as many echoes as fit a beacon; if not all fit, other ones in each turn."""
     if len(echoes) <= MAX_ECHOES:
         return echoes
     start = turn * MAX_ECHOES % len(echoes)

@@ -1,37 +1,40 @@
-"""Knowledge passed on: a table of single-writer records, the newest of each subject (E24).
+"""Gossip: a table of single-writer records, the newest of each subject, passed on (E24).
 
-A record is adopted only if its (incarnation, version) exceeds the last ever adopted for that
-subject, and that number outlives the record; otherwise the departed would circulate as ghosts. The
-version of a record is its subject's beacon sequence, so a beacon heard directly is a record too.
+A record is adopted only if its (incarnation, version) exceeds the last one ever adopted for that
+subject, and that number outlives the record; otherwise departed agents would circulate as ghosts.
+The version of a record is its subject's beacon sequence, so a beacon heard directly counts as a
+record too.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from math import inf
 from types import MappingProxyType
+from typing import assert_never
 
-from agent.codec import MAX_RADIO_B, SEAL_B, encode, sealed
-from agent.comms.unidentified_vehicles import Departed, Member
+from agent.codec import CHECKSUM_B, add_checksum, encode
+from agent.comms.neighbours import NO_VERSION
+from agent.comms.unidentified_vehicles import DepartedMember, MemberPosition
 from agent.controller import Peer
 from agent.messages import Beacon, Gossip, Piece, Place, Record
+from netem.wire.channels import MAX_PAYLOAD_B
 
 RELAYED_SILENCE_ROUNDS = 12
-"""T_d = (2 D + 10) / (1 - loss) rounds: what of it is the same at any distance. The rest, for D
-hops at that loss, is twice the age at which a subject's records are measured to come."""
+"""The part of T_d = (2 D + 10) / (1 - loss) rounds that is the same at any distance. The rest, for
+D hops at that loss, is twice the measured age at which a subject's records arrive."""
 LAG_SMOOTHING = 0.25
 LEAST_RELAYED_SILENCE_S = 2.5
-NEVER = (-1, -1)
-NOBODY: Mapping[int, float] = MappingProxyType({})
-MAX_FRAME_B = MAX_RADIO_B - SEAL_B
+NONE_LOST: Mapping[int, float] = MappingProxyType({})
+MAX_FRAME_B = MAX_PAYLOAD_B - CHECKSUM_B
 FRAME_HEAD_B = 17
-"""What a Gossip takes besides its records, with the greatest numbers it may hold."""
-MAX_KNOWN = 1024
-"""So many subjects at most: what is passed on in one round must fit one transmission."""
+"""Longest encoding of a Gossip without records [B]."""
+MAX_SUBJECTS = 1024
+"""Most subjects of a table: one round must fit one transmission."""
 
 
-class Table:
-    """What one agent knows of the team, itself excepted.
+class RecordTable:
+    """What one agent knows of the other members of the team.
 
-    multihop_hz: how often the table is passed on; 0 for never.
+    multihop_hz: how often the table is passed on [Hz]; 0: never.
     """
 
     def __init__(self, own_id: int, multihop_hz: float) -> None:
@@ -43,115 +46,138 @@ class Table:
         self._relayed_silence_s = max(LEAST_RELAYED_SILENCE_S, RELAYED_SILENCE_ROUNDS * period_s)
 
     def adopt_beacon(self, beacon: Beacon) -> None:
-        """Take what a neighbour said of itself just now."""
-        who, version = beacon.id, (beacon.incarnation, beacon.sequence)
-        if version > self._last.get(who, NEVER) and (who in self._newest or self._has_room):
-            self._last[who] = version
-            self._newest[who] = beacon
+        """Take a neighbour's beacon as the newest record of that neighbour."""
+        subject, version = beacon.id, (beacon.incarnation, beacon.sequence)
+        if version > self._last.get(subject, NO_VERSION) and (
+            subject in self._newest or self._has_room
+        ):
+            self._last[subject] = version
+            self._newest[subject] = beacon
 
     def adopt(self, gossip: Gossip, now_s: float, slack_s: float) -> None:
-        """Take what is news in a frame of the multihop channel.
+        """Take the new records of a frame of the multihop channel.
 
-        Stamps of the future are not, nor are those so old that one first heard of by them would
-        be dropped at once.
+        It ignores stamps in the future, and stamps so old that a subject first heard of by them
+        would be dropped at once.
         """
         latest_s = now_s + slack_s
         earliest_s = now_s - self._relayed_silence_s / (1.0 - 2.0 * LAG_SMOOTHING)
         for record in gossip.records:
-            who, version = record.id, (record.incarnation, record.version)
-            if version <= self._last.get(who, NEVER):
+            subject, version = record.id, (record.incarnation, record.version)
+            if version <= self._last.get(subject, NO_VERSION):
                 continue
-            plausible = who != self._own_id and earliest_s <= record.stamp_s <= latest_s
-            if plausible and (who in self._newest or self._has_room):
-                self._last[who] = version
-                self._newest[who] = record
-                lag_s = self._lag_s.get(who, 0.0)
+            plausible = subject != self._own_id and earliest_s <= record.stamp_s <= latest_s
+            if plausible and (subject in self._newest or self._has_room):
+                self._last[subject] = version
+                self._newest[subject] = record
+                lag_s = self._lag_s.get(subject, 0.0)
                 age_s = max(0.0, now_s - record.stamp_s)
-                self._lag_s[who] = lag_s + LAG_SMOOTHING * (age_s - lag_s)
+                self._lag_s[subject] = lag_s + LAG_SMOOTHING * (age_s - lag_s)
 
     def forget_silent(
-        self, now_s: float, heard: Collection[int], lost: Mapping[int, float] = NOBODY
-    ) -> list[Departed]:
-        """Drop the records of those who are gone, and return where they were.
+        self, now_s: float, heard: Collection[int], lost: Mapping[int, float] = NONE_LOST
+    ) -> list[DepartedMember]:
+        """Drop the records of departed members and return their last reports.
 
-        heard: the direct neighbours who are not; lost: those given up just now, see
-        :meth:`Neighbours.forget_silent`. One of whom others tell later than that, or who never was
-        a neighbour, may be silent for as long as relays take.
+        heard: ids of the present neighbours. lost: neighbours just given up, as returned by
+        :meth:`Neighbours.forget_silent`. A member with a relayed record later than that, or one
+        that never was a neighbour, may be silent for as long as relays take.
         """
-        lag_s = self._lag_s
-        gone = [
-            who
-            for who, newest in self._newest.items()
-            if (
-                who not in heard
-                if isinstance(newest, Beacon)
-                else newest.stamp_s <= lost.get(who, -inf)
-                or now_s - newest.stamp_s > self._relayed_silence_s + 2.0 * lag_s.get(who, 0.0)
-            )
-        ]
+        gone = []
+        for subject, newest in self._newest.items():
+            match newest:
+                case Beacon():
+                    silent = subject not in heard
+                case Record():
+                    limit_s = self._relayed_silence_s + 2.0 * self._lag_s.get(subject, 0.0)
+                    silent = newest.stamp_s <= lost.get(subject, -inf)
+                    silent = silent or now_s - newest.stamp_s > limit_s
+                case _:
+                    assert_never(newest)
+            if silent:
+                gone.append(subject)
         departed = []
-        for who in gone:
-            last = self._newest.pop(who)
-            departed.append(Departed(last.position, last.stamp_s))
-            self._lag_s.pop(who, None)
+        for subject in gone:
+            last = self._newest.pop(subject)
+            departed.append(DepartedMember(position=last.position, stamp_s=last.stamp_s))
+            self._lag_s.pop(subject, None)
         return departed
 
     def team(self, own: Peer, mission: int = 0) -> tuple[Peer, ...]:
-        """Return all who are known, oneself included, sorted by id.
+        """Return all known members, the own agent included, sorted by id.
 
-        A place claimed in another mission than ``mission`` is none.
+        mission: key of the own mission; a place claimed in another mission is left out.
         """
         peers = [own]
-        for who, newest in self._newest.items():
+        for subject, newest in self._newest.items():
             placed = newest.queue >= 0 and newest.mission == mission
             place = Place(newest.queue, newest.rank) if placed else None
-            peers.append(Peer(who, newest.position, place, newest.cost_mm / 1000.0))
+            cost_m = newest.cost_mm / 1000.0
+            peers.append(Peer(id=subject, position=newest.position, place=place, cost_m=cost_m))
         peers.sort()
         return tuple(peers)
 
-    def members(self, now_s: float) -> list[Member]:
-        """Return where each member last said it was, and how long ago."""
-        return [Member(newest.position, now_s - newest.stamp_s) for newest in self._newest.values()]
+    def members(self, now_s: float) -> list[MemberPosition]:
+        """Return the last reported position of each member."""
+        return [
+            MemberPosition(position=newest.position, age_s=now_s - newest.stamp_s)
+            for newest in self._newest.values()
+        ]
 
     def blocked(self, mission: int) -> frozenset[Place]:
-        """Return the places that others see taken by a silent body (E18)."""
-        told = [each for each in self._newest.values() if each.blocked and each.mission == mission]
-        return frozenset(Place(*place) for newest in told for place in newest.blocked)
+        """Return the places that others see taken by an unidentified vehicle (E18).
+
+        mission: key of the mission in which these are places.
+        """
+        reports = [
+            each for each in self._newest.values() if each.blocked and each.mission == mission
+        ]
+        return frozenset(Place(*place) for newest in reports for place in newest.blocked)
 
     def frames(self, own: Record, pieces: Sequence[Piece] = ()) -> list[bytes]:
-        """Return the whole table, the own record first, in frames of at most 1200 B.
+        """Return the payloads of one round: the whole table, the own record first.
 
-        pieces: of a mission that somebody lacks; each travels in a frame of its own.
+        pieces: of a mission that a neighbour lacks; each travels in a frame of its own.
         """
-        records = [own, *(_record(self._newest[who]) for who in sorted(self._newest))]
-        said = [Gossip(self._own_id, own.stamp_s, chunk, None) for chunk in _chunks(records)]
-        said += [Gossip(self._own_id, own.stamp_s, (), piece) for piece in pieces]
-        return [sealed(encode(gossip)) for gossip in said]
+        records = [own, *(_record_of(self._newest[each]) for each in sorted(self._newest))]
+        frames = [
+            Gossip(id=self._own_id, stamp_s=own.stamp_s, records=chunk, piece=None)
+            for chunk in _chunks(records)
+        ]
+        frames += [
+            Gossip(id=self._own_id, stamp_s=own.stamp_s, records=(), piece=piece)
+            for piece in pieces
+        ]
+        return [add_checksum(encode(gossip)) for gossip in frames]
 
     @property
     def _has_room(self) -> bool:
-        return len(self._newest) < MAX_KNOWN
+        return len(self._newest) < MAX_SUBJECTS
 
 
-def _record(newest: Beacon | Record) -> Record:
-    if isinstance(newest, Record):
-        return newest
-    return Record(
-        newest.id,
-        newest.incarnation,
-        newest.sequence,
-        newest.stamp_s,
-        newest.position,
-        newest.queue,
-        newest.rank,
-        newest.cost_mm,
-        newest.mission,
-        newest.blocked,
-    )
+def _record_of(newest: Beacon | Record) -> Record:
+    match newest:
+        case Record():
+            return newest
+        case Beacon():
+            return Record(
+                id=newest.id,
+                incarnation=newest.incarnation,
+                version=newest.sequence,
+                stamp_s=newest.stamp_s,
+                position=newest.position,
+                queue=newest.queue,
+                rank=newest.rank,
+                cost_mm=newest.cost_mm,
+                mission=newest.mission,
+                blocked=newest.blocked,
+            )
+        case _:
+            assert_never(newest)
 
 
 def _chunks(records: Sequence[Record]) -> Iterator[tuple[Record, ...]]:
-    """Divide records over frames, as many to each as fit."""
+    """Divide records over frames, as many in each as fit."""
     chunk, size = list[Record](), FRAME_HEAD_B
     for record in records:
         length = len(encode(record))

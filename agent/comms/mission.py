@@ -1,42 +1,55 @@
-"""Missions: what the team shall form, and where its frame goes. The highest key wins everywhere.
+"""Missions: the formation that the team forms, and the path of its frame. The highest key wins.
 
-Given to one agent, they spread. A key is version * 65536 + origin, so two missions of the same
-version are ordered too, everywhere alike. Every beacon tells which mission its sender flies, and
-where the frame is; the mission itself follows in pieces on the multihop channel, as long as
-somebody who is heard lags behind.
+An operator gives a mission to one agent; it spreads from there. A key is version * KEYS_PER_VERSION
++ origin, the id of the agent that numbered it (the world's origin is 0), so two missions of one
+version are ordered alike in all agents. Every beacon says which mission its sender flies, and where
+the frame is. The mission itself follows in pieces on the multihop channel, as long as a neighbour
+flies an older one.
 
-Who has the mission knows the frame's path, and says where the frame is at the time of each beacon.
-Who has only heard where the frame was passes that on as it was said, stamp and all, down the tiers:
-the newest stamp wins, and everybody carries the frame forward from there by itself.
+An agent that has the mission computes the frame from its path, and reports the frame at the time of
+each beacon. An agent that has only heard of the frame passes on the report unchanged, with its
+stamp, down the tiers. The newest stamp wins, and each agent extrapolates the frame from there.
 """
 
 from __future__ import annotations
+
+from typing import assert_never
 
 import msgspec
 
 from agent.codec import RejectedError, decode, decode_formation, encode, encode_formation
 from agent.controller import Flown
-from agent.messages import AT_HOME, Beacon, Drift, FramePath, Message, Mission, Piece, Pose
+from agent.messages import (
+    AGENT_IDS,
+    AT_HOME,
+    PIECE_B,
+    Beacon,
+    Drift,
+    FramePath,
+    Message,
+    Mission,
+    Piece,
+    Pose,
+)
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from agent.qstructure.frame_path import Track
 from agent.qstructure.target_frame import Frame
 
-ORIGINS = 2**16
-PIECE_B = 900
-MAX_TOLD_B = 4 * PIECE_B
-FORWARD_S = 5.0
-"""So long a frame that was only heard of is carried forward; then it is taken to stand."""
+KEYS_PER_VERSION = AGENT_IDS
+MAX_MISSION_B = 4 * PIECE_B
+MAX_EXTRAPOLATION_S = 5.0
+"""A reported frame is extrapolated for this long; then it counts as at rest."""
 
 
-class _Told(Message, frozen=True):
-    """What travels in pieces: where the frame goes, and the formation as msgpack."""
+class _MissionData(Message, frozen=True):
+    """What travels in pieces."""
 
     frame: FramePath
-    formation: bytes
+    formation: bytes  # a FormationSpec as msgpack
 
 
-class Glimpse:
-    """A frame that was heard of: where it was at a stamp, and how it moved then."""
+class ReportedFrame:
+    """A frame known only from a beacon: its pose at a stamp, and its velocity then."""
 
     def __init__(self, pose: Pose, drift: Drift | None) -> None:
         self.pose = pose
@@ -47,7 +60,7 @@ class Glimpse:
         """Return the frame at a time [s]."""
         pose, drift = self.pose, self.drift
         age_s = time_s - drift.stamp_s if drift is not None else 0.0
-        if drift is None or age_s > FORWARD_S:
+        if drift is None or age_s > MAX_EXTRAPOLATION_S:
             return Frame(pose[:3], pose.yaw)
         t, velocity = max(0.0, age_s), (drift.x, drift.y, drift.z)
         origin = (pose.x + t * drift.x, pose.y + t * drift.y, pose.z + t * drift.z)
@@ -55,9 +68,9 @@ class Glimpse:
 
 
 class Missions:
-    """The mission of one agent, and those it is about to learn.
+    """The mission that one agent flies, and those that it is receiving.
 
-    spacing: d_ir [m], which a formation's geometry needs; path: the frame's, to begin with.
+    spacing: d_ir of the formation [m]; path: of the frame at the start.
     """
 
     def __init__(
@@ -68,75 +81,92 @@ class Missions:
         self._encoded = encode_formation(formation)
         self._pieces: dict[int, dict[int, bytes]] = {}
         self._path = path
-        self._frame: Track | Glimpse = Track(path)
+        self._frame: Track | ReportedFrame = Track(path)
         self._resting: tuple[Frame, Pose] | None = None
         self.frame_key = 0
-        self.flown = Flown(0, Formation(formation, spacing), self._frame.at(0.0))
+        self.flown = Flown(
+            key=0, formation=Formation(formation, spacing), frame=self._frame.at(0.0)
+        )
 
     def flown_at(self, time_s: float) -> Flown:
-        """Return what is flown, with the frame as it is at a time [s; of Observations]."""
+        """Return the mission flown, with its frame at a time [s; Observation time]."""
         if not self._frame.rests:
             self.flown = self.flown._replace(frame=self._frame.at(time_s))
         return self.flown
 
-    def order(self, mission: Mission) -> None:
-        """Take an operator's order, or raise RejectedError: an old key, or no formation."""
-        key = mission.key or (self.flown.key // ORIGINS + 1) * ORIGINS + self._own_id
+    def accept_order(self, mission: Mission) -> None:
+        """Take an operator's order; raise RejectedError for an old key or an invalid formation."""
+        version = self.flown.key // KEYS_PER_VERSION + 1
+        key = mission.key or version * KEYS_PER_VERSION + self._own_id
         self._adopt(key, mission.frame, mission.formation or self._encoded)
 
-    def hear(self, piece: Piece) -> None:
-        """Take a piece of a mission; once all are there, fly it. Raises RejectedError."""
+    def receive(self, piece: Piece) -> None:
+        """Take a piece of a mission; with the last piece, fly it. Raises RejectedError."""
         if piece.key <= self.flown.key or piece.index >= piece.count:
             return
-        self._pieces = {key: have for key, have in self._pieces.items() if key >= piece.key}
-        have = self._pieces.setdefault(piece.key, {})
-        have[piece.index] = piece.data
-        if len(have) == piece.count:
+        self._pieces = {key: parts for key, parts in self._pieces.items() if key >= piece.key}
+        parts = self._pieces.setdefault(piece.key, {})
+        parts[piece.index] = piece.data
+        if len(parts) == piece.count:
             del self._pieces[piece.key]
-            told = decode(b"".join(have[k] for k in sorted(have)), _Told, MAX_TOLD_B)
-            self._adopt(piece.key, told.frame, told.formation)
+            data = decode(b"".join(parts[k] for k in sorted(parts)), _MissionData, MAX_MISSION_B)
+            self._adopt(piece.key, data.frame, data.formation)
 
     def pieces(self) -> list[Piece]:
-        """Return the present mission in pieces, for those who lag behind."""
-        told = encode(_Told(self._path, self._encoded))
-        parts = [told[at : at + PIECE_B] for at in range(0, len(told), PIECE_B)]
-        key = self.flown.key
-        return [Piece(key, index, len(parts), part) for index, part in enumerate(parts)]
+        """Return the present mission in pieces, for neighbours that fly an older one."""
+        data = encode(_MissionData(frame=self._path, formation=self._encoded))
+        parts = [data[at : at + PIECE_B] for at in range(0, len(data), PIECE_B)]
+        return [
+            Piece(key=self.flown.key, index=index, count=len(parts), data=part)
+            for index, part in enumerate(parts)
+        ]
 
-    def _is_news(self, beacon: Beacon) -> bool:
-        """Whether a beacon knows better where the frame is: by a newer mission, or a newer look."""
+    def receive_frame(self, beacon: Beacon) -> None:
+        """Take the frame from a beacon if it is newer, before its mission has arrived.
+
+        So a moving frame spreads down the tiers at the local channel's rate. Raises RejectedError
+        for a frame with a stamp later than the beacon's.
+        """
+        if not self._is_newer(beacon):
+            return
+        if beacon.drift is not None and beacon.drift.stamp_s > beacon.stamp_s:
+            raise RejectedError("future", "the frame's stamp is later than the beacon's")
+        self.frame_key = beacon.frame_key
+        self._set_frame(ReportedFrame(beacon.frame, beacon.drift), beacon.stamp_s)
+
+    def _is_newer(self, beacon: Beacon) -> bool:
+        """Whether a beacon's frame is of a newer mission, or of the same one with a newer stamp."""
         key, drift = beacon.frame_key, beacon.drift
         if key != self.frame_key or drift is None:
             return key > self.frame_key
-        mine = self._frame
-        if isinstance(mine, Track) or mine.drift is None:
-            return False
-        return drift.stamp_s > mine.drift.stamp_s
+        own = self._frame
+        match own:
+            case Track():
+                return False
+            case ReportedFrame():
+                return own.drift is not None and drift.stamp_s > own.drift.stamp_s
+            case _:
+                assert_never(own)
 
-    def glimpse(self, beacon: Beacon) -> None:
-        """Take the frame from a beacon where that is news, before its mission has come.
+    def frame_report(self, now_s: float) -> tuple[Pose, Drift | None]:
+        """Return the frame as a beacon reports it now."""
+        match self._frame:
+            case ReportedFrame(pose=pose, drift=drift):
+                return pose, drift
+            case Track(rests=True):
+                return self._resting_pose(self.flown.frame), None
+            case Track():
+                frame = self.flown.frame
+                x, y, z = frame.velocity
+                drift = Drift(stamp_s=now_s, x=x, y=y, z=z, yaw_rate=frame.yaw_rate)
+                return Pose(*frame.origin, frame.yaw), drift
+            case _:
+                assert_never(self._frame)
 
-        So a frame that moves comes down the tiers at the local channel's rate. Raises
-        RejectedError for a look at it that is newer than the beacon.
-        """
-        if not self._is_news(beacon):
-            return
-        if beacon.drift is not None and beacon.drift.stamp_s > beacon.stamp_s:
-            raise RejectedError("future", "a frame seen after the beacon that tells of it")
-        self.frame_key = beacon.frame_key
-        self._follow(Glimpse(beacon.frame, beacon.drift), beacon.stamp_s)
-
-    def told(self, now_s: float) -> tuple[Pose, Drift | None]:
-        """Return what a beacon says of the frame."""
-        if isinstance(self._frame, Glimpse):
-            return self._frame.pose, self._frame.drift
-        frame = self.flown.frame
-        if self._frame.rests:
-            if self._resting is None or self._resting[0] is not frame:
-                self._resting = frame, Pose(*frame.origin, frame.yaw)
-            return self._resting[1], None
-        pose = Pose(*frame.origin, frame.yaw)
-        return pose, Drift(now_s, *frame.velocity, frame.yaw_rate)
+    def _resting_pose(self, frame: Frame) -> Pose:
+        if self._resting is None or self._resting[0] is not frame:
+            self._resting = frame, Pose(*frame.origin, frame.yaw)
+        return self._resting[1]
 
     def _adopt(self, key: int, path: FramePath, encoded: bytes) -> None:
         if key <= self.flown.key:
@@ -145,13 +175,13 @@ class Missions:
         if encoded != self._encoded:
             formation = self._formation(encoded)
         self._encoded, self._path = encoded, path
-        self.flown = Flown(key, formation, self.flown.frame)
+        self.flown = Flown(key=key, formation=formation, frame=self.flown.frame)
         if key >= self.frame_key:
             self.frame_key = key
-            self._follow(Track(path), path.start_s)
+            self._set_frame(Track(path), path.start_s)
 
-    def _follow(self, frame: Track | Glimpse, time_s: float) -> None:
-        """Fly by another frame from now on; one that stands as before stays the same object."""
+    def _set_frame(self, frame: Track | ReportedFrame, time_s: float) -> None:
+        """Fly by another frame from now on; a resting frame that is equal stays the same object."""
         self._frame = frame
         here, now = self.flown.frame, frame.at(time_s)
         if here.moves or now.moves or (here.origin, here.yaw) != (now.origin, now.yaw):

@@ -1,7 +1,7 @@
-"""Neighbours: who is heard directly, how old what they said is, and who fell silent.
+"""Neighbours: agents heard directly, the age of their reports, and the detection of silence.
 
-Everything here is in the Observation's time, which all vehicles share (as GPS gives it); a host's
-clock is never read.
+All times are in Observation time, which all vehicles share (as GPS gives it). The host's clock is
+never read.
 """
 
 from collections.abc import Collection
@@ -12,21 +12,23 @@ from agent.controller import Heard
 from agent.messages import Beacon, Place
 
 MAX_AGE_S = 5.0
-"""A beacon older than this says nothing about now."""
-FORWARD_S = 1.0
-"""A position is carried forward along its velocity for this long at most."""
+"""An older beacon is rejected."""
+MAX_EXTRAPOLATION_S = 1.0
+"""A position is extrapolated along its velocity for this long at most."""
 LEAST_SILENCE_S = 1.5
-NONE_YET = (-1, -1)
-FALSE_ALARM = log(1e-6)
+NO_VERSION = (-1, -1)
+"""(incarnation, sequence) of a sender not heard so far: lower than any."""
+LOG_FALSE_ALARM = log(1e-6)
+"""Logarithm of the probability that chance alone makes a silence of T_lost (E17)."""
 HEARD_BY_OTHERS = 0.25
-"""Share of T_lost by which others hear the last word of one who is gone later than oneself."""
+"""Share of T_lost by which others may hear a departing agent's last beacon later."""
 SMOOTHING = 0.05
 MARGIN = 1.2
-"""The loss is known from the last 39 gaps or so: n (1e6^(1/n) - 1) / ln 1e6 at n = 39."""
+"""The loss is estimated from the last 39 gaps or so: n (1e6^(1/n) - 1) / ln 1e6 at n = 39."""
 
 
 class Neighbour:
-    """One neighbour: its last beacon, and the radio's quality as its sequence numbers show it."""
+    """One neighbour: its last beacon, and the radio's quality estimated from its sequence."""
 
     __slots__ = ("beacon", "key", "latency_s", "mean_gap", "place")
 
@@ -35,34 +37,34 @@ class Neighbour:
         self.key = (beacon.incarnation, beacon.sequence)
         self.latency_s = latency_s
         self.mean_gap = 1.0
-        self.place = _claim(beacon)
+        self.place = _claimed_place(beacon)
 
-    def hear(self, beacon: Beacon, key: tuple[int, int], latency_s: float) -> None:
-        """Take a newer beacon that was under way for ``latency_s`` [s]; key: which it is."""
+    def update(self, beacon: Beacon, key: tuple[int, int], latency_s: float) -> None:
+        """Take a newer beacon. key: its (incarnation, sequence); latency_s: its delay [s]."""
         before, self.key = self.beacon, key
         if beacon.incarnation == before.incarnation:
             gap = beacon.sequence - before.sequence
             self.mean_gap += SMOOTHING * (gap - self.mean_gap)
         self.latency_s += SMOOTHING * (latency_s - self.latency_s)
         if beacon.rank != before.rank or beacon.queue != before.queue:
-            self.place = _claim(beacon)
+            self.place = _claimed_place(beacon)
         self.beacon = beacon
 
     def silence_s(self, beacon_hz: float) -> float:
-        """Return T_lost of E17 [s]: after that long without a word it is taken for gone.
+        """Return T_lost of E17 [s]: after a longer silence the neighbour counts as gone.
 
-        So long that chance alone would bring it once in a million, at the loss measured.
+        At the measured loss, chance alone makes such a silence once in a million gaps.
         """
         loss = 1.0 - 1.0 / max(self.mean_gap, 1.0)
-        missed = MARGIN * FALSE_ALARM / log(loss) if loss > 1e-9 else 0.0
+        missed = MARGIN * LOG_FALSE_ALARM / log(loss) if loss > 1e-9 else 0.0
         return max(LEAST_SILENCE_S, missed / beacon_hz) + self.latency_s
 
 
 class Neighbours:
-    """The neighbours of one agent.
+    """The neighbours of one agent, with ``sorted_ids``: the ids heard directly.
 
-    sorted_ids: who is heard directly. beacon_hz: how often each is expected; slack_s: how far ahead
-    of the own observation a stamp may be, for a message can overtake an observation [s].
+    beacon_hz: expected beacon rate of each neighbour [Hz]. slack_s: how far a stamp may lie ahead
+    of the own observation [s], since a message can overtake an observation.
     """
 
     def __init__(self, own_id: int, beacon_hz: float, slack_s: float) -> None:
@@ -74,35 +76,35 @@ class Neighbours:
         self.sorted_ids: tuple[int, ...] = ()
         self._last: dict[int, tuple[int, int]] = {}
 
-    def hear(self, beacon: Beacon, now_s: float, own_sent_s: dict[int, float]) -> None:
-        """Take a beacon, or raise RejectedError: a replay, or a stamp that cannot be.
+    def receive(self, beacon: Beacon, now_s: float, own_sent_s: dict[int, float]) -> None:
+        """Take a beacon, or raise RejectedError for a replay or an implausible stamp.
 
-        own_sent_s: when each of the own recent sequences was sent [s]; a beacon that echoes one
+        own_sent_s: sending time of each recent own sequence [s]. A beacon that echoes a sequence
         was sent after it (E22), whatever its stamp says.
         """
-        who, key = beacon.id, (beacon.incarnation, beacon.sequence)
-        if who == self._own_id:
-            raise RejectedError("spoofed", "a beacon under one's own id")
-        known = self._known.get(who)
-        if key <= (known.key if known is not None else self._last.get(who, NONE_YET)):
-            raise RejectedError("replay", f"sequence {key} of {who} is not new")
+        sender, key = beacon.id, (beacon.incarnation, beacon.sequence)
+        if sender == self._own_id:
+            raise RejectedError("spoofed", "a beacon with the receiver's own id")
+        known = self._known.get(sender)
+        if key <= (known.key if known is not None else self._last.get(sender, NO_VERSION)):
+            raise RejectedError("replay", f"sequence {key} of agent {sender} is not new")
         age_s = now_s - beacon.stamp_s
         if age_s < -self._slack_s:
-            raise RejectedError("future", f"a stamp {-age_s:.3f} s ahead")
+            raise RejectedError("future", f"the stamp is {-age_s:.3f} s ahead")
         if age_s > MAX_AGE_S:
-            raise RejectedError("old", f"a stamp {age_s:.3f} s old")
-        # Nothing was sent later than a fresh stamp: only an old one can be found out.
-        if age_s > self._slack_s and self._answers_later(beacon, own_sent_s):
-            raise RejectedError("offset", "older than a beacon it has heard")
+            raise RejectedError("old", f"the stamp is {age_s:.3f} s old")
+        # A fresh stamp is later than every own beacon; only an old one can contradict its echo.
+        if age_s > self._slack_s and self._contradicts_echo(beacon, own_sent_s):
+            raise RejectedError("offset", "the stamp is older than a beacon that it echoes")
         latency_s = age_s if age_s > 0.0 else 0.0
         if known is not None:
-            known.hear(beacon, key, latency_s)
+            known.update(beacon, key, latency_s)
         else:
-            self._known[who] = Neighbour(beacon, latency_s)
+            self._known[sender] = Neighbour(beacon, latency_s)
             self._put_in_order()
 
-    def _answers_later(self, beacon: Beacon, own_sent_s: dict[int, float]) -> bool:
-        """Whether a beacon echoes one of one's own that was sent after its stamp."""
+    def _contradicts_echo(self, beacon: Beacon, own_sent_s: dict[int, float]) -> bool:
+        """Whether a beacon echoes an own beacon that was sent after its stamp."""
         for echoed, sequence in beacon.echoes:
             if echoed == self._own_id:
                 return beacon.stamp_s + self._slack_s < own_sent_s.get(sequence, -inf)
@@ -110,55 +112,64 @@ class Neighbours:
 
     @property
     def ids(self) -> Collection[int]:
-        """Who is heard directly; to look one up."""
+        """The ids heard directly, for membership tests."""
         return self._known.keys()
 
     def forget_silent(self, now_s: float) -> dict[int, float]:
-        """Drop those who have been silent for longer than chance explains.
+        """Drop neighbours whose silence is longer than chance explains.
 
-        Returns for each of them until when word passed on says no more than its own did: somebody
-        else may have heard its last beacons, but not many more of them [s].
+        Returns for each of them a time [s]: a relayed record with a stamp up to then adds nothing
+        to the neighbour's own last beacon, for others may have heard a few beacons more.
         """
         gone = {
-            who: stamp_s + HEARD_BY_OTHERS * known.silence_s(self._beacon_hz)
-            for who, known in self._known.items()
+            sender: stamp_s + HEARD_BY_OTHERS * known.silence_s(self._beacon_hz)
+            for sender, known in self._known.items()
             if now_s - (stamp_s := known.beacon.stamp_s) > LEAST_SILENCE_S
             and now_s - stamp_s > known.silence_s(self._beacon_hz)
         }
-        for who in gone:
-            self._last[who] = self._known.pop(who).key
+        for sender in gone:
+            self._last[sender] = self._known.pop(sender).key
         if gone:
             self._put_in_order()
         return gone
 
     def silences_s(self) -> dict[int, float]:
-        """Return for each neighbour how long it may be silent [s]."""
-        return {who: each.silence_s(self._beacon_hz) for who, each in self._known.items()}
+        """Return the allowed silence T_lost of each neighbour [s]."""
+        return {sender: each.silence_s(self._beacon_hz) for sender, each in self._known.items()}
 
     def heard(self, now_s: float, mission: int = 0) -> tuple[Heard, ...]:
-        """Return all neighbours, brought forward to now, sorted by id.
+        """Return all neighbours, extrapolated to now, sorted by id.
 
-        A place claimed in another mission than ``mission`` is none.
+        mission: key of the own mission; a place claimed in another mission is left out.
         """
         heard = []
         for known in self._in_order:
             beacon = known.beacon
             since_s = now_s - beacon.stamp_s
             age_s = since_s if since_s > 0.0 else 0.0
-            along = age_s if age_s < FORWARD_S else FORWARD_S
+            along = age_s if age_s < MAX_EXTRAPOLATION_S else MAX_EXTRAPOLATION_S
             x, y, z = beacon.position
             u, v, w = velocity = beacon.velocity
             position = (x + along * u, y + along * v, z + along * w)
             place = known.place if beacon.mission == mission else None
-            heard.append(Heard(beacon.id, age_s, position, velocity, beacon.target, place))
+            heard.append(
+                Heard(
+                    id=beacon.id,
+                    age_s=age_s,
+                    position=position,
+                    velocity=velocity,
+                    target=beacon.target,
+                    place=place,
+                )
+            )
         return tuple(heard)
 
-    def behind(self, mission: int) -> bool:
-        """Whether somebody who is heard flies an older mission."""
+    def any_behind(self, mission: int) -> bool:
+        """Whether any neighbour flies an older mission than the one with this key."""
         return any(known.beacon.mission < mission for known in self._in_order)
 
     def beacons(self) -> list[Beacon]:
-        """Return each neighbour's last beacon, sorted by id."""
+        """Return the last beacon of each neighbour, sorted by id."""
         return [each.beacon for each in self._in_order]
 
     def echoes(self) -> tuple[tuple[int, int], ...]:
@@ -167,8 +178,8 @@ class Neighbours:
 
     def _put_in_order(self) -> None:
         self.sorted_ids = tuple(sorted(self._known))
-        self._in_order = [self._known[who] for who in self.sorted_ids]
+        self._in_order = [self._known[sender] for sender in self.sorted_ids]
 
 
-def _claim(beacon: Beacon) -> Place | None:
+def _claimed_place(beacon: Beacon) -> Place | None:
     return Place(beacon.queue, beacon.rank) if beacon.queue >= 0 else None

@@ -1,8 +1,9 @@
-"""Silent bodies: vehicles that are sensed and stay put, but from which nothing is heard (E18).
+"""Unidentified vehicles: sensed and stationary, but no member of the team (E18).
 
-A dead agent's vehicle may hover in a slot. Whoever senses it long enough without knowing of anybody
-there takes it for what it is, and remembers it while out of the sensor's range. A sensor may see
-farther than a radio hears: a body is silent only if others as far away are heard.
+The vehicle of a dead agent may hover in a slot. An agent that senses a vehicle for long enough, and
+knows of no member there, takes it for unidentified, and remembers it while it is out of the
+sensor's range. A sensor may reach farther than the radio: a vehicle counts as unidentified only if
+members at its distance are heard.
 """
 
 from __future__ import annotations
@@ -15,135 +16,167 @@ import msgspec
 
 from agent.messages import Beacon, Vector
 
-SAME_BODY_M = 0.2
-NEIGHBOUR_M = 0.4
-SILENCE_S = 1.5
+SAME_VEHICLE_M = 0.2
+"""Two sightings nearer than this are the same vehicle, which then is stationary."""
+SAME_MEMBER_M = 0.4
+"""A vehicle sensed nearer than this to where a member is reported is that member."""
+UNIDENTIFIED_AFTER_S = 1.5
 MEMORY_S = 10.0
-"""So long a body is remembered out of sight; whoever comes near will see it again."""
+"""How long a vehicle out of the sensor's range is remembered."""
 SURE_RANGE_M = 1.8
-"""Nearer than this a body would be sensed if it were still there."""
-
+"""A vehicle nearer than this would be sensed if it were still there."""
 WITNESS_M = 1.3
-"""Nearer than this to where a body was, whoever tells of none there says that it is gone."""
-TellsOf = Callable[[Beacon, Vector], bool]
+"""A neighbour nearer than this to a vehicle would sense it and report its place as blocked."""
+
+ReportsVehicle = Callable[[Beacon, Vector], bool]
+"""Whether a neighbour's beacon reports an unidentified vehicle at a position [m; world frame]."""
 
 
-class _Body(NamedTuple):
-    """A body without a name: where it stands [m; world frame], since when, and when last seen."""
+def _always(_witness: Beacon, _vehicle: Vector) -> bool:
+    return True
 
-    position: Vector
-    since_s: float
-    seen_s: float
 
-    def seen_again(self, now_s: float, sensed: Sequence[Vector]) -> _Body:
-        near = any(dist(self.position, each) < SAME_BODY_M for each in sensed)
+class _Track(NamedTuple):
+    """A vehicle without an id, as tracked over time."""
+
+    position: Vector  # [m; world frame]
+    since_s: float  # at this position since [s]
+    seen_s: float  # last sensed [s]
+
+    def seen_again(self, now_s: float, sensed: Sequence[Vector]) -> _Track:
+        near = any(dist(self.position, each) < SAME_VEHICLE_M for each in sensed)
         return self._replace(seen_s=now_s) if near else self
 
 
-class Member(msgspec.Struct, frozen=True, gc=False):
-    """A member of the team as last told of: where it was [m; world frame], and how long ago [s]."""
+class MemberPosition(msgspec.Struct, frozen=True, gc=False):
+    """A team member's last reported position."""
 
-    position: Vector
-    age_s: float
+    position: Vector  # [m; world frame]
+    age_s: float  # age of the report [s]
 
 
-class Departed(NamedTuple):
-    """A member that fell silent: where it was [m; world frame] when it last spoke [s]."""
+class DepartedMember(NamedTuple):
+    """A member that fell silent, with its last report."""
 
-    position: Vector
-    stamp_s: float
+    position: Vector  # [m; world frame]
+    stamp_s: float  # time of the report [s]
+
+
+class Surroundings(NamedTuple):
+    """What an agent senses and knows of vehicles near by at one time."""
+
+    now_s: float  # [s]
+    position: Vector  # own [m; world frame]
+    sensed: Sequence[Vector]  # vehicles, relative to ``position`` [m; world axes]
+    beacons: Sequence[Beacon]  # the last one of each neighbour
+    team: Sequence[MemberPosition]  # all known members
+    departed: Sequence[DepartedMember] = ()  # members that fell silent since the last update
+    reports_vehicle: ReportsVehicle = _always
 
 
 class UnidentifiedVehicles:
-    """The silent bodies that one agent knows of. max_speed: the fastest vehicle's limit [m/s]."""
+    """The unidentified vehicles that one agent knows of.
+
+    max_speed: the limit of the fleet's fastest vehicle [m/s].
+    """
 
     def __init__(self, max_speed: float) -> None:
         self._max_speed = max_speed
-        self._bodies: list[_Body] = []
-        self._departed: list[Departed] = []
+        self._tracks: list[_Track] = []
+        self._departed: list[DepartedMember] = []
 
-    def look(
-        self,
-        now_s: float,
-        position: Vector,
-        sensed: Sequence[Vector],
-        heard: Sequence[Beacon],
-        team: Sequence[Member],
-        departed: Sequence[Departed] = (),
-        tells_of: TellsOf = lambda _witness, _body: True,
-    ) -> tuple[Vector, ...]:
-        """Return where silent bodies stand [m; world frame].
-
-        sensed: bodies relative to ``position`` [m; world axes]; heard: the last beacons of those
-        who are heard directly; team: all members known; departed: who was one until now; tells_of:
-        whether a neighbour tells of a body there.
-        """
-        if departed or self._departed:
-            self._departed = [
-                gone for gone in (*self._departed, *departed) if now_s - gone.stamp_s <= MEMORY_S
-            ]
-        unknown = [body for body in _in_world(position, sensed) if not self._explained(body, team)]
-        if unknown:
-            reach = max((dist(position, each.position) for each in heard), default=0.0)
-            reach += SAME_BODY_M
-            unknown = [body for body in unknown if dist(position, body) <= reach]
-        if not unknown and not self._bodies:
+    def update(self, around: Surroundings) -> tuple[Vector, ...]:
+        """Return the positions of unidentified vehicles [m; world frame]."""
+        self._note_departed(around)
+        unknown = self._unknown(around)
+        if not unknown and not self._tracks:
             return ()
-        known = [each.seen_again(now_s, unknown) for each in self._bodies]
+        tracks = [each.seen_again(around.now_s, unknown) for each in self._tracks]
         new = [
             seen
             for seen in unknown
-            if all(dist(body.position, seen) >= SAME_BODY_M for body in known)
+            if all(dist(track.position, seen) >= SAME_VEHICLE_M for track in tracks)
         ]
-        lost = [body for body in known if body.seen_s < now_s]
+        lost = [track for track in tracks if track.seen_s < around.now_s]
         kept = [
-            body
-            for body in known
-            if body.seen_s == now_s
-            or (
-                self._remembered(body, now_s, position, team)
-                and not _refuted(body, heard, tells_of)
-            )
+            track
+            for track in tracks
+            if track.seen_s == around.now_s
+            or (self._may_remain(track, around) and not _contradicted(track, around))
         ]
-        self._bodies = kept + [self._found(seen, now_s, lost) for seen in new]
-        return tuple(body.position for body in self._bodies if now_s - body.since_s >= SILENCE_S)
+        self._tracks = kept + [self._new_track(seen, around.now_s, lost) for seen in new]
+        return tuple(
+            track.position
+            for track in self._tracks
+            if around.now_s - track.since_s >= UNIDENTIFIED_AFTER_S
+        )
 
-    def _found(self, body: Vector, now_s: float, lost: Sequence[_Body]) -> _Body:
-        """Return a body found now; where a member fell silent, it is as silent as that one.
+    def _note_departed(self, around: Surroundings) -> None:
+        if around.departed or self._departed:
+            self._departed = [
+                gone
+                for gone in (*self._departed, *around.departed)
+                if around.now_s - gone.stamp_s <= MEMORY_S
+            ]
 
-        lost: those no longer seen; one of them that has flown on stands nowhere yet.
+    def _unknown(self, around: Surroundings) -> list[Vector]:
+        """Return the sensed vehicles that are no member and within hearing range [m; world]."""
+        unknown = [
+            vehicle
+            for vehicle in _in_world(around.position, around.sensed)
+            if not self._is_member(vehicle, around.team)
+        ]
+        if unknown:
+            reach = max(
+                (dist(around.position, each.position) for each in around.beacons), default=0.0
+            )
+            reach += SAME_VEHICLE_M
+            unknown = [vehicle for vehicle in unknown if dist(around.position, vehicle) <= reach]
+        return unknown
+
+    def _new_track(self, vehicle: Vector, now_s: float, lost: Sequence[_Track]) -> _Track:
+        """Return the track of a vehicle first sensed now.
+
+        Where a member fell silent, the vehicle counts as silent since then. lost: the tracks no
+        longer sensed; one of them may have flown on to here, and then is not stationary yet.
         """
         since_s = min(
-            (gone.stamp_s for gone in self._departed if dist(gone.position, body) < NEIGHBOUR_M),
+            (
+                gone.stamp_s
+                for gone in self._departed
+                if dist(gone.position, vehicle) < SAME_MEMBER_M
+            ),
             default=now_s,
         )
-        flown = any(
-            dist(each.position, body) < SAME_BODY_M + self._max_speed * (now_s - each.seen_s)
+        moved = any(
+            dist(each.position, vehicle) < SAME_VEHICLE_M + self._max_speed * (now_s - each.seen_s)
             for each in lost
         )
-        return _Body(body, now_s if flown else since_s, now_s)
+        return _Track(vehicle, now_s if moved else since_s, now_s)
 
-    def _remembered(
-        self, body: _Body, now_s: float, position: Vector, team: Sequence[Member]
-    ) -> bool:
-        """Whether a body that is not sensed now may still be there: one that was seen to stand."""
-        out_of_sight = dist(body.position, position) > SURE_RANGE_M
-        recent = now_s - body.seen_s <= MEMORY_S and body.seen_s - body.since_s >= SILENCE_S
-        return out_of_sight and recent and not self._explained(body.position, team)
+    def _may_remain(self, track: _Track, around: Surroundings) -> bool:
+        """Whether a stationary vehicle that is not sensed now may still be there."""
+        out_of_sight = dist(track.position, around.position) > SURE_RANGE_M
+        recent = (
+            around.now_s - track.seen_s <= MEMORY_S
+            and track.seen_s - track.since_s >= UNIDENTIFIED_AFTER_S
+        )
+        return out_of_sight and recent and not self._is_member(track.position, around.team)
 
-    def _explained(self, body: Vector, team: Sequence[Member]) -> bool:
-        """Whether a member may be there by now: told of long ago, it may have moved on."""
+    def _is_member(self, vehicle: Vector, team: Sequence[MemberPosition]) -> bool:
+        """Whether a member may be there by now, having moved on since its last report."""
         for member in team:
-            if dist(body, member.position) < NEIGHBOUR_M + self._max_speed * member.age_s:
+            if dist(vehicle, member.position) < SAME_MEMBER_M + self._max_speed * member.age_s:
                 return True
         return False
 
 
-def _refuted(body: _Body, heard: Sequence[Beacon], tells_of: TellsOf) -> bool:
-    """Whether a neighbour who would see a body tells of none."""
+def _contradicted(track: _Track, around: Surroundings) -> bool:
+    """Whether a neighbour that would sense the vehicle reports none there."""
     return any(
-        dist(witness.position, body.position) <= WITNESS_M and not tells_of(witness, body.position)
-        for witness in heard
+        dist(witness.position, track.position) <= WITNESS_M
+        and not around.reports_vehicle(witness, track.position)
+        for witness in around.beacons
     )
 
 

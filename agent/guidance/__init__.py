@@ -1,1 +1,1 @@
-"""From a place to a velocity: Algorithms 1, 2 and 4, potentials and the safety filter."""
+"""Guidance: from a place to a safe velocity (Algorithms 1-4, potentials, safety filter)."""

@@ -1,8 +1,8 @@
 """The bobber-agent: an immediate target that asks for no abrupt turn (Algorithm 2).
 
-The paper lets a virtual agent slide down a potential inside the cast-zone. Its limit for a
-vanishing weight of the walls has a closed form (E7), which is what stands here: straight to the
-target when it lies in the cone, else to a point on the cone's edge on the target's side.
+In the paper a virtual agent slides down a potential inside the cast-zone. The limit for a vanishing
+weight of the zone's walls has a closed form (E7), which is used here: straight to a target that
+lies in the cone, else to a point on the cone's edge on the target's side.
 """
 
 from math import cos, hypot, sin, sqrt
@@ -12,23 +12,22 @@ from agent.guidance.cone import Cone, azimuth_error
 from agent.messages import Vector
 
 STRAIGHT_AHEAD_M = 0.1
-WITHIN = 0.95
-"""A bobber on the cone's edge stands a little inside: a neighbour's push then asks for no turn."""
+"""A target nearer than this horizontally counts as straight ahead (E7)."""
+INSIDE_EDGE = 0.95
+"""A bobber on the cone's edge stands at this share of the half angle, so that a neighbour's push
+does not ask for a turn."""
 
 
 class CastZone(NamedTuple):
-    """Where a bobber may be cast.
-
-    reach: d_c2 [m]; turning_radius: R of E7 [m].
-    """
+    """The zone in which a bobber may be cast."""
 
     cone: Cone
-    reach: float
-    turning_radius: float
+    reach: float  # d_c2 [m]
+    turning_radius: float  # R of E7 [m]
 
 
 def cast_zone(cone: Cone, reach: float, max_speed: float, max_yaw_rate: float) -> CastZone:
-    """Return the cast-zone of a vehicle: reach [m], speeds [m/s] and [rad/s]."""
+    """Return a vehicle's cast-zone. reach: d_c2 [m]; max_speed [m/s]; max_yaw_rate [rad/s]."""
     theta = min(cone)
     radius = max(0.5 * reach / (2.0 * sin(0.5 * theta)), max_speed / max_yaw_rate)
     return CastZone(cone, reach, radius)
@@ -37,8 +36,9 @@ def cast_zone(cone: Cone, reach: float, max_speed: float, max_yaw_rate: float) -
 def bobber(q: Vector, yaw: float, q_toq: Vector, zone: CastZone) -> Vector:
     """Return q_ba, the immediate target on the way to the target-on-queue [m; world frame].
 
-    A target inside the turning circle is taken head on: it would be orbited otherwise, so the
-    vehicle turns on the spot there (E11).
+    q, q_toq: own position and target-on-queue [m; world frame]; yaw: heading [rad]. A target inside
+    the turning circle is the bobber itself, so that the vehicle turns on the spot towards it;
+    otherwise the vehicle would orbit the target (E11).
     """
     x, y, z = q_toq[0] - q[0], q_toq[1] - q[1], q_toq[2] - q[2]
     across = hypot(x, y)
@@ -47,6 +47,6 @@ def bobber(q: Vector, yaw: float, q_toq: Vector, zone: CastZone) -> Vector:
         scale = min(1.0, zone.reach / max(sqrt(x * x + y * y + z * z), 1e-12))
         return (q[0] + x * scale, q[1] + y * scale, q[2] + z * scale)
     step = 0.5 * zone.reach
-    heading = yaw + WITHIN * (zone.cone.left if error > 0.0 else -zone.cone.right)
+    heading = yaw + INSIDE_EDGE * (zone.cone.left if error > 0.0 else -zone.cone.right)
     climb = min(max(z, -step), step)
     return (q[0] + step * cos(heading), q[1] + step * sin(heading), q[2] + climb)

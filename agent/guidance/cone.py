@@ -1,6 +1,6 @@
-"""The cone of headings a vehicle may fly without turning first: theta_k of the paper's Fig. 5.
+"""The cone of directions in which a vehicle may fly without turning first: theta_k of Fig. 5.
 
-In azimuth only, for vehicles climb and descend freely (E10).
+It is a cone in azimuth only, for vehicles climb and descend freely (E10).
 """
 
 from math import atan2, radians, remainder, tau
@@ -8,22 +8,23 @@ from typing import NamedTuple
 
 from agent.config import Vehicle
 
-SLACK = 1e-9
+SLACK_RAD = 1e-9
+"""Tolerance for rounding at the cone's edge [rad]."""
 
 
 class Cone(NamedTuple):
-    """Angles to the left and right of the heading [rad], theta_1 and theta_2."""
+    """Half angles of the cone about the heading."""
 
-    left: float
-    right: float
+    left: float  # theta_1 [rad]
+    right: float  # theta_2 [rad]
 
     def holds(self, error: float) -> bool:
-        """Whether a direction at this azimuth error [rad], left positive, lies in the cone."""
-        return -self.right - SLACK <= error <= self.left + SLACK
+        """Whether a direction with this azimuth error [rad; left positive] lies in the cone."""
+        return -self.right - SLACK_RAD <= error <= self.left + SLACK_RAD
 
 
 def cone_of(vehicle: Vehicle) -> Cone:
-    """Return a vehicle's cone: ``max_turn_deg`` to both sides unless a side has its own."""
+    """Return a vehicle's cone: ``max_turn_deg`` on both sides, unless a side has its own angle."""
     left, right = vehicle.max_turn_left_deg, vehicle.max_turn_right_deg
     return Cone(
         radians(vehicle.max_turn_deg if left is None else left),
@@ -32,5 +33,5 @@ def cone_of(vehicle: Vehicle) -> Cone:
 
 
 def azimuth_error(x: float, y: float, yaw: float) -> float:
-    """Return the angle from a heading to a horizontal direction [rad], in [-pi, pi]."""
+    """Return the angle from the heading yaw to the direction (x, y) [rad], in [-pi, pi]."""
     return remainder(atan2(y, x) - yaw, tau)

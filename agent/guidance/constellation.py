@@ -1,12 +1,12 @@
-"""Constellation-agents: guiding lines that bend round what is sensed (Algorithm 3, Fig. 7).
+"""Constellation-agents: guiding lines that bend round sensed surfaces (Algorithm 3, Fig. 7).
 
 Eight lines open like a cone about the heading, from a common agent behind the vehicle. Each agent
-on a line stands d_cs beyond the one before, in the direction of the last two as they are *bent*, so
-that a bend carries all that follow (lines 4-7, normalised). Where the way from the vehicle to it is
-blocked, it is drawn in to what is free (lines 3 and 5, along the unit vector). What is blocked is
-known from sensed points alone: within d_s of any of them.
+of a line stands d_cs beyond the one before, in the direction of the last two as they are *bent*, so
+that a bend carries all agents after it (lines 4-7, normalised). If the straight way from the
+vehicle to an agent is blocked, the agent is drawn in to the free part of the way (lines 3 and 5,
+along the unit vector). Blocked is everything within d_s of a sensed point.
 
-As poles of (23) such agents ask for thousands of m/s (E19). Two bounded terms stand for their
+As poles of (23) such agents ask for thousands of m/s (E19). Two bounded terms replace their
 repulsion in Omega of (27): the sum of the displacements, which holds back and turns aside, and the
 sum of the bent lines' directions, weighted by how far they are drawn in, which leads along the
 surface.
@@ -14,26 +14,28 @@ surface.
 
 from collections.abc import Sequence
 from math import cos, inf, pi, sin, sqrt
-from typing import Protocol
+from typing import Protocol, assert_never
 
-from agent.messages import Vector
+from agent.config import AvoidanceKind
+from agent.messages import ZERO, Vector
 
 LINES = 8
 AGENTS = 4
 BEHIND_M = 0.3
 FIRST_M, FIRST_RAD = 0.3, 69.0 * pi / 180.0
 STEP_M = 0.2
-"""d_cs."""
+"""d_cs [m]."""
 ROLL = 0.1 * pi / 180.0
-"""Breaks the symmetry of an obstacle dead ahead."""
+"""Rolls all lines, which breaks the symmetry of an obstacle dead ahead [rad]."""
 LEAST_M = 0.1
+"""An agent that is drawn in stays at least this far from the vehicle."""
 REACH_M = 0.9
-"""No agent stands farther than this from the vehicle."""
-DISPLACED, ALONG, CAP = 0.15, 0.075, 2.0
+"""Every agent stands within this distance of the vehicle."""
+DISPLACEMENT_GAIN, TANGENT_GAIN, MAX_OMEGA_M = 0.15, 0.075, 2.0
 
 
 def _default_lines() -> list[list[Vector]]:
-    """Return the agents of each line where nothing is sensed [m; heading along x]."""
+    """Return the agents of each undisturbed line, relative to the vehicle [m; heading along x]."""
     ahead, aside = FIRST_M * cos(FIRST_RAD), FIRST_M * sin(FIRST_RAD)
     length = sqrt((ahead + BEHIND_M) ** 2 + aside**2)
     along, out = STEP_M * (ahead + BEHIND_M) / length, STEP_M * aside / length
@@ -42,25 +44,25 @@ def _default_lines() -> list[list[Vector]]:
         [
             (
                 ahead + k * along,
-                (aside + k * out) * cos(presence),
-                (aside + k * out) * sin(presence),
+                (aside + k * out) * cos(roll),
+                (aside + k * out) * sin(roll),
             )
             for k in range(AGENTS)
         ]
-        for presence in rolls
+        for roll in rolls
     ]
 
 
-DEFAULT = _default_lines()
+DEFAULT_LINES = _default_lines()
 
 
 class Avoidance(Protocol):
-    """What keeps a vehicle's wishes clear of surfaces, long before the safety filter has to."""
+    """A term of Omega that leads round surfaces before the safety filter has to act."""
 
     def omega(self, yaw: float, points: Sequence[Vector]) -> Vector:
-        """Return what points of surfaces add to Omega of (27) [m; world axes].
+        """Return the term that sensed points add to Omega of (27) [m; world axes].
 
-        yaw: the heading [rad]; points: relative to the vehicle [m; world axes].
+        yaw: heading [rad]; points: relative to the vehicle [m; world axes].
         """
 
 
@@ -72,44 +74,48 @@ class Constellation:
         self._near = (REACH_M + safety) ** 2
 
     def omega(self, yaw: float, points: Sequence[Vector]) -> Vector:
-        """Return what the lines add to Omega [m; world axes]; see Avoidance."""
+        """Return the term of the lines [m; world axes]; see Avoidance."""
         near = [p for p in points if p[0] * p[0] + p[1] * p[1] + p[2] * p[2] < self._near]
         if not near:
-            return (0.0, 0.0, 0.0)
+            return ZERO
         c, s = cos(yaw), sin(yaw)
         x = y = z = 0.0
-        for line in DEFAULT:
+        for line in DEFAULT_LINES:
             turned = [(c * a - s * b, s * a + c * b, h) for a, b, h in line]
-            dx, dy, dz = self._line(turned, (-BEHIND_M * c, -BEHIND_M * s, 0.0), near)
+            dx, dy, dz = self._line_term(turned, (-BEHIND_M * c, -BEHIND_M * s, 0.0), near)
             x, y, z = x + dx, y + dy, z + dz
         length = sqrt(x * x + y * y + z * z)
-        scale = min(1.0, CAP / max(length, 1e-9))
+        scale = min(1.0, MAX_OMEGA_M / max(length, 1e-9))
         return (-scale * x, -scale * y, -scale * z)
 
-    def _line(self, default: list[Vector], common: Vector, points: list[Vector]) -> Vector:
-        """Return what one line asks for [m]; default: its agents where nothing is sensed."""
+    def _line_term(self, default: list[Vector], common: Vector, points: list[Vector]) -> Vector:
+        """Return the term of one line [m; world axes].
+
+        default: its undisturbed agents; common: the common agent; both and the points relative to
+        the vehicle [m; world axes].
+        """
         before, last, drawn_in = common, common, 1.0
         x = y = z = 0.0
         for a, (u, v, w) in enumerate(default):
             ahead = default[0] if a == 0 else _beyond(before, last)
-            f = self._drawn_in(ahead, points)
+            f = self._free_share(ahead, points)
             drawn_in = min(drawn_in, f)
             here = ahead if f == 1.0 else (f * ahead[0], f * ahead[1], f * ahead[2])
-            x += DISPLACED * (here[0] - u)
-            y += DISPLACED * (here[1] - v)
-            z += DISPLACED * (here[2] - w)
+            x += DISPLACEMENT_GAIN * (here[0] - u)
+            y += DISPLACEMENT_GAIN * (here[1] - v)
+            z += DISPLACEMENT_GAIN * (here[2] - w)
             share = 1.0 - f if f < 1.0 else 0.5 * (1.0 - drawn_in)
             if a > 0 and share > 0.0:
                 dx, dy, dz = here[0] - last[0], here[1] - last[1], here[2] - last[2]
-                weight = ALONG * share / max(sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
+                weight = TANGENT_GAIN * share / max(sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
                 x, y, z = x + weight * dx, y + weight * dy, z + weight * dz
             before, last = last, here
         return (x, y, z)
 
-    def _drawn_in(self, ahead: Vector, points: list[Vector]) -> float:
-        """Return the share of the way to a point at which its agent stands: 1 where it is free.
+    def _free_share(self, ahead: Vector, points: list[Vector]) -> float:
+        """Return the free share of the way from the vehicle to an agent: 1 if all of it is free.
 
-        The way is free outside all that is within d_s of a point sensed.
+        The way is free where it is farther than d_s from every sensed point.
         """
         far = sqrt(ahead[0] * ahead[0] + ahead[1] * ahead[1] + ahead[2] * ahead[2])
         free, safe = inf, self._safety * self._safety
@@ -122,20 +128,20 @@ class Constellation:
 
 
 def _beyond(before: Vector, last: Vector) -> Vector:
-    """Return the point d_cs beyond the last, away from the one before it."""
+    """Return the point d_cs beyond the last one, away from the one before it."""
     x, y, z = last[0] - before[0], last[1] - before[1], last[2] - before[2]
     scale = STEP_M / max(sqrt(x * x + y * y + z * z), 1e-9)
     return (last[0] + scale * x, last[1] + scale * y, last[2] + scale * z)
 
 
 class Repulsion:
-    """The plain repulsion that the lines are compared with: from each point, away; safety: d_s."""
+    """Direct repulsion from each point, to compare the lines with; safety: d_s [m]."""
 
     def __init__(self, safety: float) -> None:
         self._safety = safety
 
     def omega(self, yaw: float, points: Sequence[Vector]) -> Vector:
-        """Return what being near adds to Omega [m; world axes]; see Avoidance."""
+        """Return the term of the repulsion [m; world axes]; see Avoidance."""
         x = y = z = 0.0
         for p in points:
             r = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
@@ -146,8 +152,14 @@ class Repulsion:
         return (x, y, z)
 
 
-def avoidance(kind: str, safety: float) -> Avoidance | None:
-    """Return the avoidance of that name; None for "none". safety: d_s [m]."""
-    if kind == "none":
-        return None
-    return Constellation(safety) if kind == "constellation" else Repulsion(safety)
+def avoidance_of(kind: AvoidanceKind, safety: float) -> Avoidance | None:
+    """Return the avoidance of a kind; None for "none". safety: d_s [m]."""
+    match kind:
+        case "constellation":
+            return Constellation(safety)
+        case "direct":
+            return Repulsion(safety)
+        case "none":
+            return None
+        case _:
+            assert_never(kind)

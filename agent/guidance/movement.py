@@ -6,14 +6,14 @@ from agent.guidance.cone import Cone, azimuth_error
 from agent.messages import Vector
 
 DEAD_BAND_MPS = 0.02
-"""Below this horizontal speed a motion has no azimuth: the vehicle hovers or climbs (E10)."""
+"""Up to this horizontal speed a motion has no azimuth: the vehicle hovers or climbs (E10)."""
 
 
 def steer(wanted: Vector, yaw: float, cone: Cone) -> tuple[Vector, float]:
     """Return the velocity to fly now [m/s] and the heading to turn to [rad].
 
-    wanted: velocity [m/s; world frame]; yaw: present heading [rad]. Vehicles hover, climb and
-    descend without turning.
+    wanted: desired velocity [m/s; world frame]; yaw: present heading [rad]. Vehicles hover, climb
+    and descend without turning.
     """
     if hypot(wanted[0], wanted[1]) <= DEAD_BAND_MPS:
         return wanted, yaw
@@ -24,7 +24,7 @@ def steer(wanted: Vector, yaw: float, cone: Cone) -> tuple[Vector, float]:
 
 
 def saturated(velocity: Vector, max_speed: float, max_climb: float) -> Vector:
-    """Return a velocity [m/s] scaled down as a whole to the vehicle's limits."""
+    """Return a velocity scaled down, in its direction, to the vehicle's limits [m/s]."""
     x, y, z = velocity
     speed = hypot(x, y, z)
     scale = 1.0

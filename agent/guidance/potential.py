@@ -1,13 +1,13 @@
-"""Attraction to the target and repulsion between agents: (18)-(28), in a form that converges.
+"""Potentials: attraction to the target and repulsion between agents, (18)-(28), so as to converge.
 
-Per pair, with r = |q_i - q_j| and g = max(r - d_ob, 1 mm):
+For each pair, with r = |q_i - q_j| and g = max(r - d_ob, 1 mm):
 
     U    = g^2 / 2                                                     (21), E2
     U_tg = (max(|q_tg,i - q_tg,j|, d_ob + 0.25 m) - d_ob)^2 / 2        (22), E1
     U_ob = sigma(U) (h(U) - h(U_tg)) for U < U_tg, else 0              (23), E3
 
 with h(U) = U / U_tg^2 + 1 / U and sigma(U) = 1 / (1 + exp(a_t (U - U_tg)^3)). The one-sided form
-keeps the pole at U = 0 and the zero slope at U_tg, and has no second equilibrium beyond it. Below
+keeps the pole at U = 0 and the zero slope at U_tg, and has no second equilibrium beyond U_tg. Below
 U_tg the exponent is never positive, so nothing overflows (E5).
 """
 
@@ -18,11 +18,13 @@ from typing import Protocol
 from agent.messages import Vector
 
 LEAST_GAP_M = 1e-3
+"""E2: g is at least this, also inside d_ob."""
 TARGET_FLOOR_M = 0.25
+"""E1: targets nearer than d_ob plus this are no equilibrium of the potential."""
 
 
 class Other(Protocol):
-    """A neighbour as the potential sees it: where it is and where it is heading [m]."""
+    """A neighbour as the potential needs it."""
 
     @property
     def position(self) -> Vector:
@@ -37,8 +39,9 @@ class Potential:
     """The potential of one agent among others.
 
     d_ob: least acceptable distance [m]; a_t: sharpness of (23); k_ob: weight of repulsion; cap:
-    limit of each pair's term in Omega [m] (E4). The weight was chosen by trial, 40 seeds of the
-    wedge: from 0.02 to 0.005 convergence and separation stay, and turns over 45 degrees halve.
+    limit of each pair's term in Omega [m] (E4). The weight is the result of a trial with 40 seeds
+    of the wedge: from 0.02 to 0.005, convergence and separation stay, and turns over 45 degrees
+    halve.
     """
 
     __slots__ = ("_floor", "a_t", "cap", "d_ob", "k_ob")
@@ -53,12 +56,12 @@ class Potential:
         self._floor = d_ob + TARGET_FLOOR_M
 
     def gap_at_targets(self, between_targets_m: float) -> float:
-        """Return the gap g that belongs to two immediate targets so far apart [m]: E1."""
+        """Return the gap g of two immediate targets at this distance from each other [m]: E1."""
         floor = self._floor
         return (between_targets_m if between_targets_m > floor else floor) - self.d_ob
 
     def at_targets(self, between_targets_m: float) -> float:
-        """Return U_tg for two immediate targets that far apart [m]: (22) with E1."""
+        """Return U_tg of two immediate targets at this distance from each other [m]: (22), E1."""
         gap = self.gap_at_targets(between_targets_m)
         return 0.5 * gap * gap
 
@@ -69,7 +72,7 @@ class Potential:
         return self._sigma(u - u_tg) * (u / (u_tg * u_tg) + 1.0 / u - 2.0 / u_tg)
 
     def slope(self, u: float, u_tg: float) -> float:
-        """Return dU_ob/dU, never positive: 0 from U_tg on, a pole at 0 (E3)."""
+        """Return dU_ob/dU: never positive, 0 from U_tg on, with a pole at 0 (E3)."""
         if u >= u_tg:
             return 0.0
         d = u - u_tg
@@ -79,9 +82,9 @@ class Potential:
         return sigma * steepness - 3.0 * self.a_t * d * d * sigma * (1.0 - sigma) * excess
 
     def omega(self, q: Vector, q_tg: Vector, others: Iterable[Other]) -> Vector:
-        """Return Omega_i of (27) with the chain rule put right (E2) [m].
+        """Return Omega_i of (27) with the chain rule corrected (E2) [m; world frame].
 
-        q, q_tg: own position and immediate target [m]; others: the same of each neighbour.
+        q, q_tg: own position and immediate target [m; world frame]; others: the neighbours.
         """
         x, y, z = q[0] - q_tg[0], q[1] - q_tg[1], q[2] - q_tg[2]
         for other in others:
@@ -94,7 +97,7 @@ class Potential:
         return (x, y, z)
 
     def _push(self, r: float, between_targets: float) -> float:
-        """Return the factor of q_ij in Omega_i: k_ob U'_ob g / r, its size capped."""
+        """Return the factor of q_ij in Omega_i: k_ob U'_ob g / r, with a capped pair term."""
         g, gap = r - self.d_ob, self.gap_at_targets(between_targets)
         if g >= gap or r == 0.0:
             return 0.0

@@ -1,32 +1,31 @@
 """The adaptive Q-structure as a controller: Algorithm 4, line by line.
 
 Target-on-queue (Algorithm 1, at 5 Hz), bobber (Algorithm 2), constellation-agents (Algorithm 3),
-potentials (18)-(28), then move or turn. Plain floats throughout.
+potentials (18)-(28), then move or turn. All numbers are plain floats.
 """
 
 from math import dist, hypot, pi, radians, sqrt
 
-from agent.config import AgentSetup
+from agent.config import DEFAULT_CAST_FAR_M, AgentSetup
 from agent.controller import Intent, Senses
 from agent.guidance.bobber import bobber, cast_zone
 from agent.guidance.cone import azimuth_error, cone_of
-from agent.guidance.constellation import avoidance
-from agent.guidance.deadlock_escape import Dodge
+from agent.guidance.constellation import avoidance_of
+from agent.guidance.deadlock_escape import DeadlockEscape
 from agent.guidance.movement import DEAD_BAND_MPS, saturated, steer
 from agent.guidance.potential import Potential
-from agent.guidance.slot_selection import Choice
-from agent.messages import Vector
+from agent.guidance.slot_selection import SlotSelection
+from agent.messages import ZERO, Vector
 from agent.qstructure.target_frame import Frame
 
 GAIN = 2.0
 """c of (28) [1/s]."""
-CAST_FAR_M = 0.5
 AT_SLOT_M = 0.02
-"""So near its slot an agent takes up the queue's orientation."""
+"""Within this distance of its slot an agent takes up the queue's orientation."""
 
 
 class QStructure:
-    """Flies one agent into its slot."""
+    """Flies one agent to its slot in the formation."""
 
     def __init__(self, setup: AgentSetup) -> None:
         vehicle, control = setup.vehicle, setup.control
@@ -35,75 +34,78 @@ class QStructure:
         self._cone = cone_of(vehicle)
         self._zone = cast_zone(
             self._cone,
-            control.cast_far_m or CAST_FAR_M,
+            control.cast_far_m or DEFAULT_CAST_FAR_M,
             vehicle.max_speed_mps,
             radians(vehicle.max_yaw_rate_dps),
         )
         self._potential = Potential(control.separation_m)
-        self._choice = Choice(setup)
-        self._avoidance = avoidance(control.avoidance, control.safety_m)
-        self._dodge = Dodge(setup.id)
+        self._slot_selection = SlotSelection(setup)
+        self._avoidance = avoidance_of(control.avoidance, control.safety_m)
+        self._escape = DeadlockEscape(setup.id)
 
     def decide(self, senses: Senses) -> Intent:
-        """Return what to do now; without a place, stay and give way."""
-        q, mine, frame = senses.position, self._choice.made(senses), senses.mission.frame
-        q_toq = frame.to_world(mine.slot.point) if mine is not None else q
-        q_tg = bobber(q, senses.yaw, _led(q_toq, frame), self._zone)
+        """Return the intent; an agent without a place stays where it is and gives way."""
+        q, own, frame = senses.position, self._slot_selection.select(senses), senses.mission.frame
+        q_toq = frame.to_world(own.slot.point) if own is not None else q
+        q_tg = bobber(q, senses.yaw, _aim_point(q_toq, frame), self._zone)
         x, y, z = self._potential.omega(q, q_tg, senses.neighbours)
-        aside = self._dodge.direction(senses, q_toq)
-        if senses.obstacles and not self._dodge.rounds:
-            a, b, c = self._cleared(senses)
+        escape = self._escape.direction(senses, q_toq)
+        if senses.obstacles and not self._escape.rounds_obstacle:
+            a, b, c = self._obstacle_term(senses)
             x, y, z = x + a, y + b, z + c
-        wanted = self._wanted((-GAIN * x, -GAIN * y, -GAIN * z), aside)
+        wanted = self._wanted((-GAIN * x, -GAIN * y, -GAIN * z), escape)
         velocity, yaw = steer(wanted, senses.yaw, self._cone)
         tilt = (0.0, 0.0)
-        if mine is not None and dist(q, q_toq) < AT_SLOT_M and velocity == wanted:
-            attitude = mine.slot.attitude
-            yaw = self._heading(yaw, attitude.yaw, velocity, frame)
-            tilt = (attitude.pitch or 0.0, attitude.presence or 0.0)
+        if own is not None and dist(q, q_toq) < AT_SLOT_M and velocity == wanted:
+            attitude = own.slot.attitude
+            yaw = self._heading_at_slot(yaw, attitude.yaw, velocity, frame)
+            tilt = (attitude.pitch or 0.0, attitude.roll or 0.0)
         return Intent(
-            wanted,
-            velocity,
-            yaw % (2.0 * pi),
-            GAIN * sqrt(x * x + y * y + z * z),
-            q_tg,
-            target=q_toq if mine is not None else None,
-            place=mine.place if mine is not None else None,
+            wanted=wanted,
+            velocity=velocity,
+            yaw=yaw % (2.0 * pi),
+            force=GAIN * sqrt(x * x + y * y + z * z),
+            heading_for=q_tg,
+            target=q_toq if own is not None else None,
+            place=own.place if own is not None else None,
             tilt=tilt,
-            cost_m=self._choice.cost_m,
-            vertex=mine is not None and mine.vertex,
-            blocked=self._choice.blocked,
+            cost_m=self._slot_selection.cost_m,
+            vertex=own is not None and own.vertex,
+            blocked=self._slot_selection.blocked,
         )
 
-    def _cleared(self, senses: Senses) -> Vector:
-        """Return what surfaces near by add to Omega [m]; silent while one goes round them."""
+    def _obstacle_term(self, senses: Senses) -> Vector:
+        """Return the term that near surfaces add to Omega [m; world axes]."""
         if self._avoidance is None:
-            return (0.0, 0.0, 0.0)
+            return ZERO
         return self._avoidance.omega(senses.yaw, senses.obstacles)
 
-    def _heading(self, yaw: float, asked: float | None, velocity: Vector, frame: Frame) -> float:
-        """Return the heading at the slot [rad]: the queue's, if one can fly on with it."""
-        if asked is None:
+    def _heading_at_slot(
+        self, yaw: float, wanted_yaw: float | None, velocity: Vector, frame: Frame
+    ) -> float:
+        """Return the heading at the slot [rad]: the queue's, if the velocity stays in its cone."""
+        if wanted_yaw is None:
             return yaw
         u, v, _ = velocity
-        error = azimuth_error(u, v, asked + frame.yaw)
-        flies_on = hypot(u, v) <= DEAD_BAND_MPS or self._cone.holds(error)
-        return asked + frame.yaw if flies_on else yaw
+        error = azimuth_error(u, v, wanted_yaw + frame.yaw)
+        in_cone = hypot(u, v) <= DEAD_BAND_MPS or self._cone.holds(error)
+        return wanted_yaw + frame.yaw if in_cone else yaw
 
-    def _wanted(self, u: Vector, aside: Vector | None) -> Vector:
-        """Return u of (28) [m/s] within the vehicle's limits, and past what holds it (E23)."""
+    def _wanted(self, u: Vector, escape: Vector | None) -> Vector:
+        """Return u of (28) within the vehicle's limits, plus the escape manoeuvre (E23) [m/s]."""
         wanted = saturated(u, self._max_speed, self._max_climb)
-        if aside is None:
+        if escape is None:
             return wanted
         v = self._max_speed
-        past = (wanted[0] + v * aside[0], wanted[1] + v * aside[1], wanted[2] + v * aside[2])
-        return saturated(past, self._max_speed, self._max_climb)
+        escaping = (wanted[0] + v * escape[0], wanted[1] + v * escape[1], wanted[2] + v * escape[2])
+        return saturated(escaping, self._max_speed, self._max_climb)
 
 
-def _led(q_toq: Vector, frame: Frame) -> Vector:
-    """Return where to aim for so that a slot that moves is held [m; world frame].
+def _aim_point(q_toq: Vector, frame: Frame) -> Vector:
+    """Return the point to aim for so that a moving slot is held [m; world frame].
 
-    1 / c ahead of it: there c (q_tg - q) is the slot's own velocity, once one is at the slot.
+    It lies 1 / c ahead of the slot: once the agent is at the slot, c (q_tg - q) is the slot's own
+    velocity.
     """
     if not frame.moves:
         return q_toq

@@ -1,11 +1,12 @@
-"""The safety filter: last before the vehicle, and independent of why a velocity was wanted.
+"""The safety filter: the last step before the vehicle, independent of why a velocity is wanted.
 
-Two forms. With a ranging sensor the approach speed towards each body sensed is limited by the gap
-that is left; both vehicles of a pair keep to half of the duty, so the gap never closes, whatever
-their phases and with a command's whole life as latency. A margin covers that the direction between
-two turns while a command is flown; within it the speed across is limited too, or two that circle
-each other could eat it up little by little. Without a ranging sensor, the limit follows from what
-neighbours last told and from the speed they promised not to exceed.
+It has two forms. With a ranging sensor, the approach speed towards each sensed vehicle is limited
+by the remaining gap. Each vehicle of a pair may close only its own share of the gap, so the gap
+never closes, whatever the phases of their steps and with a command's whole life as latency. A
+margin covers that the direction between two vehicles turns while a command is flown. Within the
+margin the speed across is limited too, or two vehicles that circle each other could use the margin
+up little by little. Without a ranging sensor, the limit follows from the neighbours' last reports
+and from the speeds that they promised not to exceed.
 
 H is the longest time from a measurement to the expiry of the command made from it [s].
 """
@@ -17,39 +18,36 @@ from typing import NamedTuple
 
 from agent.guidance.cone import Cone, azimuth_error
 from agent.guidance.movement import DEAD_BAND_MPS
-from agent.messages import Vector
+from agent.messages import ZERO, Vector
 
 SHARE = 0.18
 """Share of the gap that one vehicle of a pair may close within H: 2 * SHARE <= 1/e."""
-STATIC = 2.0 * SHARE
-"""Share for what stands still: nobody else closes the gap."""
 PROMISE_S = 3.0
 LEAST_CAP_MPS = 0.05
 PASSES = 3
 ROUNDING_MPS = 1e-12
-"""What slides along a limit of zero exceeds it by rounding; that is no reason to stand still."""
+"""Tolerance: a velocity that slides along a limit of zero exceeds it by rounding."""
 
 
 class Bound(NamedTuple):
-    """One body's limits: the speed towards it and the speed across [m/s].
+    """The limits that one vehicle or surface sets to the velocity.
 
-    away: the unit vector away from the body. A negative limit asks for a retreat from what comes at
-    ``coming`` [m/s; world axes] by itself.
+    A negative limit asks for a retreat from a surface that approaches by itself.
     """
 
-    away: Vector
-    limit: float
-    aside: float = inf
-    coming: Vector = (0.0, 0.0, 0.0)
+    away: Vector  # unit vector away from the vehicle or surface [world axes]
+    limit: float  # of the speed towards it [m/s]
+    across_limit: float = inf  # of the speed across the line to it [m/s]
+    surface_velocity: Vector = ZERO  # of an approaching surface [m/s; world axes]
 
 
 class RangingFilter:
-    """Limits approach by the gap to each body sensed.
+    """Limits the approach speed by the gap to each sensed vehicle or point.
 
-    d_ob: least distance between centres [m]; max_speed [m/s]; horizon_s: H. share: of the gap, what
-    may be closed within H; STATIC for what does not move itself. creep: how fast one may go across
-    however near [m/s]: noise puts points nearer than they are, and must not hold one for ever.
-    latency_s: H without the time to brake, which makes the margin; left out: horizon_s.
+    d_ob: least distance between centres [m]; max_speed: of any vehicle [m/s]; horizon_s: H. share:
+    of the gap, closed within H at most; 2 * SHARE for what does not move. creep: speed across that
+    is always allowed [m/s], since noise shows points nearer than they are and must not hold the
+    vehicle for ever. latency_s: H without the braking time, for the margin; None: horizon_s.
     """
 
     def __init__(
@@ -70,49 +68,54 @@ class RangingFilter:
         self._creep = creep
         self._ignore_m = self._stop_m + max_speed / self._rate
 
-    def bounds(self, vehicles: Sequence[Vector]) -> list[Bound]:
-        """Return the limits from bodies at these relative positions [m; world axes]."""
+    def bounds(self, points: Sequence[Vector]) -> list[Bound]:
+        """Return the bounds of vehicles or points at relative positions [m; world axes]."""
         found = []
-        for x, y, z in vehicles:
+        for x, y, z in points:
             r = sqrt(x * x + y * y + z * z)
             if r >= self._ignore_m or r == 0.0:
                 continue
             limit = self._rate * max(0.0, r - self._stop_m)
             turning = self._turning_hz * max(0.0, r - self._d_ob)
-            aside = max(self._creep, turning) if r < self._stop_m else inf
-            found.append(Bound((-x / r, -y / r, -z / r), limit, aside))
+            across_limit = max(self._creep, turning) if r < self._stop_m else inf
+            found.append(Bound((-x / r, -y / r, -z / r), limit, across_limit))
         return found
 
-    def from_moving(self, points: Sequence[Vector], coming: Sequence[Vector]) -> list[Bound]:
-        """Return the limits from points of which some come nearer by themselves [m/s].
+    def bounds_of_moving(
+        self, points: Sequence[Vector], velocities: Sequence[Vector]
+    ) -> list[Bound]:
+        """Return the bounds of points of which some approach by themselves.
 
-        These do not share the duty, so their speed counts whole: -n.v <= share gap/H - n.coming.
-        Where it is negative, nothing holds one from going aside.
+        velocities: of the points' surfaces [m/s; world axes]; zero for a surface at rest. An
+        approaching surface keeps no share of its own, so its speed counts whole: -n.v <= share
+        gap/H - n.v_surface. Where that is negative, the speed across is not limited.
         """
         found = []
-        for (x, y, z), (u, v, w) in zip(points, coming, strict=True):
+        for (x, y, z), (u, v, w) in zip(points, velocities, strict=True):
             r = max(hypot(x, y, z), 1e-9)
             speed = -(x * u + y * v + z * w) / r
             limit = self._rate * (r - self._stop_m) - speed
             if speed <= 0.0:
                 found += self.bounds([(x, y, z)])
             elif limit < self._max_speed:
-                found.append(Bound((-x / r, -y / r, -z / r), limit, coming=(u, v, w)))
+                away = (-x / r, -y / r, -z / r)
+                found.append(Bound(away, limit, surface_velocity=(u, v, w)))
         return found
 
 
-class TelemetryRow(NamedTuple):
-    """What a neighbour last told: relative position [m], its age [s], the speed it promised."""
+class NeighbourReport(NamedTuple):
+    """What a neighbour last reported of itself."""
 
-    relative: Vector
-    age_s: float
-    speed_cap: float
+    relative: Vector  # position relative to the own centre [m; world axes]
+    age_s: float  # [s]
+    speed_cap: float  # the promised speed [m/s]
 
 
 class PromiseFilter:
-    """Limits approach by what neighbours told, for vehicles without a ranging sensor.
+    """Limits the approach speed by neighbours' reports, for vehicles without a ranging sensor.
 
-    Each broadcast promises a speed for the next 3 s; the least promise of the last 3 s is kept.
+    Each beacon promises a speed for the next 3 s; a vehicle keeps its lowest promise of the last
+    3 s.
     """
 
     def __init__(self, d_ob: float, max_speed: float, horizon_s: float) -> None:
@@ -121,10 +124,10 @@ class PromiseFilter:
         self._horizon_s = horizon_s
         self._promises: deque[tuple[float, float]] = deque()
 
-    def promise(self, now_s: float, told: Sequence[TelemetryRow]) -> float:
+    def promise(self, now_s: float, reports: Sequence[NeighbourReport]) -> float:
         """Return the speed to promise now [m/s], and remember it."""
         gap = min(
-            (hypot(*each.relative) - self._d_ob - self._max_speed * each.age_s for each in told),
+            (hypot(*each.relative) - self._d_ob - self._max_speed * each.age_s for each in reports),
             default=float("inf"),
         )
         cap = min(max(gap / 1.3, LEAST_CAP_MPS), self._max_speed)
@@ -135,13 +138,13 @@ class PromiseFilter:
 
     @property
     def speed_cap(self) -> float:
-        """The least speed promised in the last 3 s [m/s]."""
+        """The lowest speed promised in the last 3 s [m/s]."""
         return min((cap for _, cap in self._promises), default=LEAST_CAP_MPS)
 
-    def bounds(self, told: Sequence[TelemetryRow]) -> list[Bound]:
-        """Return the limits from what was told; zero where a neighbour may be too near already."""
+    def bounds(self, reports: Sequence[NeighbourReport]) -> list[Bound]:
+        """Return the bounds of neighbours; zero where one may already be too near."""
         found = []
-        for relative, age_s, promised in told:
+        for relative, age_s, promised in reports:
             r = hypot(*relative)
             if r == 0.0:
                 continue
@@ -155,22 +158,23 @@ class PromiseFilter:
 def limited(velocity: Vector, bounds: Sequence[Bound], yaw: float, cone: Cone) -> Vector:
     """Return a velocity that keeps every bound [m/s].
 
-    It first slides along what is in the way, and is shortened where it is still too fast. A slide
-    that leaves the cone about ``yaw`` [rad] is not flown: of its climb alone, and of the velocity
-    merely shortened, the faster is.
+    It first slides along the bounds that it breaks, and is shortened if it is still too fast. A
+    slide that leaves the cone about ``yaw`` [rad] is not flown; then the result is the faster one
+    of its climb alone and of the velocity merely shortened.
     """
     if all(_keeps(velocity, bound) for bound in bounds):
         return velocity
     sliding = _slid_along(velocity, bounds)
     if _in_cone(sliding, yaw, cone):
-        return _kept(sliding, bounds)
-    climbing = _kept((0.0, 0.0, sliding[2]), bounds)
-    return max(climbing, _kept(velocity, bounds), key=lambda v: hypot(*v))
+        return _scaled_down(sliding, bounds)
+    climbing = _scaled_down((0.0, 0.0, sliding[2]), bounds)
+    return max(climbing, _scaled_down(velocity, bounds), key=lambda v: hypot(*v))
 
 
 def slid(velocity: Vector, bounds: Sequence[Bound]) -> Vector:
-    """Return a velocity slid along every bound; those that are not negative it keeps [m/s]."""
-    return _kept(_slid_along(velocity, bounds), [each for each in bounds if each.limit >= 0.0])
+    """Return a velocity slid along every bound; it keeps those that are not negative [m/s]."""
+    firm = [each for each in bounds if each.limit >= 0.0]
+    return _scaled_down(_slid_along(velocity, bounds), firm)
 
 
 def shortened(velocity: Vector, max_speed: float) -> Vector:
@@ -186,22 +190,22 @@ def _slid_along(velocity: Vector, bounds: Sequence[Bound]) -> Vector:
     for _ in range(PASSES):
         for bound in bounds:
             if not _keeps(velocity, bound):
-                velocity = _slid(velocity, bound)
+                velocity = _cut(velocity, bound)
     return velocity
 
 
 def _keeps(velocity: Vector, bound: Bound) -> bool:
-    if bound.aside < inf and _across(velocity, bound) > bound.aside + ROUNDING_MPS:
+    if bound.across_limit < inf and _across(velocity, bound) > bound.across_limit + ROUNDING_MPS:
         return False
     return approach_of(velocity, bound) <= bound.limit + ROUNDING_MPS
 
 
-def _slid(velocity: Vector, bound: Bound) -> Vector:
-    """Return a velocity with the parts towards the body and across cut to its limits [m/s]."""
+def _cut(velocity: Vector, bound: Bound) -> Vector:
+    """Return a velocity whose parts towards and across the bound are cut to its limits [m/s]."""
     n, approach = bound.away, approach_of(velocity, bound)
     kept, share = -min(approach, bound.limit), 1.0
-    if bound.aside < inf:
-        share = min(1.0, bound.aside / max(_across(velocity, bound), 1e-12))
+    if bound.across_limit < inf:
+        share = min(1.0, bound.across_limit / max(_across(velocity, bound), 1e-12))
     return (
         share * (velocity[0] + approach * n[0]) + kept * n[0],
         share * (velocity[1] + approach * n[1]) + kept * n[1],
@@ -209,20 +213,21 @@ def _slid(velocity: Vector, bound: Bound) -> Vector:
     )
 
 
-def _kept(velocity: Vector, bounds: Sequence[Bound]) -> Vector:
+def _scaled_down(velocity: Vector, bounds: Sequence[Bound]) -> Vector:
+    """Return a velocity scaled down until it keeps every bound [m/s]."""
     scale = 1.0
     for bound in bounds:
         approach = approach_of(velocity, bound)
         if approach * scale > bound.limit + ROUNDING_MPS:
             scale = bound.limit / approach
-        across = _across(velocity, bound) if bound.aside < inf else 0.0
-        if across * scale > bound.aside + ROUNDING_MPS:
-            scale = bound.aside / across
+        across = _across(velocity, bound) if bound.across_limit < inf else 0.0
+        if across * scale > bound.across_limit + ROUNDING_MPS:
+            scale = bound.across_limit / across
     return (velocity[0] * scale, velocity[1] * scale, velocity[2] * scale)
 
 
 def _across(velocity: Vector, bound: Bound) -> float:
-    """Return the speed across the line to the body [m/s]."""
+    """Return the speed across the line to a bound's vehicle or surface [m/s]."""
     n, approach = bound.away, approach_of(velocity, bound)
     return hypot(
         velocity[0] + approach * n[0], velocity[1] + approach * n[1], velocity[2] + approach * n[2]
@@ -230,7 +235,7 @@ def _across(velocity: Vector, bound: Bound) -> float:
 
 
 def approach_of(velocity: Vector, bound: Bound) -> float:
-    """Return the speed towards a body [m/s]."""
+    """Return the speed towards a bound's vehicle or surface [m/s]."""
     n = bound.away
     return -(velocity[0] * n[0] + velocity[1] * n[1] + velocity[2] * n[2])
 

@@ -1,66 +1,68 @@
-"""The last word before the vehicle: which bounds hold for one agent, and how it keeps them.
+"""The safety monitor: which bounds hold for one agent, and how its kind of vehicle keeps them.
 
-Bodies are limited by what is sensed where there is a ranging sensor, else by what neighbours told;
-obstacles by the points near by, however they are known. To what comes nearer by itself it gives
-way, where nearest points are sensed: points that were scanned are taken to stand.
+Vehicles set bounds by what is sensed if there is a ranging sensor, else by the neighbours' reports.
+Obstacles set bounds by their near points, from whichever sensor. The agent retreats from a surface
+that approaches by itself only if it senses nearest points; scanned points count as at rest.
 """
 
 from collections.abc import Callable
 from math import hypot, radians
+from typing import assert_never
 
-from agent.config import AgentSetup
+from agent.config import AgentSetup, VehicleKind
 from agent.controller import Senses
 from agent.guidance.cone import cone_of
-from agent.guidance.evasion import retreated
-from agent.guidance.nonholonomic import forward_kept, forward_retreat
+from agent.guidance.evasion import evasive_velocity
+from agent.guidance.nonholonomic import forward_evasion, forward_limited
 from agent.guidance.safety_filter import (
     ROUNDING_MPS,
     SHARE,
     Bound,
+    NeighbourReport,
     PromiseFilter,
     RangingFilter,
-    TelemetryRow,
     approach_of,
     limited,
     shortened,
 )
-from agent.messages import Vector
-from agent.sensing.ray_pattern import KINDS
-from agent.sensing.surface_motion import Motion
+from agent.messages import ZERO, Vector
+from agent.sensing.ray_pattern import SCANNERS
+from agent.sensing.surface_motion import SurfaceMotion
 
-BRAKING = 0.25
+BRAKING_SHARE = 0.25
 """Share of the gap that one vehicle of bounded acceleration may close until it stands."""
-STAND = (0.0, 0.0, 0.0)
-SCANNED_M = 0.05
-"""So much farther one stays from points that were scanned: noise, and a coarse pattern."""
+SCAN_MARGIN_M = 0.05
+"""Extra distance to scanned points, for noise and a coarse pattern."""
 CREEP = 0.3
-"""Such a share of its speed one may go across a point that was scanned, however near it is."""
+"""Share of its speed at which a vehicle may always fly across a scanned point."""
 
 
-class Guard:
-    """Keeps one agent from all that it knows of."""
+class SafetyMonitor:
+    """Keeps one agent's velocity within the bounds of all vehicles and obstacles it knows of.
+
+    speed_cap: the speed that the agent promises to its neighbours [m/s].
+    """
 
     def __init__(self, setup: AgentSetup) -> None:
         limits, control = setup.vehicle, setup.control
         self._latency_s = setup.command_ticks / setup.tick_hz
-        self._accelerates = limits.kind == "accelerating"
+        self._kind = limits.kind
         self._brake_mps2 = limits.max_accel_mps2
-        self._sway = radians(limits.max_yaw_rate_dps) * self._latency_s
-        self._forward = limits.kind == "forward"
+        self._turn = radians(limits.max_yaw_rate_dps) * self._latency_s
         horizon_s = self._latency_s + self._stopping_s(setup.fleet_max_speed_mps)
         self._horizon_s = horizon_s
-        share = BRAKING if self._accelerates else SHARE
+        share = _share_of(limits.kind)
         filtered = (control.separation_m, setup.fleet_max_speed_mps, horizon_s)
-        scans = any(kind in limits.sensors for kind in KINDS)
-        scanned_m, creep = (SCANNED_M, CREEP * limits.max_speed_mps) if scans else (0.0, 0.0)
+        scans = any(kind in limits.sensors for kind in SCANNERS)
+        margin_m, creep = (SCAN_MARGIN_M, CREEP * limits.max_speed_mps) if scans else (0.0, 0.0)
         self._cone = cone_of(limits)
         self._speeds = limits.max_speed_mps, limits.max_climb_mps
-        self._motion = None if scans else Motion(setup.sensor.proximity.noise_m)
+        self._motion = None if scans else SurfaceMotion(setup.sensor.proximity.noise_m)
         self._ranging = None
         if "proximity" in limits.sensors:
             self._ranging = RangingFilter(*filtered, share, latency_s=self._latency_s)
         self._clearing = RangingFilter(
-            control.clearance_m + scanned_m,
+            control.clearance_m + margin_m,
             limits.max_speed_mps,
             horizon_s,
             2.0 * share,
@@ -70,42 +72,52 @@ class Guard:
         self._promises = PromiseFilter(*filtered)
         self.speed_cap = limits.max_speed_mps
 
-    def safe(
-        self, wanted: Vector, senses: Senses, told: Callable[[], list[TelemetryRow]]
+    def safe_velocity(
+        self, wanted: Vector, senses: Senses, reports: Callable[[], list[NeighbourReport]]
     ) -> Vector:
-        """Return the velocity that is safe to fly [m/s]; told: what neighbours last told."""
-        bounds = self._cleared(senses) if senses.obstacles else []
+        """Return the velocity that is safe to fly [m/s; world frame].
+
+        reports: returns the neighbours' last reports; called only without a ranging sensor.
+        """
+        bounds = self._obstacle_bounds(senses) if senses.obstacles else []
         if self._ranging is not None:
             bounds += self._ranging.bounds(senses.vehicles)
-            return self._kept(wanted, bounds, senses)
-        known = told()
+            return self._limited(wanted, bounds, senses)
+        known = reports()
         self._promises.promise(senses.now_s, known)
         self.speed_cap = self._promises.speed_cap
         bounds += self._promises.bounds(known)
-        return shortened(self._kept(wanted, bounds, senses), self.speed_cap)
+        return shortened(self._limited(wanted, bounds, senses), self.speed_cap)
 
-    def _cleared(self, senses: Senses) -> list[Bound]:
-        """Return the limits from obstacles; negative where something comes too fast."""
+    def _obstacle_bounds(self, senses: Senses) -> list[Bound]:
+        """Return the bounds of obstacles; negative where a surface approaches too fast."""
         points = senses.obstacles
         if self._motion is not None:
-            coming = self._motion.coming(senses.now_s, senses.position, points)
-            if coming:
-                return self._clearing.from_moving(points, coming)
+            velocities = self._motion.approaching(senses.now_s, senses.position, points)
+            if velocities:
+                return self._clearing.bounds_of_moving(points, velocities)
         return self._clearing.bounds(points)
 
-    def _kept(self, wanted: Vector, bounds: list[Bound], senses: Senses) -> Vector:
-        comes = bool(senses.obstacles) and any(bound.limit < 0.0 for bound in bounds)
-        if self._forward:
-            if comes:
-                return forward_retreat(bounds, senses.yaw, self._sway, *self._speeds)
-            return forward_kept(wanted, bounds, senses.yaw, self._sway)
-        if self._accelerates and self._too_fast(senses.velocity, bounds):
-            return STAND
-        if comes:
-            return retreated(wanted, bounds, *self._speeds)
+    def _limited(self, wanted: Vector, bounds: list[Bound], senses: Senses) -> Vector:
+        """Return the velocity that keeps the bounds, as the kind of vehicle can fly it [m/s]."""
+        must_retreat = bool(senses.obstacles) and any(bound.limit < 0.0 for bound in bounds)
+        match self._kind:
+            case "forward":
+                if must_retreat:
+                    return forward_evasion(bounds, senses.yaw, self._turn, *self._speeds)
+                return forward_limited(wanted, bounds, senses.yaw, self._turn)
+            case "accelerating":
+                if self._must_brake(senses.velocity, bounds):
+                    return ZERO
+            case "kinematic":
+                pass
+            case _:
+                assert_never(self._kind)
+        if must_retreat:
+            return evasive_velocity(wanted, bounds, *self._speeds)
         return limited(wanted, bounds, senses.yaw, self._cone)
 
-    def _too_fast(self, velocity: Vector, bounds: list[Bound]) -> bool:
+    def _must_brake(self, velocity: Vector, bounds: list[Bound]) -> bool:
         """Whether a vehicle under way must brake straight: -n.v (H + |v|/2a) > 0.25 gap."""
         needs_s = self._latency_s + self._stopping_s(hypot(*velocity))
         return any(
@@ -115,5 +127,22 @@ class Guard:
         )
 
     def _stopping_s(self, speed: float) -> float:
-        """Return |v|/2a: stopping distance over speed [s]; 0 for what stops at once."""
-        return 0.5 * speed / self._brake_mps2 if self._accelerates else 0.0
+        """Return |v|/2a: stopping distance over speed [s]; 0 for a vehicle that stops at once."""
+        match self._kind:
+            case "accelerating":
+                return 0.5 * speed / self._brake_mps2
+            case "kinematic" | "forward":
+                return 0.0
+            case _:
+                assert_never(self._kind)
+
+
+def _share_of(kind: VehicleKind) -> float:
+    """Return the share of the gap that one vehicle of a pair may close within H."""
+    match kind:
+        case "accelerating":
+            return BRAKING_SHARE
+        case "kinematic" | "forward":
+            return SHARE
+        case _:
+            assert_never(kind)

@@ -1,8 +1,8 @@
-"""Algorithm 1: which slot of which queue is mine, from whom I hear and what they claim.
+"""Target-on-queue: the own slot, from the known team and its claims (Algorithm 1).
 
-The paper orders the agents of a queue by distance, literally each time anew. Here a place once
-claimed is kept (E17): the assignment of :mod:`agent.comms.allocation` gives it up only for a gain
-beyond noise. A vertex shared by queues has one agent (E16); slots stand by arc length (E13).
+The paper orders the agents of a queue by distance, anew each time. Here a claimed place is kept
+(E17): the assignment of :mod:`agent.comms.allocation` gives it up only for a gain beyond noise. A
+vertex shared by queues has one agent (E16); slots stand by arc length (E13).
 """
 
 from collections.abc import Iterable, Sequence
@@ -18,14 +18,11 @@ from agent.qstructure.target_frame import Frame
 
 
 class OwnTarget(NamedTuple):
-    """An agent's place, where it is, and what comes with it.
-
-    slot [m, rad; target's frame]; vertex: whether the holder is a queue-vertex agent.
-    """
+    """An agent's place and its slot."""
 
     place: Place
-    slot: Slot
-    vertex: bool
+    slot: Slot  # [m, rad; target's frame]
+    vertex: bool  # whether its holder is a queue-vertex agent
 
 
 class TargetOnQueue:
@@ -33,69 +30,76 @@ class TargetOnQueue:
 
     def __init__(self, own_id: int, spacing: float) -> None:
         self._own_id = own_id
-        self._blocking_m = 0.5 * spacing
-        self._seen: tuple[Layout, Frame, list[Vector]] | None = None
+        self._blocks_within_m = 0.5 * spacing
+        self._cached: tuple[Layout, Frame, list[Vector]] | None = None
 
     def choose(
         self, mission: Flown, team: Sequence[Peer], blocked: frozenset[Place]
     ) -> OwnTarget | None:
-        """Return the own target; None where all queues are full.
+        """Return the own target; None if all queues are full.
 
-        team: all members known, oneself included, sorted by id; blocked: places that cannot be had.
+        team: all known members, the own agent included, sorted by id; blocked: the places that are
+        not available.
         """
         layout = mission.formation.layout(len(team), blocked)
         points = self._points(layout, mission.frame)
         place = own_place(self._own_id, team, layout.places, points)
         if place is None:
             return None
-        return OwnTarget(place, layout.slots[place], place in layout.heads)
+        return OwnTarget(place=place, slot=layout.slots[place], vertex=place in layout.heads)
 
-    def blocked(self, mission: Flown, agents: int, silent: Sequence[Vector]) -> tuple[Place, ...]:
-        """Return the places of a team that are within d_ir / 2 of a silent body (E18)."""
+    def taken_by(
+        self, mission: Flown, agents: int, vehicles: Sequence[Vector]
+    ) -> tuple[Place, ...]:
+        """Return the places of a team that are within d_ir / 2 of an unidentified vehicle (E18).
+
+        vehicles [m; world frame]; at most MAX_PLACES places.
+        """
         found: set[Place] = set()
-        while silent and len(found) < MAX_PLACES:
+        while vehicles and len(found) < MAX_PLACES:
             layout = mission.formation.layout(agents, frozenset(found))
             points = self._points(layout, mission.frame)
             new = {
                 place
                 for place, point in zip(layout.places, points, strict=True)
-                if any(dist(point, body) <= self._blocking_m for body in silent)
+                if any(dist(point, vehicle) <= self._blocks_within_m for vehicle in vehicles)
             }
             if not new:
                 break
             found |= new
         return tuple(sorted(found))[:MAX_PLACES]
 
-    def beside(
-        self, mission: Flown, agents: int, places: Iterable[Place], bodies: Sequence[Vector]
+    def near_vehicles(
+        self, mission: Flown, agents: int, places: Iterable[Place], vehicles: Sequence[Vector]
     ) -> list[Place]:
-        """Return which of some places are within d_ir / 2 of a body [m; world frame]."""
+        """Return which of some places are within d_ir / 2 of a vehicle [m; world frame]."""
         points = [(place, self.point(mission, agents, place)) for place in places]
         return [
             place
             for place, point in points
-            if point is not None and any(dist(point, body) <= self._blocking_m for body in bodies)
+            if point is not None
+            and any(dist(point, vehicle) <= self._blocks_within_m for vehicle in vehicles)
         ]
 
     def point(self, mission: Flown, agents: int, place: Place) -> Vector | None:
-        """Return where a place is [m; world frame] in a team of that size; None for no place."""
+        """Return a place's position in a team of that size [m; world frame]; None if not there."""
         slot = mission.formation.slot(place, agents)
         return mission.frame.to_world(slot.point) if slot is not None else None
 
-    def believed(
+    def plausible(
         self,
         mission: Flown,
         agents: int,
-        told: frozenset[Place],
+        reported: frozenset[Place],
         here: Vector,
         near: Sequence[Vector],
     ) -> frozenset[Place]:
-        """Return which places that others tell of as blocked may be so, by what one sees oneself.
+        """Return the places reported as blocked, without those that the agent sees empty itself.
 
-        here [m; world frame]: where one is; near: the bodies sensed from there, relative to it [m].
+        here: own position [m; world frame]; near: sensed vehicles relative to it [m; world axes].
         """
         return frozenset(
-            place for place in told if not self._is_empty(mission, agents, place, here, near)
+            place for place in reported if not self._is_empty(mission, agents, place, here, near)
         )
 
     def _is_empty(
@@ -106,12 +110,12 @@ class TargetOnQueue:
             return False
         x, y, z = point
         away = (x - here[0], y - here[1], z - here[2])
-        in_sight = hypot(*away) <= SURE_RANGE_M - self._blocking_m
-        return in_sight and all(dist(away, body) > self._blocking_m for body in near)
+        in_sight = hypot(*away) <= SURE_RANGE_M - self._blocks_within_m
+        return in_sight and all(dist(away, vehicle) > self._blocks_within_m for vehicle in near)
 
     def _points(self, layout: Layout, frame: Frame) -> list[Vector]:
-        """Return where a layout's places are [m; world frame]; remembered while both stay."""
-        if self._seen is None or self._seen[0] is not layout or self._seen[1] is not frame:
+        """Return the positions of a layout's places [m; world frame]; cached while both stay."""
+        if self._cached is None or self._cached[0] is not layout or self._cached[1] is not frame:
             points = [frame.to_world(layout.slots[place].point) for place in layout.places]
-            self._seen = (layout, frame, points)
-        return self._seen[2]
+            self._cached = (layout, frame, points)
+        return self._cached[2]

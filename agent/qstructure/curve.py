@@ -1,8 +1,8 @@
-"""Curves by arc length: whatever parameter a curve is written in, slots stand by metres along it.
+"""Curves by arc length: slots stand by metres along a curve, whatever its parameter.
 
-The curve is walked once, in pieces of at most a centimetre, as far as somebody asks; a table then
-answers which parameter belongs to an arc length. The walk halves its step where the curve is fast
-or bends, so a jump shows as a step that no halving makes short.
+The curve is measured once, in pieces of at most a centimetre, as far as it is asked for. A table
+then gives the parameter of an arc length. The step is halved where the curve is fast or bends, so a
+jump shows as a step that no halving makes short.
 """
 
 from bisect import bisect_right
@@ -12,9 +12,12 @@ from math import dist, inf
 from agent.messages import Vector
 
 PIECE_M = 0.01
+"""Longest piece of the table."""
 BEND_M = 1e-5
+"""Most by which a piece with its middle point is longer than its chord."""
 LEAST_STEP = 1e-10
 GREATEST_STEP = 0.5
+"""Bounds of a piece's step in the curve's own parameter."""
 STANDSTILL_STEPS = 2000
 STANDSTILL_M = 1e-6
 SAMPLES = 1000
@@ -22,13 +25,13 @@ JUMP_M = 0.02
 
 
 class CurveError(ValueError):
-    """A curve that cannot be walked: it jumps, stands still, or ends too soon."""
+    """A curve that cannot be measured: it jumps, stands still, or ends too soon."""
 
 
-class Walk:
-    """A curve, walked from parameter 0 on.
+class ArcLengthCurve:
+    """A curve by arc length, measured from parameter 0 on.
 
-    at: the curve by its parameter [m]; ends: the last parameter there is.
+    at: the curve by its own parameter [m]; ends: its last parameter.
     """
 
     def __init__(self, at: Callable[[float], Vector], ends: float = inf) -> None:
@@ -40,15 +43,15 @@ class Walk:
         self._step = 1e-3
 
     def reaches(self, s: float) -> bool:
-        """Walk on, and return whether the curve is at least that long [m]."""
+        """Measure on as needed; return whether the curve is at least ``s`` long [m]."""
         while self._lengths[-1] < s:
             if self._parameters[-1] >= self._ends:
                 return False
-            self._walk_on()
+            self._measure_piece()
         return True
 
     def length(self) -> float:
-        """Return the whole length of a curve that ends [m]."""
+        """Return the length of a curve that ends [m]."""
         self.reaches(inf)
         return self._lengths[-1]
 
@@ -67,8 +70,8 @@ class Walk:
     def check(self, s: float) -> None:
         """Raise CurveError if the curve jumps somewhere on the way to arc length s [m].
 
-        A walk never gets past a pole, since the way there has no end; so the parameters up to s
-        are looked at too, for that is how far the writer of a curve in metres thinks.
+        Measuring never gets past a pole, since the way there has no end. So the parameters up to s
+        are checked too, for the author of a curve in metres expects it to reach that far.
         """
         last = min(max(self.parameter(s), s), self._ends)
         here = self._at(0.0)
@@ -80,7 +83,7 @@ class Walk:
             here = there
 
     def _check_jump(self, start: float, end: float) -> None:
-        """Halve an interval towards its longer half: on a curve it shrinks, at a jump it stays."""
+        """Halve an interval towards its longer half: it shrinks unless there is a jump."""
         for _ in range(50):
             middle = 0.5 * (start + end)
             first = dist(self._at(start), self._at(middle))
@@ -95,8 +98,8 @@ class Walk:
         """Return the point at arc length s [m]."""
         return self._at(self.parameter(s))
 
-    def _walk_on(self) -> None:
-        """Add one piece, of a length that the table can be straight between."""
+    def _measure_piece(self) -> None:
+        """Add one piece, so short that the table may interpolate linearly within it."""
         start = self._parameters[-1]
         while True:
             step = min(self._step, self._ends - start)

@@ -1,7 +1,7 @@
-"""Expressions in one variable, as formation files write them: ``"2*cos(s)"``, ``"5*d"``.
+"""Expressions in one variable, as in formation files: ``"2*cos(s)"``, ``"5*d"``.
 
-Parsed by simpleeval, which walks the syntax tree and cannot run code. Only arithmetic is left of
-what it knows: a comparison, a text or an attribute is refused before it is evaluated.
+simpleeval evaluates them: it walks the syntax tree and cannot run code. Only arithmetic is allowed;
+a comparison, a text or an attribute is rejected before evaluation.
 """
 
 import ast
@@ -11,11 +11,11 @@ from typing import Any
 
 from simpleeval import InvalidExpression, SimpleEval
 
-MAX_LENGTH = 300
+MAX_EXPRESSION_LENGTH = 300
 
 
 def _power(base: float, exponent: float) -> float:
-    """Powers in floating point: those of integers can fill memory."""
+    """Return a power in floating point: powers of integers can fill memory."""
     return float(base) ** float(exponent)  # type: ignore[no-any-return]
 
 
@@ -40,7 +40,7 @@ CONSTANTS = {"pi": math.pi, "e": math.e, "tau": math.tau}
 
 
 class ExpressionError(ValueError):
-    """An expression that is none, or that has no finite value somewhere."""
+    """A text that is no expression, or an expression without a finite value somewhere."""
 
 
 class Expression:
@@ -52,16 +52,16 @@ class Expression:
         self._evaluator = SimpleEval(
             operators=OPERATORS, functions=FUNCTIONS, names={**CONSTANTS, variable: 0.0}
         )
-        if len(text) > MAX_LENGTH:
-            raise ExpressionError(f"longer than {MAX_LENGTH} characters")
+        if len(text) > MAX_EXPRESSION_LENGTH:
+            raise ExpressionError(f"longer than {MAX_EXPRESSION_LENGTH} characters")
         try:
             self._tree = ast.parse(text.strip(), mode="eval").body
         except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
-            raise ExpressionError(f"{text!r} is no expression in {variable}") from error
+            raise ExpressionError(f"{text!r} is not an expression in {variable}") from error
         self._check_nodes()
 
     def __call__(self, value: float) -> float:
-        """Return the value there, or raise ExpressionError where there is no finite one."""
+        """Return the expression's value; raise ExpressionError if it is not finite."""
         self._evaluator.names[self.variable] = value
         try:
             result = self._evaluator.eval(self.text, previously_parsed=self._tree)
@@ -71,7 +71,7 @@ class Expression:
         except InvalidExpression as error:
             raise ExpressionError(f"{self.text!r}: {error}") from error
         if isinstance(result, complex):
-            raise ExpressionError(f"{self._at(value)} is no real number")
+            raise ExpressionError(f"{self._at(value)} is not a real number")
         if not math.isfinite(number):
             raise ExpressionError(f"{self._at(value)} is not finite")
         return number
@@ -85,10 +85,10 @@ class Expression:
             number = not isinstance(node, ast.Constant) or type(node.value) in {int, float}
             if not isinstance(node, NODES) or not number:
                 raise ExpressionError(
-                    f"{self.text!r} is not only numbers, {self.variable}, + - * / ** and functions"
+                    f"{self.text!r}: allowed are numbers, {self.variable}, + - * / ** and functions"
                 )
             if isinstance(node, ast.Name) and node.id not in known:
                 raise ExpressionError(
-                    f"{self.text!r}: {node.id!r} is unknown; there are {self.variable}, "
-                    f"{', '.join(CONSTANTS)} and functions like sin, sqrt, min"
+                    f"{self.text!r}: {node.id!r} is unknown; allowed are {self.variable}, "
+                    f"{', '.join(CONSTANTS)} and functions such as sin, sqrt, min"
                 )

@@ -1,7 +1,7 @@
-"""Formations: Definition 3. What a team looks like, not who stands where.
+"""Formations: Definition 3. The places of a team, not which agent takes which place.
 
-The ``...Spec`` structures are the tables of a formation file; :class:`Formation` is what agents
-compute with, and a :class:`Layout` is the formation filled by a team of one size.
+The ``...Spec`` structures are the tables of a formation file. :class:`Formation` is the geometry
+that agents compute with, and a :class:`Layout` is a formation filled by a team of one size.
 """
 
 from collections.abc import Sequence
@@ -25,13 +25,11 @@ from agent.qstructure.queue import Queue, QueueError
 from agent.qstructure.shape import ShapeError, ShapeSpec, Straight, shape_of
 
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
-
-
-NOTHING: frozenset[Place] = frozenset()
+NO_PLACES: frozenset[Place] = frozenset()
 
 
 class FormationError(ValueError):
-    """A formation that cannot be flown; ``key`` names the offending key."""
+    """A formation that cannot be flown; ``key`` is the offending key."""
 
     def __init__(self, key: str, detail: str) -> None:
         super().__init__(f"{key}: {detail}")
@@ -42,9 +40,9 @@ class FormationError(ValueError):
 class QueueSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A queue's table: Q_j = (V_j, S_j, C_j, O_j) of Definition 4.
 
-    vertices: names; one for an open queue, more for a closed one. shape: may be left out of a
-    closed queue, which then runs straight from vertex to vertex. capacity: share of the team, left
-    out: equal shares. orientation: left out: free.
+    vertices: names, one for an open queue, more for a closed one. shape: a closed queue without a
+    shape runs straight from vertex to vertex. capacity: share of the team; left out: equal shares.
+    orientation: left out: free.
     """
 
     name: Name
@@ -55,7 +53,7 @@ class QueueSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_de
 
 
 class FormationSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A formation's file: F = (Q, V_F) of Definition 3; vertices [m; target's frame]."""
+    """A formation file: F = (Q, V_F) of Definition 3; vertices [m; target's frame]."""
 
     name: Name
     vertices: Annotated[
@@ -65,32 +63,28 @@ class FormationSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omi
 
 
 class Slot(NamedTuple):
-    """Where a place is: point [m; target's frame], arc length [m], attitude wanted."""
+    """The geometry of a place."""
 
-    point: Vector
-    arc_length: float
+    point: Vector  # [m; target's frame]
+    arc_length: float  # from the queue's first vertex [m]
     attitude: Attitude
 
 
 class Layout(NamedTuple):
-    """A formation filled by a team: its places in the order they fill, and where each is.
+    """A formation filled by a team of one size."""
 
-    unplaced: how many of the team find no place, because every queue is closed and full. heads: the
-    places whose holders are queue-vertex agents.
-    """
-
-    places: tuple[Place, ...]
+    places: tuple[Place, ...]  # in the order in which they fill
     slots: dict[Place, Slot]
-    unplaced: int
-    heads: frozenset[Place]
+    unplaced: int  # agents without a place, because every queue is closed and full
+    heads: frozenset[Place]  # places whose holders are queue-vertex agents
 
 
 class Formation:
     """The geometry of a formation, d_ir = ``spacing`` [m], and a team's division over its queues.
 
     A place is (queue, rank): the ranks of a queue's vertices come first, in order, then its members
-    along the curve. A vertex that queues share is held in common, under the name of the first of
-    them. Raises :class:`FormationError` when the tables contradict themselves.
+    along the curve. A vertex shared by several queues is one place, of the first of these queues.
+    Raises :class:`FormationError` if the tables contradict each other.
     """
 
     def __init__(self, spec: FormationSpec, spacing: float) -> None:
@@ -104,15 +98,15 @@ class Formation:
         self.vertex_places = {name: places[0] for name, places in holders.items()}
         self.common = tuple(places[0] for places in holders.values() if len(places) > 1)
         self._own = self._own_vertices(holders)
-        self._through: dict[tuple[int, int], frozenset[int]] = {
+        self._queues_of_vertex: dict[tuple[int, int], frozenset[int]] = {
             places[0]: frozenset(place.queue for place in places) for places in holders.values()
         }
         self.layout = cache(self._layout)
 
     def slot(self, place: Place, agents: int) -> Slot | None:
-        """Return where a place is in a team of that size; None for a place that there is not.
+        """Return a place's slot in a team of that size; None if there is no such place.
 
-        On an open queue a place is where it is, whatever the size of the team.
+        On an open queue a place's slot does not depend on the size of the team.
         """
         found = self.layout(agents).slots.get(place)
         if found is not None:
@@ -124,53 +118,53 @@ class Formation:
         return self._slot(place.queue, self.queues[place.queue].members(place.rank)[-1])
 
     def queues_of(self, place: Place | tuple[int, int]) -> frozenset[int]:
-        """Return the queues that a place belongs to: of a vertex, all that pass through it."""
-        return self._through.get(place) or frozenset(place[:1])
+        """Return the queues that a place belongs to; for a vertex, all that pass through it."""
+        return self._queues_of_vertex.get(place) or frozenset(place[:1])
 
-    def divide(self, agents: int, blocked: frozenset[Place] = NOTHING) -> tuple[int, ...]:
-        """Return how many agents each queue gets besides the common ones of shared vertices.
+    def divide(self, agents: int, blocked: frozenset[Place] = NO_PLACES) -> tuple[int, ...]:
+        """Return how many agents each queue gets besides those of shared vertices.
 
-        Vertices first, then largest remainder over the capacities, ties to the queue named first
-        (E16). What a closed queue cannot hold goes to those that can. blocked: places that cannot
-        be had, since a dead body hovers there (E18).
+        Vertices come first, then the largest remainder over the capacities; ties go to the queue
+        named first (E16). What a closed queue cannot hold goes to queues that can. blocked: places
+        that are not available, since an unidentified vehicle hovers there (E18).
         """
-        most = [self._most(j, blocked) for j in range(len(self.queues))]
-        return self._divide(agents, most, blocked)
+        bounds = [self._capacity_of(j, blocked) for j in range(len(self.queues))]
+        return self._divide(agents, bounds, blocked)
 
     def _divide(
-        self, agents: int, most: list[float], blocked: frozenset[Place] = NOTHING
+        self, agents: int, bounds: list[float], blocked: frozenset[Place] = NO_PLACES
     ) -> tuple[int, ...]:
-        """Divide with at most so many in each queue.
+        """Divide with a bound for each queue.
 
-        One agent after the other goes where most are wanting: the method of largest remainders,
+        One agent after another goes to the queue that lacks most: the method of largest remainders,
         with bounds.
         """
-        left = max(0, agents - len(_but(self.common, blocked)))
-        owned = [len(_but(own, blocked)) for own in self._own]
-        counts = owned if left >= sum(owned) else [0] * len(most)
+        left = max(0, agents - len(_without(self.common, blocked)))
+        owned = [len(_without(own, blocked)) for own in self._own]
+        counts = owned if left >= sum(owned) else [0] * len(bounds)
         for _ in range(left - sum(counts)):
-            free = [j for j in range(len(counts)) if counts[j] < most[j]]
+            free = [j for j in range(len(counts)) if counts[j] < bounds[j]]
             if not free:
                 break
-            wanting = {j: round(self.capacities[j] * left - counts[j], 9) for j in free}
-            counts[max(free, key=lambda j: (wanting[j], -j))] += 1
+            lacking = {j: round(self.capacities[j] * left - counts[j], 9) for j in free}
+            counts[max(free, key=lambda j: (lacking[j], -j))] += 1
         return tuple(counts)
 
     def check(self, agents: int, least_m: float) -> None:
-        """Raise FormationError unless such a team can stand in it, ``least_m`` [m] apart."""
+        """Raise FormationError unless a team of that size fits, its slots ``least_m`` [m] apart."""
         layout = self._checked_layout(agents)
         if layout.unplaced:
             raise FormationError(
                 "queue",
                 f"all queues are closed and full: {layout.unplaced} of {agents} agents find no "
-                "place; allowed is one open queue, or fewer agents",
+                "place; add an open queue, or take fewer agents",
             )
         wanted = self._divide(agents, [inf] * len(self.queues))
         for j, queue in enumerate(self.queues):
-            if wanted[j] > self._most(j):
+            if wanted[j] > self._capacity_of(j):
                 raise FormationError(
                     f"queue {queue.name!r}",
-                    f"its capacity asks for {wanted[j]} members, {self._most(j):g} fit",
+                    f"its capacity asks for {wanted[j]} members, {self._capacity_of(j):g} fit",
                 )
             self._check_shape(queue, layout)
         _check_apart(layout, self.queues, least_m)
@@ -192,14 +186,14 @@ class Formation:
         except (CurveError, ExpressionError) as error:
             raise FormationError("queue", str(error)) from error
 
-    def _layout(self, agents: int, blocked: frozenset[Place] = NOTHING) -> Layout:
+    def _layout(self, agents: int, blocked: frozenset[Place] = NO_PLACES) -> Layout:
         counts = self.divide(agents, blocked)
-        common = _but(self.common, blocked)[:agents]
+        common = _without(self.common, blocked)[:agents]
         ordered = [(0, 0, place) for place in common]
         heads = {*common}
         slots = {place: self._station(place) for place in common}
         for j, queue in enumerate(self.queues):
-            own = _but(self._own[j], blocked)[: counts[j]]
+            own = _without(self._own[j], blocked)[: counts[j]]
             members = self._members(j, counts[j] - len(own), blocked)
             arc_lengths = queue.members(
                 members[-1].rank + 1 - len(queue.stations) if members else 0
@@ -211,13 +205,13 @@ class Formation:
             }
             ordered += [(0, 1, place) for place in own]
             ordered += [(1 + k, j, place) for k, place in enumerate(members)]
-            heads.update(own if self._headed(j, blocked) else members[:1])
+            heads.update(own if self._has_vertex(j, blocked) else members[:1])
         ordered.sort()
         places = tuple(place for _, _, place in ordered)
         return Layout(places, slots, agents - len(places), frozenset(heads))
 
     def _members(self, queue: int, count: int, blocked: frozenset[Place]) -> list[Place]:
-        """Return the next ``count`` places behind or between a queue's vertices."""
+        """Return the first ``count`` available places behind or between a queue's vertices."""
         first, found = len(self.queues[queue].stations), list[Place]()
         rank = first
         while len(found) < count:
@@ -227,10 +221,11 @@ class Formation:
             rank += 1
         return found
 
-    def _headed(self, queue: int, blocked: frozenset[Place]) -> bool:
-        """Whether one of a queue's vertices can be held; else its first member is the head."""
+    def _has_vertex(self, queue: int, blocked: frozenset[Place]) -> bool:
+        """Whether one of a queue's vertices is available; else its first member is the head."""
         return any(
-            queue in queues and place not in blocked for place, queues in self._through.items()
+            queue in queues and place not in blocked
+            for place, queues in self._queues_of_vertex.items()
         )
 
     def _station(self, place: Place) -> Slot:
@@ -255,15 +250,15 @@ class Formation:
         return holders
 
     def _own_vertices(self, holders: dict[str, list[Place]]) -> list[list[Place]]:
-        """Return for each queue the places of those vertices that no other queue passes."""
+        """Return for each queue the places of the vertices that no other queue passes through."""
         own: list[list[Place]] = [[] for _ in self._vertices_of]
         for places in holders.values():
             if len(places) == 1:
                 own[places[0].queue].append(places[0])
         return [sorted(places) for places in own]
 
-    def _most(self, queue: int, blocked: frozenset[Place] = NOTHING) -> float:
-        """Return how many agents a queue can hold besides the common ones."""
+    def _capacity_of(self, queue: int, blocked: frozenset[Place] = NO_PLACES) -> float:
+        """Return how many agents a queue can hold besides those of shared vertices."""
         room = self.queues[queue].room
         if room is None:
             return inf
@@ -271,12 +266,12 @@ class Formation:
         return max(0, len(self._own[queue]) + room - lost)
 
 
-def _but(places: Sequence[Place], blocked: frozenset[Place]) -> list[Place]:
+def _without(places: Sequence[Place], blocked: frozenset[Place]) -> list[Place]:
     return [place for place in places if place not in blocked]
 
 
 def _queue(table: QueueSpec, vertices: dict[str, Vector], spacing: float) -> Queue:
-    """Return a queue's geometry, or raise FormationError naming the queue."""
+    """Return a queue's geometry; raise FormationError with the queue's name."""
     through = [vertices[name] for name in table.vertices]
     label = f"queue {table.name!r}"
     if table.shape is None and len(through) == 1:
@@ -314,14 +309,14 @@ def _check_names(spec: FormationSpec) -> None:
 
 
 def _capacities(spec: FormationSpec) -> tuple[float, ...]:
-    """Return each queue's share; what is left out shares equally what the others leave."""
+    """Return each queue's share; queues without a capacity share the rest equally."""
     given = [queue.capacity for queue in spec.queue]
     total = sum(share for share in given if share is not None)
     missing = given.count(None)
     if missing and total < 1.0 - 1e-6:
         return tuple((1.0 - total) / missing if share is None else share for share in given)
     if missing or abs(total - 1.0) > 1e-6:
-        raise FormationError("queue.capacity", f"the sum must be 1 within 1e-6, it is {total:g}")
+        raise FormationError("queue.capacity", f"the sum must be 1 within 1e-6; it is {total:g}")
     return tuple(share for share in given if share is not None)
 
 
@@ -334,5 +329,5 @@ def _check_apart(layout: Layout, queues: tuple[Queue, ...], least_m: float) -> N
                 names = sorted({queues[place.queue].name, queues[other.queue].name})
                 raise FormationError(
                     f"queue {' and '.join(map(repr, names))}",
-                    f"two of its slots are {apart:.3f} m apart, at least {least_m:g} m is allowed",
+                    f"two of its slots are {apart:.3f} m apart; at least {least_m:g} m is required",
                 )

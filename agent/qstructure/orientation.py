@@ -6,16 +6,17 @@ from typing import Annotated, NamedTuple
 import msgspec
 from msgspec import Meta
 
-from agent.qstructure.expression import Expression, ExpressionError
+from agent.qstructure.expression import MAX_EXPRESSION_LENGTH, Expression, ExpressionError
 
-Angle = Annotated[float, Meta(ge=-1e4, le=1e4)] | Annotated[str, Meta(min_length=1, max_length=300)]
+Text = Annotated[str, Meta(min_length=1, max_length=MAX_EXPRESSION_LENGTH)]
+Angle = Annotated[float, Meta(ge=-1e4, le=1e4)] | Text
 ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
 
 
 class OrientationSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Angles [deg] as expressions in d, the arc length from the first vertex [m]; or numbers.
+    """Angles [deg]: numbers, or expressions in d, the arc length from the first vertex [m].
 
-    What is left out is free. Yaw is counted in the target's frame.
+    An angle that is left out is free. Yaw is counted in the target's frame.
     """
 
     yaw_deg: Angle | None = None
@@ -24,18 +25,18 @@ class OrientationSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, o
 
 
 class Attitude(NamedTuple):
-    """Yaw, pitch and roll wanted [rad], each None where it is free."""
+    """The attitude at a slot; an angle that is None is free."""
 
-    yaw: float | None = None
-    pitch: float | None = None
-    presence: float | None = None
+    yaw: float | None = None  # [rad; target's frame]
+    pitch: float | None = None  # [rad]
+    roll: float | None = None  # [rad]
 
 
 FREE = Attitude()
 
 
 class OrientationError(ValueError):
-    """An angle that cannot be computed; ``key`` says which."""
+    """An angle that cannot be computed; ``key`` is its key."""
 
     def __init__(self, key: str, detail: str) -> None:
         super().__init__(detail)
@@ -43,7 +44,7 @@ class OrientationError(ValueError):
 
 
 class Orientation:
-    """Angles along a queue. Raises OrientationError for an expression that is none."""
+    """Angles along a queue. Raises OrientationError for an invalid expression."""
 
     def __init__(self, spec: OrientationSpec) -> None:
         self._angles: list[Expression | None] = []

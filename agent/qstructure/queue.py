@@ -1,7 +1,7 @@
-"""Queues: where the members of one queue stand, by arc length (Definition 4).
+"""Queues: the positions of a queue's members by arc length (Definition 4).
 
-An open queue has one vertex and goes on for ever, its members d_ir apart. A closed queue passes
-through two or more vertices; its members stand evenly between them, never closer than d_ir.
+An open queue has one vertex and no end; its members stand d_ir apart. A closed queue passes through
+two or more vertices; its members stand evenly between them, never closer than d_ir.
 """
 
 from itertools import pairwise
@@ -12,12 +12,14 @@ from agent.qstructure.orientation import FREE, Attitude, Orientation
 from agent.qstructure.shape import Shape, Straight
 
 ON_CURVE_M = 1e-3
-LOOK_M = 0.01
+"""A shape passes through a vertex if it comes nearer than this."""
+SEARCH_STEP_M = 0.01
 DETOUR = 50.0
+"""A vertex is searched for over so many times its straight distance."""
 
 
 class QueueError(ValueError):
-    """A queue that cannot be stood on; the text says why, ``key`` where."""
+    """A queue that cannot hold its members; ``key`` is the offending key."""
 
     def __init__(self, key: str, detail: str) -> None:
         super().__init__(detail)
@@ -25,11 +27,10 @@ class QueueError(ValueError):
 
 
 class Queue:
-    """One queue's geometry.
+    """One queue's geometry, with ``stations``: the arc lengths of its vertices [m].
 
-    vertices [m; target's frame]: those it passes through, in order; spacing: d_ir [m]. ``stations``
-    are the vertices' arc lengths [m]. Raises QueueError if the shape misses a vertex or there is
-    less than d_ir between two.
+    vertices: those it passes through, in order [m; target's frame]; spacing: d_ir [m]. Raises
+    QueueError if the shape misses a vertex or two vertices are less than d_ir apart.
     """
 
     def __init__(
@@ -51,12 +52,12 @@ class Queue:
 
     @property
     def closed(self) -> bool:
-        """Whether the queue ends at a vertex, and so holds only so many."""
+        """Whether the queue ends at a vertex, and so has a limited room."""
         return len(self.stations) > 1
 
     @property
     def room(self) -> int | None:
-        """How many members fit between the vertices; None for an open queue: any number."""
+        """How many members fit between the vertices; None for an open queue, which has no limit."""
         if not self.closed:
             return None
         return sum(self._rooms())
@@ -67,7 +68,7 @@ class Queue:
         return (self._origin[0] + x, self._origin[1] + y, self._origin[2] + z)
 
     def attitude(self, s: float) -> Attitude:
-        """Return the attitude wanted at arc length s [m]; raises OrientationError."""
+        """Return the attitude at arc length s [m]; raises OrientationError."""
         return self._orientation.at(s) if self._orientation is not None else FREE
 
     def check(self, s: float) -> None:
@@ -75,11 +76,11 @@ class Queue:
         self._shape.check(s)
 
     def members(self, count: int) -> list[float]:
-        """Return the arc lengths at which ``count`` members stand besides the vertices [m]."""
+        """Return the arc lengths of ``count`` members besides the vertices [m]."""
         return self._between(count) if self.closed else self._behind(count)
 
     def _behind(self, count: int) -> list[float]:
-        """Members of an open queue: s_i = s_k + d_ir, by arc length, never by the chord (E13)."""
+        """Members of an open queue: s_i = s_k + d_ir, by arc length, not by the chord (E13)."""
         return [self._spacing * (index + 1) for index in range(count)]
 
     def _between(self, count: int) -> list[float]:
@@ -105,17 +106,17 @@ class Queue:
         return [int(length / self._spacing + 1e-9) - 1 for length in self._lengths()]
 
     def _station(self, vertex: Vector) -> float:
-        """Return the arc length at which the shape passes a vertex, after the one before it."""
+        """Return the arc length at which the shape passes a vertex, after the last one [m]."""
         start = self.stations[-1]
         limit = min(self._shape.end, start + DETOUR * (dist(self.point(start), vertex) + 1.0))
-        s, best, least = start + LOOK_M, start, float("inf")
-        while s < limit + LOOK_M:
+        s, best, least = start + SEARCH_STEP_M, start, float("inf")
+        while s < limit + SEARCH_STEP_M:
             away = dist(self.point(min(s, limit)), vertex)
             if away < least:
                 best, least = min(s, limit), away
-            elif least < LOOK_M:
+            elif least < SEARCH_STEP_M:
                 break
-            s += LOOK_M
+            s += SEARCH_STEP_M
         best = self._closest(vertex, best)
         least = dist(self.point(best), vertex)
         if least > ON_CURVE_M:
@@ -128,7 +129,7 @@ class Queue:
         return best
 
     def _closest(self, vertex: Vector, near: float) -> float:
-        low, high = max(0.0, near - LOOK_M), near + LOOK_M
+        low, high = max(0.0, near - SEARCH_STEP_M), near + SEARCH_STEP_M
         for _ in range(60):
             a, b = low + (high - low) / 3.0, high - (high - low) / 3.0
             if dist(self.point(a), vertex) <= dist(self.point(b), vertex):

@@ -1,31 +1,31 @@
 """Shapes of queues: S_j of Definition 4, each a curve by arc length.
 
-A shape starts at the origin; a queue puts that origin on its first vertex. A shape that ends goes
-on straight, in the direction it had: an open queue never ends.
+A shape starts at the origin; a queue puts that origin on its first vertex. A shape that ends is
+continued straight, in its last direction, since an open queue has no end.
 """
 
 from collections.abc import Callable
 from itertools import pairwise
 from math import cos, dist, hypot, pi, radians, sin
-from typing import Annotated, Any
+from typing import Annotated, assert_never
 
 import msgspec
 from msgspec import Meta
 
-from agent.messages import Metres, Vector
-from agent.qstructure.curve import CurveError, Walk
-from agent.qstructure.expression import Expression, ExpressionError
+from agent.messages import ZERO, Metres, Vector
+from agent.qstructure.curve import ArcLengthCurve, CurveError
+from agent.qstructure.expression import MAX_EXPRESSION_LENGTH, Expression, ExpressionError
 
 Triple = tuple[Metres, Metres, Metres]
 Length = Annotated[float, Meta(gt=0, le=1e4)]
 Degrees = Annotated[float, Meta(ge=-1e4, le=1e4)]
 Points = Annotated[tuple[Triple, ...], Meta(min_length=2, max_length=256)]
-Text = Annotated[str, Meta(min_length=1, max_length=300)]
+Text = Annotated[str, Meta(min_length=1, max_length=MAX_EXPRESSION_LENGTH)]
 AHEAD_M = 1e-4
 
 
 class ShapeError(ValueError):
-    """A shape that no agent could stand on; the text says why, ``key`` where."""
+    """A shape that cannot hold a queue; ``key`` is the offending key."""
 
     def __init__(self, key: str, detail: str) -> None:
         super().__init__(detail)
@@ -33,11 +33,11 @@ class ShapeError(ValueError):
 
 
 class _Spec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind"):
-    """A shape's table; ``kind`` says which."""
+    """Base of the shapes' tables, which differ by ``kind``."""
 
 
 class Ray(_Spec, frozen=True, tag="ray"):
-    """A straight line from the vertex on. ``direction`` need not be of unit length."""
+    """A straight line from the vertex. ``direction`` need not have unit length."""
 
     direction: Triple
 
@@ -49,7 +49,7 @@ class Polyline(_Spec, frozen=True, tag="polyline"):
 
 
 class Arc(_Spec, frozen=True, tag="arc"):
-    """A level arc: it leaves the vertex towards ``heading_deg``, and turns left for a sweep > 0."""
+    """A level arc that leaves the vertex towards ``heading_deg``; sweep > 0 turns left."""
 
     radius_m: Length
     sweep_deg: Annotated[float, Meta(ge=-360, le=360)]
@@ -57,7 +57,7 @@ class Arc(_Spec, frozen=True, tag="arc"):
 
 
 class Helix(_Spec, frozen=True, tag="helix"):
-    """A left-turning helix about a vertical axis; ``pitch_m`` is its climb per turn, signed."""
+    """A left-turning helix about a vertical axis; ``pitch_m`` is its signed climb per turn."""
 
     radius_m: Length
     pitch_m: Metres
@@ -82,16 +82,16 @@ ShapeSpec = Ray | Polyline | Arc | Helix | Spline | Curve
 
 
 class Shape:
-    """A curve by arc length. ``end`` [m]: where it goes over into its straight continuation."""
+    """A curve by arc length. ``end``: arc length at which its straight continuation begins [m]."""
 
-    def __init__(self, walk: Walk, *, endless: bool) -> None:
-        self._walk = walk
-        self.end = float("inf") if endless else walk.length()
-        self._origin = walk.point(0.0)
+    def __init__(self, curve: ArcLengthCurve, *, endless: bool) -> None:
+        self._by_length = curve
+        self.end = float("inf") if endless else curve.length()
+        self._origin = curve.point(0.0)
 
     def point(self, s: float) -> Vector:
         """Return the point at arc length s >= 0 [m] from the vertex, relative to it [m]."""
-        x, y, z = self._walk.point(min(s, self.end))
+        x, y, z = self._by_length.point(min(s, self.end))
         beyond = max(0.0, s - self.end)
         if beyond:
             u, v, w = self._last_direction()
@@ -100,15 +100,15 @@ class Shape:
 
     def check(self, s: float) -> None:
         """Raise CurveError if the curve has a pole or a jump on the way to arc length s [m]."""
-        self._walk.check(min(s, self.end))
+        self._by_length.check(min(s, self.end))
 
     def _last_direction(self) -> Vector:
-        here, before = self._walk.point(self.end), self._walk.point(self.end - AHEAD_M)
+        here, before = self._by_length.point(self.end), self._by_length.point(self.end - AHEAD_M)
         return _unit(before, here)
 
 
 class Straight:
-    """Straight pieces; the last one goes on for ever, past ``end`` [m]."""
+    """Straight pieces; the last one continues without end, past ``end`` [m]."""
 
     def __init__(self, corners: list[Vector]) -> None:
         self._corners = corners
@@ -132,21 +132,39 @@ class Straight:
         )
 
     def check(self, s: float) -> None:
-        """Straight pieces can always be followed."""
+        """Accept any s: straight pieces have neither poles nor jumps."""
 
 
 def shape_of(spec: ShapeSpec) -> Shape | Straight:
     """Return the curve that a shape's table describes, or raise :class:`ShapeError`."""
     try:
-        return _MAKERS[type(spec)](spec)
+        return _shape_of(spec)
     except (CurveError, ExpressionError) as error:
         raise ShapeError("", str(error)) from error
 
 
+def _shape_of(spec: ShapeSpec) -> Shape | Straight:
+    match spec:
+        case Ray():
+            return _ray(spec)
+        case Polyline():
+            return _polyline(spec)
+        case Arc():
+            return _arc(spec)
+        case Helix():
+            return _helix(spec)
+        case Spline():
+            return _spline(spec)
+        case Curve():
+            return _curve(spec)
+        case _:
+            assert_never(spec)
+
+
 def _ray(spec: Ray) -> Straight:
     if hypot(*spec.direction) < 1e-9:
-        raise ShapeError("direction", "must not be of zero length")
-    return Straight([(0.0, 0.0, 0.0), spec.direction])
+        raise ShapeError("direction", "must not have zero length")
+    return Straight([ZERO, spec.direction])
 
 
 def _polyline(spec: Polyline) -> Straight:
@@ -164,7 +182,7 @@ def _arc(spec: Arc) -> Shape:
         radius, turned = side * spec.radius_m, heading + side * angle
         return (radius * (sin(turned) - sin(heading)), radius * (cos(heading) - cos(turned)), 0.0)
 
-    return Shape(Walk(at, abs(sweep)), endless=False)
+    return Shape(ArcLengthCurve(at, abs(sweep)), endless=False)
 
 
 def _helix(spec: Helix) -> Shape:
@@ -175,12 +193,14 @@ def _helix(spec: Helix) -> Shape:
         y = spec.radius_m * (cos(heading) - cos(heading + angle))
         return (x, y, spec.pitch_m * angle / (2.0 * pi))
 
-    return Shape(Walk(at), endless=True)
+    return Shape(ArcLengthCurve(at), endless=True)
 
 
 def _spline(spec: Spline) -> Shape:
     _check_points(spec.points_m)
-    return Shape(Walk(_catmull_rom(spec.points_m), len(spec.points_m) - 1.0), endless=False)
+    return Shape(
+        ArcLengthCurve(_catmull_rom(spec.points_m), len(spec.points_m) - 1.0), endless=False
+    )
 
 
 def _curve(spec: Curve) -> Shape:
@@ -191,17 +211,7 @@ def _curve(spec: Curve) -> Shape:
         except ExpressionError as error:
             raise ShapeError(key, str(error)) from error
     x, y, z = parts
-    return Shape(Walk(lambda s: (x(s), y(s), z(s))), endless=True)
-
-
-_MAKERS: dict[type, Callable[[Any], Shape | Straight]] = {
-    Ray: _ray,
-    Polyline: _polyline,
-    Arc: _arc,
-    Helix: _helix,
-    Spline: _spline,
-    Curve: _curve,
-}
+    return Shape(ArcLengthCurve(lambda s: (x(s), y(s), z(s))), endless=True)
 
 
 def _check_points(points: tuple[Vector, ...]) -> None:
@@ -213,8 +223,8 @@ def _check_points(points: tuple[Vector, ...]) -> None:
 def _catmull_rom(points: tuple[Vector, ...]) -> Callable[[float], Vector]:
     """Return the centripetal Catmull-Rom spline; parameter k is at point k.
 
-    Its knots follow from the square root of the distances, which keeps it free of loops; the two
-    outer pieces see their last point mirrored.
+    Its knots follow the square root of the distances, which keeps it free of loops. The outer
+    pieces use their end point's neighbour, mirrored, as the missing point.
     """
     first = _mirrored(points[1], points[0])
     last = _mirrored(points[-2], points[-1])
@@ -235,7 +245,7 @@ def _catmull_rom(points: tuple[Vector, ...]) -> Callable[[float], Vector]:
 
 
 def _mix(a: Vector, b: Vector, at_a: float, at_b: float, t: float) -> Vector:
-    """Return the point on the line through a and b that belongs to t."""
+    """Return the point at t on the line through a (at t = at_a) and b (at t = at_b)."""
     w = (t - at_a) / (at_b - at_a)
     return (a[0] + w * (b[0] - a[0]), a[1] + w * (b[1] - a[1]), a[2] + w * (b[2] - a[2]))
 

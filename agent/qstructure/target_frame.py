@@ -2,36 +2,34 @@
 
 from math import cos, sin
 
-from agent.messages import Vector
-
-REST = (0.0, 0.0, 0.0)
+from agent.messages import ZERO, Vector
 
 
 class Frame:
-    """A frame at one time: at ``origin`` [m; world frame], turned by ``yaw`` [rad] about +z.
+    """The frame at one time: at ``origin`` [m; world frame], turned by ``yaw`` [rad] about +z.
 
-    velocity: of its origin [m/s; world frame]; yaw_rate [rad/s].
+    velocity: of the origin [m/s; world frame]; yaw_rate [rad/s]. ``moves``: whether any is not 0.
     """
 
     __slots__ = ("_cos", "_sin", "moves", "origin", "velocity", "yaw", "yaw_rate")
 
     def __init__(
         self,
-        origin: Vector = (0.0, 0.0, 0.0),
+        origin: Vector = ZERO,
         yaw: float = 0.0,
-        velocity: Vector = REST,
+        velocity: Vector = ZERO,
         yaw_rate: float = 0.0,
     ) -> None:
         self.origin = origin
         self.yaw = yaw
         self.velocity = velocity
         self.yaw_rate = yaw_rate
-        self.moves = yaw_rate != 0.0 or velocity != REST
+        self.moves = yaw_rate != 0.0 or velocity != ZERO
         self._cos = cos(yaw)
         self._sin = sin(yaw)
 
     def to_world(self, point: Vector) -> Vector:
-        """Return a point of this frame [m] in the world frame [m]."""
+        """Return a point of this frame [m] in world coordinates [m]."""
         x, y, z = point
         return (
             self.origin[0] + self._cos * x - self._sin * y,
@@ -40,7 +38,7 @@ class Frame:
         )
 
     def velocity_at(self, point: Vector) -> Vector:
-        """Return how fast a point that rests in this frame moves [m/s; world frame]: v + w x r.
+        """Return the velocity of a point at rest in this frame: v + w x r [m/s; world frame].
 
         point [m; world frame].
         """

@@ -1,1 +1,1 @@
-"""What an agent makes of its sensors: patterns of rays, a map of points seen, trust."""
+"""Sensing: ray patterns, a map of scanned points, surface motion, and sensor health."""

@@ -1,76 +1,75 @@
-"""The map of points seen of late: what a narrow sensor saw stays known when it looks elsewhere.
+"""A map of scanned points: what a narrow sensor saw stays known while it looks elsewhere.
 
-A field of cubes, each with its last point; what was not seen again for some seconds is forgotten,
-and so is what a later ray passes through: vehicles move on, and leave no wall behind.
+The map is a grid of cubes, each with its last point. It forgets a point that was not seen again for
+some seconds, and a point that a later ray passes through: vehicles move on and leave no wall.
 """
 
 from array import array
 from collections.abc import Iterable, Sequence
 from math import atan2, cos, hypot, pi, sin
 
-from agent.messages import Scan, Vector
+from agent.messages import NO_ECHO_MM, PROXIMITY_RANGE_M, Scan, Vector
 from agent.sensing.ray_pattern import Grid, Pattern
 
 KEPT_S = 6.0
-VOXEL_M = 0.15
-NEAR_M = 2.0
-MOST_NEAR = 24
+CUBE_M = 0.15
+MAX_NEAR_POINTS = 24
 MAX_POINTS = 2000
 PASSED_M = 0.3
-"""An echo from so much farther shows that a point before it is gone."""
+"""An echo from this much farther than a point shows that the point is gone."""
 MISSES = 2
-"""So many rays that meet nothing show it too: one may have been a dropout."""
-NOTHING = 0xFFFF
-OWN_BODY_M = 0.3
-"""A point so near to where a neighbour says it is, is that neighbour."""
+"""So many rays without an echo show it too; a single one may be a dropout."""
+NEIGHBOUR_RADIUS_M = 0.3
+"""A point nearer than this to a neighbour's reported position belongs to that neighbour."""
 
 Cube = tuple[int, int, int]
 
 
-class Point:
-    """A point seen [m; world frame], when last [s], and how many rays met nothing there since."""
+class MapPoint:
+    """A scanned point."""
 
     __slots__ = ("at", "misses", "seen_s")
 
     def __init__(self, at: Vector, seen_s: float) -> None:
-        self.at = at
-        self.seen_s = seen_s
-        self.misses = 0
+        self.at = at  # [m; world frame]
+        self.seen_s = seen_s  # last seen [s]
+        self.misses = 0  # rays through it without an echo since
 
 
 class PointMap:
-    """What one agent's scanning sensors saw, as points in the world frame."""
+    """The points that one agent's scanning sensors saw."""
 
     def __init__(self, patterns: Sequence[Pattern]) -> None:
         self._patterns = {pattern.kind: pattern for pattern in patterns}
-        self._points: dict[Cube, Point] = {}
+        self._points: dict[Cube, MapPoint] = {}
 
     def __len__(self) -> int:
         return len(self._points)
 
-    def take(
+    def add_scan(
         self, scan: Scan, here: Vector, yaw: float, now_s: float, others: Sequence[Vector] = ()
     ) -> None:
-        """Take a scan made at a pose [m, rad; world frame]; others: where neighbours are [m].
+        """Add a scan made at a pose [m, rad; world frame]; others: neighbours' positions [m].
 
-        A scan of a sensor one does not have, or of another length, says nothing.
+        A scan of a sensor that the agent does not carry, or of another length, is ignored.
         """
         pattern = self._patterns.get(scan.kind)
         ranges = array("H", scan.ranges) if len(scan.ranges) % 2 == 0 else array("H")
         if pattern is None or len(ranges) != len(pattern.axes):
             return
-        self._forget(now_s)
+        self._forget_old(now_s)
         axes = _turned(pattern.axes, yaw)
         if pattern.grid is not None:
-            self._pass_through(pattern.grid, ranges, pattern.range_m, here, yaw)
+            self._clear_passed(pattern.grid, ranges, pattern.range_m, here, yaw)
         for axis, millimetres in zip(axes, ranges, strict=True):
-            if millimetres != NOTHING:
-                self._mark(axis, 0.001 * millimetres, here, now_s, others)
+            if millimetres != NO_ECHO_MM:
+                self._add_echo(axis, 0.001 * millimetres, here, now_s, others)
 
-    def near(self, here: Vector, now_s: float) -> tuple[Vector, ...]:
-        """Return the points within 2 m of a place, relative to it [m; world axes], nearest first.
+    def near_points(self, here: Vector, now_s: float) -> tuple[Vector, ...]:
+        """Return the points within PROXIMITY_RANGE_M of a position, nearest first.
 
-        Of a surface that is seen as many points, only the 24 nearest.
+        They are relative to it [m; world axes], and at most MAX_NEAR_POINTS: a surface may be
+        seen as many points.
         """
         x, y, z = here
         found = []
@@ -78,31 +77,32 @@ class PointMap:
             u, v, w = point.at
             u, v, w = u - x, v - y, w - z
             square = u * u + v * v + w * w
-            if square < NEAR_M * NEAR_M and now_s - point.seen_s <= KEPT_S:
+            if square < PROXIMITY_RANGE_M * PROXIMITY_RANGE_M and now_s - point.seen_s <= KEPT_S:
                 found.append((square, (u, v, w)))
         found.sort()
-        return tuple(relative for _, relative in found[:MOST_NEAR])
+        return tuple(relative for _, relative in found[:MAX_NEAR_POINTS])
 
-    def _mark(
+    def _add_echo(
         self, axis: Vector, away_m: float, here: Vector, now_s: float, others: Iterable[Vector]
     ) -> None:
         x, y, z = (p + away_m * a for p, a in zip(here, axis, strict=True))
+        square = NEIGHBOUR_RADIUS_M * NEIGHBOUR_RADIUS_M
         for u, v, w in others:
-            if (x - u) ** 2 + (y - v) ** 2 + (z - w) ** 2 < OWN_BODY_M * OWN_BODY_M:
+            if (x - u) ** 2 + (y - v) ** 2 + (z - w) ** 2 < square:
                 return
-        cube = (round(x / VOXEL_M), round(y / VOXEL_M), round(z / VOXEL_M))
+        cube = (round(x / CUBE_M), round(y / CUBE_M), round(z / CUBE_M))
         if cube in self._points or len(self._points) < MAX_POINTS:
-            self._points[cube] = Point((x, y, z), now_s)
+            self._points[cube] = MapPoint((x, y, z), now_s)
 
-    def _forget(self, now_s: float) -> None:
+    def _forget_old(self, now_s: float) -> None:
         old = [cube for cube, point in self._points.items() if now_s - point.seen_s > KEPT_S]
         for cube in old:
             del self._points[cube]
 
-    def _pass_through(
+    def _clear_passed(
         self, grid: Grid, ranges: Sequence[int], range_m: float, here: Vector, yaw: float
     ) -> None:
-        """Forget points before what a ray met; those before nothing, at the second time."""
+        """Forget points in front of an echo at once, and points on empty rays the second time."""
         x, y, z = here
         gone = []
         for cube, point in self._points.items():
@@ -112,16 +112,16 @@ class PointMap:
             if not 0.0 < r < range_m - PASSED_M:
                 continue
             azimuth = _wrapped(atan2(v, u) - yaw)
-            ray = grid.towards(azimuth, atan2(w, across))
+            ray = grid.ray_towards(azimuth, atan2(w, across))
             if ray is not None and _passed(point, ranges[ray], r):
                 gone.append(cube)
         for cube in gone:
             del self._points[cube]
 
 
-def _passed(point: Point, millimetres: int, away_m: float) -> bool:
-    """Note what a ray met that looks at a point; return whether the point is gone."""
-    if millimetres == NOTHING:
+def _passed(point: MapPoint, millimetres: int, away_m: float) -> bool:
+    """Count what the ray towards a point measured; return whether the point is gone."""
+    if millimetres == NO_ECHO_MM:
         point.misses += 1
     else:
         point.misses = MISSES if 0.001 * millimetres > away_m + PASSED_M else 0

@@ -1,10 +1,10 @@
-"""Where a sensor's rays point: known to the agent from its setup, cast by the world.
+"""Ray directions of scanning sensors: the world casts the rays, the agent maps their echoes.
 
 The body frame has x ahead, y to the left and z up.
 """
 
 from math import cos, pi, radians, sin
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, assert_never
 
 from agent.config import Laser, Sensors, Sonar
 from agent.messages import Vector
@@ -12,49 +12,59 @@ from agent.messages import Vector
 IN_BEAM = 6
 """Rays on each of a beam's two rings about its axis."""
 SAME_RAY_RAD = 0.03
-"""Within so much a ray looks at a point, not past it."""
-ScanKind = Literal["laser", "sonar"]
-KINDS: tuple[ScanKind, ...] = ("laser", "sonar")
-"""Sensors that scan, in the order of a Scan's ``kind``."""
+"""A ray within this angle of a point looks at the point, not past it."""
+ScannerKind = Literal["laser", "sonar"]
+SCANNERS: tuple[ScannerKind, ...] = ("laser", "sonar")
+"""Scanning sensors; a Scan's ``kind`` is an index of this."""
 
 
 class Grid(NamedTuple):
-    """A laser's rays: ``rows`` rings of ``columns``; half the field of view in each [rad]."""
+    """A laser's rays: ``rows`` rings of ``columns`` rays each."""
 
     rows: int
     columns: int
-    tilt: float
-    half: float
+    tilt: float  # half the vertical field of view [rad]
+    half: float  # half the horizontal field of view [rad]
 
-    def towards(self, azimuth: float, up: float) -> int | None:
-        """Return the ray that looks in a direction [rad; body frame], None if none does."""
+    def ray_towards(self, azimuth: float, up: float) -> int | None:
+        """Return the ray that looks in a direction [rad; body frame]; None if none does."""
         row = _nearest(up, self.tilt, self.rows)
         column = _nearest(azimuth, self.half, self.columns)
         return None if row is None or column is None else row * self.columns + column
 
 
 class Pattern(NamedTuple):
-    """One sensor's axes, unit vectors [body frame]; each beam is a bundle of rays about its axis.
+    """The rays of one scanning sensor."""
 
-    kind: index of KINDS. every: it scans at each so many-th tick. grid: how a laser's are laid out.
-    """
-
-    kind: int
-    axes: tuple[Vector, ...]
-    beams: tuple[tuple[Vector, ...], ...]
-    range_m: float
-    every: int
-    grid: Grid | None = None
+    kind: int  # index of SCANNERS
+    axes: tuple[Vector, ...]  # unit vectors, one for each range of a scan [body frame]
+    beams: tuple[tuple[Vector, ...], ...]  # the rays about each axis, unit vectors [body frame]
+    range_m: float  # [m]
+    every: int  # period of the scans [ticks]
+    grid: Grid | None = None  # layout of a laser's rays
 
 
-def pattern_of(kind: ScanKind, sensors: Sensors, tick_hz: float) -> Pattern:
-    """Return the pattern of a sensor that scans."""
-    if kind == "laser":
-        return _laser_pattern(sensors.laser, tick_hz)
-    axes = _sonar_axes(sensors.sonar)
-    half = 0.5 * radians(sensors.sonar.beam_deg)
-    beams = tuple(_beam(axis, half) for axis in axes)
-    return Pattern(1, axes, beams, sensors.sonar.range_m, _every(sensors.sonar.rate_hz, tick_hz))
+def pattern_of(kind: ScannerKind, sensors: Sensors, tick_hz: float) -> Pattern:
+    """Return the pattern of a scanning sensor."""
+    match kind:
+        case "laser":
+            return _laser_pattern(sensors.laser, tick_hz)
+        case "sonar":
+            return _sonar_pattern(sensors.sonar, tick_hz)
+        case _:
+            assert_never(kind)
+
+
+def _sonar_pattern(sonar: Sonar, tick_hz: float) -> Pattern:
+    axes = _sonar_axes(sonar)
+    half = 0.5 * radians(sonar.beam_deg)
+    return Pattern(
+        kind=SCANNERS.index("sonar"),
+        axes=axes,
+        beams=tuple(_beam(axis, half) for axis in axes),
+        range_m=sonar.range_m,
+        every=_every(sonar.rate_hz, tick_hz),
+    )
 
 
 def _laser_pattern(laser: Laser, tick_hz: float) -> Pattern:
@@ -64,13 +74,18 @@ def _laser_pattern(laser: Laser, tick_hz: float) -> Pattern:
         for up in _spread(-tilt, tilt, laser.rings)
         for azimuth in _spread(-half, half, laser.rays)
     )
-    beams, every = tuple((ray,) for ray in rays), _every(laser.rate_hz, tick_hz)
-    grid = Grid(laser.rings, laser.rays, tilt, half)
-    return Pattern(0, rays, beams, laser.range_m, every, grid)
+    return Pattern(
+        kind=SCANNERS.index("laser"),
+        axes=rays,
+        beams=tuple((ray,) for ray in rays),
+        range_m=laser.range_m,
+        every=_every(laser.rate_hz, tick_hz),
+        grid=Grid(rows=laser.rings, columns=laser.rays, tilt=tilt, half=half),
+    )
 
 
 def _nearest(angle: float, half: float, count: int) -> int | None:
-    """Return the ray nearest to an angle [rad] of ``count`` spread over +-half."""
+    """Return which of ``count`` rays spread over +-half looks at an angle [rad]; None if none."""
     if count == 1:
         return 0 if abs(angle) <= SAME_RAY_RAD else None
     step = 2.0 * half / (count - 1)

@@ -1,42 +1,41 @@
-"""Scans that leap: most echoes at quite another distance than a scan ago, time after time.
+"""Detection of jumping scans: most echoes at quite another distance than in the scan before.
 
-No vehicle is so fast, and no way past obstacles does that to most rays at once: such a sensor tells
-anything.
+No vehicle is so fast, and no flight past obstacles does that to most rays at once. A sensor that
+jumps several times in a row measures nothing real.
 """
 
 from array import array
 
-from agent.messages import Scan
+from agent.messages import NO_ECHO_MM, Scan
 
-LEAP_MM = 1000
-ECHOES = 8
-"""Of fewer rays that met something twice nothing follows."""
-NOTHING = 0xFFFF
+JUMP_MM = 1000
+MIN_ECHOES = 8
+"""Scans with fewer rays that have an echo in both are not compared."""
 SCANS = 3
-"""So many leaps in a row make a sensor wrong, so many quiet scans right again."""
+"""So many jumps in a row make a sensor wrong; so many quiet scans in a row make it right again."""
 
 
 class ScanJumps:
-    """Watches the scans of one sensor; ``wrong``: whether it tells anything."""
+    """Watches the scans of one sensor; ``wrong``: whether its readings are arbitrary."""
 
     def __init__(self) -> None:
         self.wrong = False
         self._before = array("H")
-        self._leaps = self._quiet = 0
+        self._jumps = self._quiet = 0
 
-    def note(self, scan: Scan) -> None:
-        """Take the next scan; one that has too few echoes in common with the last says nothing."""
+    def add(self, scan: Scan) -> None:
+        """Take the next scan; with too few echoes in common with the last it changes nothing."""
         ranges = array("H", scan.ranges) if len(scan.ranges) % 2 == 0 else array("H")
-        common = [
-            abs(now - before) > LEAP_MM
+        jumped = [
+            abs(now - before) > JUMP_MM
             for now, before in zip(ranges, self._before, strict=False)
-            if NOTHING not in (now, before)
+            if NO_ECHO_MM not in (now, before)
         ]
         self._before = ranges
-        if len(common) >= ECHOES:
-            self._count(leapt=2 * sum(common) > len(common))
+        if len(jumped) >= MIN_ECHOES:
+            self._count(jumped=2 * sum(jumped) > len(jumped))
 
-    def _count(self, *, leapt: bool) -> None:
-        self._leaps = self._leaps + 1 if leapt else 0
-        self._quiet = 0 if leapt else self._quiet + 1
-        self.wrong = self._leaps >= SCANS or (self.wrong and self._quiet < SCANS)
+    def _count(self, *, jumped: bool) -> None:
+        self._jumps = self._jumps + 1 if jumped else 0
+        self._quiet = 0 if jumped else self._quiet + 1
+        self.wrong = self._jumps >= SCANS or (self.wrong and self._quiet < SCANS)

@@ -1,8 +1,8 @@
-"""Whether an agent may believe its sensors: one that doubts them stops.
+"""Sensor health: whether an agent may trust its sensors; one that does not stands still.
 
-Stuck: a reading stays the very same while the vehicle moves. Silent: scans that are due do not
-come. Silent or wrong: nothing is sensed where a neighbour near by says it is. Wrong: most echoes of
-a scan leap, time after time.
+Stuck: a reading stays exactly the same while the vehicle moves. Silent: due scans do not arrive.
+Silent or wrong: no vehicle is sensed where a near neighbour reports itself. Wrong: most echoes of a
+scan jump, several scans in a row.
 """
 
 from collections.abc import Sequence
@@ -13,25 +13,26 @@ from agent.sensing.ray_pattern import Pattern
 from agent.sensing.scan_jumps import ScanJumps
 
 MOVED_M = 0.03
-"""By so much a vehicle moves before a reading must have changed."""
+"""Once a vehicle has moved this far, its reading must have changed."""
 LOST_SCANS = 3
 PROXIMITY = -1
-"""Stands for the proximity sensor beside the kinds of scans."""
-NOWHERE = b"\xff"
+"""The proximity sensor's number beside the indices of SCANNERS."""
+NO_ECHO_BYTE = b"\xff"
 NEAR_M = 1.2
 FRESH_S = 0.5
 SLACK_M = 0.3
 LOOKS = 3
-"""So many looks in a row miss a neighbour before the sensor is doubted, and find one before it is
-believed again: that they have flown on proves nothing."""
+"""So many looks in a row that miss a neighbour make the sensors distrusted; so many that find one
+make them trusted again. Neighbours that have flown away prove nothing."""
+NO_READING: tuple[object, ...] = ((), (), ())
 
 
 class SensorHealth:
-    """Watches one agent's sensors; max_speed: of any vehicle [m/s].
+    """Watches one agent's sensors. max_speed: limit of the fleet's fastest vehicle [m/s].
 
-    noisy: sensors of which no two readings are the same. Without noise, those who fly side by side
-    see one another at the very same place for ever, and so does who flies along a wall; then only
-    what does not move shows it, to those who come nearer or go away.
+    noisy: sensors of which no two readings are equal. Without noise, vehicles side by side sense
+    one another at the same position for ever, and so does a vehicle along a wall. Then only
+    surfaces at rest prove a stuck sensor, to a vehicle that approaches or leaves them.
     """
 
     def __init__(
@@ -45,7 +46,7 @@ class SensorHealth:
         self._noisy = noisy
         self._due_s = {p.kind: LOST_SCANS * p.every / tick_hz for p in patterns}
         self._scanned_s: dict[int, float] = {}
-        self._leaps = {p.kind: ScanJumps() for p in patterns}
+        self._jumps = {p.kind: ScanJumps() for p in patterns}
         self._ranging = ranging
         self._max_speed = max_speed
         self._reading: tuple[object, ...] = ()
@@ -55,14 +56,14 @@ class SensorHealth:
         self._missed_s: dict[int, float] = {}
         self._blind = False
 
-    def note(self, observation: Observation) -> bool:
-        """Take what is sensed now; return whether it may be believed."""
-        self._note_change(observation)
-        amiss = bool(self._due_s) and (self._late(observation) or self._leap(observation))
-        return not (self._stuck or amiss or self._blind)
+    def update(self, observation: Observation) -> bool:
+        """Take a new observation; return whether the sensors may be trusted."""
+        self._update_stuck(observation)
+        faulty = bool(self._due_s) and (self._is_late(observation) or self._jumped(observation))
+        return not (self._stuck or faulty or self._blind)
 
     def compare(self, observation: Observation, neighbours: Sequence[Beacon]) -> None:
-        """Look whether neighbours near by are sensed where they say they are."""
+        """Check that near neighbours are sensed where they report themselves."""
         if not self._ranging:
             return
         here = observation.position
@@ -70,16 +71,16 @@ class SensorHealth:
         looks = [(beacon, self._is_missed(observation, beacon)) for beacon in near]
         missed = {beacon.id: beacon.stamp_s for beacon, missed in looks if missed}
         if missed:
-            # Whoever left is missed too, but says so only once: what it said last stays the last.
-            spoken = any(self._missed_s.get(who) != stamp_s for who, stamp_s in missed.items())
-            self._missed, self._met = self._missed + spoken, 0
+            # A departed neighbour is missed too, but counts only once: it sends no new beacon.
+            fresh = any(self._missed_s.get(other) != stamp_s for other, stamp_s in missed.items())
+            self._missed, self._met = self._missed + fresh, 0
             self._blind = self._blind or self._missed >= LOOKS
         elif any(missed is False for _, missed in looks):
             self._missed, self._met = 0, self._met + 1
             self._blind = self._blind and self._met < LOOKS
         self._missed_s = missed
 
-    def _note_change(self, observation: Observation) -> None:
+    def _update_stuck(self, observation: Observation) -> None:
         if self._due_s and not observation.scans:
             return
         reading = (
@@ -88,7 +89,7 @@ class SensorHealth:
             tuple(
                 scan.ranges
                 for scan in observation.scans
-                if scan.kind in self._noisy and scan.ranges.strip(NOWHERE)
+                if scan.kind in self._noisy and scan.ranges.strip(NO_ECHO_BYTE)
             ),
         )
         if reading == NO_READING or reading != self._reading or self._read_at is None:
@@ -97,9 +98,10 @@ class SensorHealth:
             self._stuck = True
 
     def _must_have_changed(self, observation: Observation, read_at: Vector) -> bool:
-        """Whether the vehicle has moved too far for a reading that stayed the same.
+        """Whether the vehicle has moved too far for an unchanged reading to be true.
 
-        Without noise one sees no change along a wall, but as one comes nearer or goes away.
+        Without noise a reading changes only as the vehicle approaches a surface or leaves it, not
+        along a wall.
         """
         if dist(observation.position, read_at) <= MOVED_M:
             return False
@@ -111,7 +113,8 @@ class SensorHealth:
             for u, v, w in observation.obstacles
         )
 
-    def _late(self, observation: Observation) -> bool:
+    def _is_late(self, observation: Observation) -> bool:
+        """Whether a due scan has not arrived."""
         now_s = observation.time_s
         for scan in observation.scans:
             self._scanned_s[scan.kind] = now_s
@@ -120,21 +123,19 @@ class SensorHealth:
             for kind, due_s in self._due_s.items()
         )
 
-    def _leap(self, observation: Observation) -> bool:
+    def _jumped(self, observation: Observation) -> bool:
+        """Whether a scanning sensor jumps."""
         for scan in observation.scans:
-            if scan.kind in self._leaps:
-                self._leaps[scan.kind].note(scan)
-        return any(leaps.wrong for leaps in self._leaps.values())
+            if scan.kind in self._jumps:
+                self._jumps[scan.kind].add(scan)
+        return any(jumps.wrong for jumps in self._jumps.values())
 
     def _is_missed(self, observation: Observation, beacon: Beacon) -> bool | None:
-        """Whether a neighbour near by is not sensed; None where its word proves nothing."""
+        """Whether a near neighbour is not sensed; None where its beacon is too old to tell."""
         here, there = observation.position, beacon.position
         age_s = max(0.0, observation.time_s - beacon.stamp_s)
         if age_s > FRESH_S:
             return None
         slack = SLACK_M + self._max_speed * age_s
         away = (there[0] - here[0], there[1] - here[1], there[2] - here[2])
-        return all(dist(away, body) > slack for body in observation.vehicles)
-
-
-NO_READING: tuple[object, ...] = ((), (), ())
+        return all(dist(away, vehicle) > slack for vehicle in observation.vehicles)

@@ -11,13 +11,8 @@ import msgpack
 import msgspec
 from msgspec import Meta
 
-LOCAL = 0
-"""High-frequency, short-term channel: heard directly, never forwarded (paper, Sec. 3 (ii))."""
-MULTIHOP = 1
-"""Low-frequency, long-term channel: records that agents pass on (paper, Sec. 3 (i))."""
-CHANNELS = ("local", "multihop")
+from netem.wire.channels import MAX_PAYLOAD_B, Channel
 
-MAX_PAYLOAD_B = 1200
 MAX_OUTGOING = 160
 """Greatest number of frames in a transmission."""
 MAX_TRANSMISSION_B = MAX_OUTGOING * (MAX_PAYLOAD_B + 5) + 22
@@ -35,7 +30,6 @@ MAX_DELIVERY_B = MAX_BATCH_B + 5 * (MAX_FRAMES + 1)
 
 Count = Annotated[int, Meta(ge=0, lt=2**53)]
 AgentId = Annotated[int, Meta(ge=0, lt=2**16)]
-Channel = Annotated[int, Meta(ge=0, lt=len(CHANNELS))]
 Payload = Annotated[bytes, Meta(max_length=MAX_PAYLOAD_B)]
 
 

@@ -14,7 +14,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from netem.wire.frame import CHANNELS, Count, Frame, unpack_typed
+from netem.wire.channels import CHANNELS
+from netem.wire.frame import Count, Frame, unpack_typed
 
 BINS_PER_SLOT = 8
 BINNED_SLOTS = 32

@@ -1,4 +1,4 @@
-"""Whatever bytes come, the codec gives back a message that keeps its promises, or refuses it."""
+"""The codec: any bytes are decoded to a message within its bounds, or rejected."""
 
 from math import inf, isfinite, nan
 from random import Random
@@ -10,20 +10,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agent.codec import (
+    CHECKSUM_B,
     MAX_MESSAGE_B,
     MAX_OBSERVATION_B,
-    MAX_RADIO_B,
-    SEAL_B,
     RejectedError,
+    add_checksum,
     decode_beacon,
     decode_command,
     decode_gossip,
     decode_observation,
     encode,
-    sealed,
 )
-from agent.messages import CAUSES as CAUSES_TOLD
 from agent.messages import (
+    CAUSES,
     Beacon,
     Command,
     Drift,
@@ -37,71 +36,104 @@ from agent.messages import (
     Scan,
     Telemetry,
 )
+from netem.wire.channels import MAX_PAYLOAD_B
 
 MANY = 15_000
 VECTOR = (1.0, -2.5, 0.25)
-POSE = Pose(1.0, 2.0, 3.0, 0.5)
-SCAN = Scan(1, bytes(8))
-DRIFT = Drift(1.5, 0.1, 0.2, 0.3, 0.4)
-PATH = FramePath((VECTOR, VECTOR), 0.25, 2.0, 0.5, 0.2, (1.0, 2.0))
-TELEMETRY = Telemetry(VECTOR, 1.0, VECTOR, (1, 2), (3, 4), ((5, 5),), 6, 1, 3, 0)
-RECORD = Record(4, 0, 77, 1.25, VECTOR, -1, -1, 0, 7, ((0, 0),))
+POSE = Pose(x=1.0, y=2.0, z=3.0, yaw=0.5)
+SCAN = Scan(kind=1, ranges=bytes(8))
+DRIFT = Drift(stamp_s=1.5, x=0.1, y=0.2, z=0.3, yaw_rate=0.4)
+PATH = FramePath(
+    waypoints=(VECTOR, VECTOR), speed=0.25, start_s=2.0, yaw=0.5, turn_rate=0.2, waits_s=(1.0, 2.0)
+)
+TELEMETRY = Telemetry(
+    wanted=VECTOR,
+    force=1.0,
+    target=VECTOR,
+    place=(1, 2),
+    heard=(3, 4),
+    rejected=((5, 5),),
+    mission=6,
+    tier=1,
+    parent=3,
+    role=0,
+)
+RECORD = Record(
+    id=4,
+    incarnation=0,
+    version=77,
+    stamp_s=1.25,
+    position=VECTOR,
+    queue=-1,
+    rank=-1,
+    cost_mm=0,
+    mission=7,
+    blocked=((0, 0),),
+)
 GOOD = {
     Observation: Observation(
-        7, 1.5, VECTOR, VECTOR, 0.5, (VECTOR, VECTOR), (VECTOR,), (Mission(0, PATH, b""),), (SCAN,)
+        slot=7,
+        time_s=1.5,
+        position=VECTOR,
+        velocity=VECTOR,
+        yaw=0.5,
+        vehicles=(VECTOR, VECTOR),
+        obstacles=(VECTOR,),
+        orders=(Mission(key=0, frame=PATH, formation=b""),),
+        scans=(SCAN,),
     ),
     Command: Command(
-        7,
-        1,
-        9,
-        VECTOR,
-        0.5,
-        (0.1, 0.2),
-        Telemetry(VECTOR, 1.0, VECTOR, (1, 2), (3, 4), ((5, 5),), 6, 1, 3, 0),
+        slot=7,
+        incarnation=1,
+        expires_slot=9,
+        velocity=VECTOR,
+        yaw=0.5,
+        tilt=(0.1, 0.2),
+        telemetry=TELEMETRY,
     ),
     Beacon: Beacon(
-        3,
-        1,
-        900,
-        1.5,
-        VECTOR,
-        VECTOR,
-        VECTOR,
-        1,
-        2,
-        850,
-        0.5,
-        ((1, 900), (2, 901)),
-        7,
-        7,
-        POSE,
-        DRIFT,
-        1,
-        4,
-        900,
-        ((0, 0),),
+        id=3,
+        incarnation=1,
+        sequence=900,
+        stamp_s=1.5,
+        position=VECTOR,
+        velocity=VECTOR,
+        target=VECTOR,
+        queue=1,
+        rank=2,
+        cost_mm=850,
+        speed_cap=0.5,
+        echoes=((1, 900), (2, 901)),
+        mission=7,
+        frame_key=7,
+        frame=POSE,
+        drift=DRIFT,
+        tier=1,
+        parent=4,
+        root=900,
+        blocked=((0, 0),),
     ),
     Gossip: Gossip(
-        3,
-        1.5,
-        (RECORD,) * 3,
-        Piece(7, 0, 1, b"x"),
+        id=3,
+        stamp_s=1.5,
+        records=(RECORD,) * 3,
+        piece=Piece(key=7, index=0, count=1, data=b"x"),
     ),
 }
 DECODE = {
     Observation: decode_observation,
     Command: decode_command,
-    Beacon: lambda data: decode_beacon(sealed(data)),
-    Gossip: lambda data: decode_gossip(sealed(data)),
+    Beacon: lambda data: decode_beacon(add_checksum(data)),
+    Gossip: lambda data: decode_gossip(add_checksum(data)),
 }
 LIMIT_B = {
     Observation: MAX_OBSERVATION_B,
     Command: MAX_MESSAGE_B,
-    Beacon: MAX_RADIO_B - SEAL_B,
-    Gossip: MAX_RADIO_B - SEAL_B,
+    Beacon: MAX_PAYLOAD_B - CHECKSUM_B,
+    Gossip: MAX_PAYLOAD_B - CHECKSUM_B,
 }
 KINDS = pytest.mark.parametrize("kind", GOOD, ids=lambda kind: kind.__name__)
-CAUSES = {"oversize", "garbage", "invalid"}
+DECODING_CAUSES = {"oversize", "garbage", "invalid"}
 
 counts = st.integers(0, 2**53 - 1)
 ids = st.integers(0, 2**16 - 1)
@@ -114,84 +146,113 @@ velocities = st.tuples(speeds, speeds, speeds)
 angles = st.floats(-100.0, 100.0)
 parents = st.integers(-1, 2**16 - 1)
 costs = st.integers(0, 2**31 - 1)
-poses = st.builds(Pose, metres, metres, metres, angles)
+poses = st.builds(Pose, x=metres, y=metres, z=metres, yaw=angles)
 blocked = st.lists(st.tuples(indices, indices), max_size=8).map(tuple)
-drifts = st.builds(Drift, seconds, speeds, speeds, speeds, angles)
+drifts = st.builds(Drift, stamp_s=seconds, x=speeds, y=speeds, z=speeds, yaw_rate=angles)
 rates = st.floats(1e-6, 100.0)
 paths = st.builds(
     FramePath,
-    st.lists(positions, min_size=1, max_size=3).map(tuple),
-    rates,
-    seconds,
-    angles,
-    rates,
-    st.lists(seconds, max_size=3).map(tuple),
+    waypoints=st.lists(positions, min_size=1, max_size=3).map(tuple),
+    speed=rates,
+    start_s=seconds,
+    yaw=angles,
+    turn_rate=rates,
+    waits_s=st.lists(seconds, max_size=3).map(tuple),
 )
-scans = st.builds(Scan, st.integers(0, 7), st.binary(max_size=200))
-missions = st.builds(Mission, counts, paths, st.binary(max_size=900))
-pieces = st.builds(Piece, counts, st.integers(0, 15), st.integers(1, 16), st.binary(max_size=900))
+scans = st.builds(Scan, kind=st.integers(0, 7), ranges=st.binary(max_size=200))
+missions = st.builds(Mission, key=counts, frame=paths, formation=st.binary(max_size=900))
+pieces = st.builds(
+    Piece,
+    key=counts,
+    index=st.integers(0, 15),
+    count=st.integers(1, 16),
+    data=st.binary(max_size=900),
+)
 records = st.builds(
-    Record, ids, counts, counts, seconds, positions, indices, indices, costs, counts, blocked
+    Record,
+    id=ids,
+    incarnation=counts,
+    version=counts,
+    stamp_s=seconds,
+    position=positions,
+    queue=indices,
+    rank=indices,
+    cost_mm=costs,
+    mission=counts,
+    blocked=blocked,
 )
 telemetries = st.builds(
     Telemetry,
-    velocities,
-    st.floats(0.0, 1e9),
-    st.none() | positions,
-    st.none() | st.tuples(indices, indices),
-    st.lists(ids, max_size=20).map(tuple),
-    st.lists(st.tuples(st.integers(0, len(CAUSES_TOLD) - 1), counts), max_size=8).map(tuple),
-    counts,
-    indices,
-    parents,
-    st.integers(0, 3),
+    wanted=velocities,
+    force=st.floats(0.0, 1e9),
+    target=st.none() | positions,
+    place=st.none() | st.tuples(indices, indices),
+    heard=st.lists(ids, max_size=20).map(tuple),
+    rejected=st.lists(st.tuples(st.integers(0, len(CAUSES) - 1), counts), max_size=8).map(tuple),
+    mission=counts,
+    tier=indices,
+    parent=parents,
+    role=st.integers(0, 3),
 )
 messages = st.one_of(
     st.builds(
         Observation,
-        counts,
-        seconds,
-        positions,
-        velocities,
-        angles,
-        st.lists(positions, max_size=9).map(tuple),
-        st.lists(positions, max_size=4).map(tuple),
-        st.lists(missions, max_size=1).map(tuple),
-        st.lists(scans, max_size=2).map(tuple),
+        slot=counts,
+        time_s=seconds,
+        position=positions,
+        velocity=velocities,
+        yaw=angles,
+        vehicles=st.lists(positions, max_size=9).map(tuple),
+        obstacles=st.lists(positions, max_size=4).map(tuple),
+        orders=st.lists(missions, max_size=1).map(tuple),
+        scans=st.lists(scans, max_size=2).map(tuple),
     ),
     st.builds(
-        Command, counts, counts, counts, velocities, angles, st.tuples(angles, angles), telemetries
+        Command,
+        slot=counts,
+        incarnation=counts,
+        expires_slot=counts,
+        velocity=velocities,
+        yaw=angles,
+        tilt=st.tuples(angles, angles),
+        telemetry=telemetries,
     ),
     st.builds(
         Beacon,
-        ids,
-        counts,
-        counts,
-        seconds,
-        positions,
-        velocities,
-        positions,
-        indices,
-        indices,
-        costs,
-        st.floats(0.0, 100.0),
-        st.lists(st.tuples(ids, counts), max_size=20).map(tuple),
-        counts,
-        counts,
-        poses,
-        st.none() | drifts,
-        indices,
-        parents,
-        counts,
-        blocked,
+        id=ids,
+        incarnation=counts,
+        sequence=counts,
+        stamp_s=seconds,
+        position=positions,
+        velocity=velocities,
+        target=positions,
+        queue=indices,
+        rank=indices,
+        cost_mm=costs,
+        speed_cap=st.floats(0.0, 100.0),
+        echoes=st.lists(st.tuples(ids, counts), max_size=20).map(tuple),
+        mission=counts,
+        frame_key=counts,
+        frame=poses,
+        drift=st.none() | drifts,
+        tier=indices,
+        parent=parents,
+        root=counts,
+        blocked=blocked,
     ),
-    st.builds(Gossip, ids, seconds, st.lists(records, max_size=8).map(tuple), st.none()),
-    st.builds(Gossip, ids, seconds, st.just(()), pieces),
+    st.builds(
+        Gossip,
+        id=ids,
+        stamp_s=seconds,
+        records=st.lists(records, max_size=8).map(tuple),
+        piece=st.none(),
+    ),
+    st.builds(Gossip, id=ids, stamp_s=seconds, records=st.just(()), piece=pieces),
 )
 
 
 def numbers(value):
-    """Every float in a message, however deep."""
+    """Yield every float in a message, at any depth."""
     if isinstance(value, float):
         yield value
     elif isinstance(value, list | tuple):
@@ -199,18 +260,18 @@ def numbers(value):
             yield from numbers(inner)
 
 
-def cause(kind, data):
+def rejection_cause(kind, data):
     with pytest.raises(RejectedError) as caught:
         DECODE[kind](data)
     return caught.value.cause
 
 
-def survives(kind, data):
-    """Return the message, or None where it is refused; anything else ends the test."""
+def decoded_or_none(kind, data):
+    """Return the checked message, or None if it is rejected; any other error fails the test."""
     try:
         message = DECODE[kind](data)
     except RejectedError as error:
-        assert error.cause in CAUSES
+        assert error.cause in DECODING_CAUSES
         return None
     assert isinstance(message, kind)
     assert all(map(isfinite, numbers(msgspec.to_builtins(message))))
@@ -225,28 +286,28 @@ def test_a_message_survives_its_codec(message):
 
 
 @KINDS
-def test_junk_is_refused(kind):
+def test_junk_is_rejected(kind):
     random = Random(1)
     for _ in range(MANY):
-        survives(kind, random.randbytes(random.randrange(0, 80)))
+        decoded_or_none(kind, random.randbytes(random.randrange(0, 80)))
 
 
 @KINDS
-def test_mutations_are_refused_or_still_keep_the_promise(kind):
-    random, whole, refused = Random(2), encode(GOOD[kind]), 0
+def test_a_mutated_message_is_rejected_or_within_bounds(kind):
+    random, whole, rejected = Random(2), encode(GOOD[kind]), 0
     for _ in range(MANY):
         data = bytearray(whole)
         for _ in range(random.randrange(1, 4)):
             data[random.randrange(len(data))] = random.randrange(256)
         if random.random() < 0.2:
             del data[random.randrange(len(data)) :]
-        refused += survives(kind, bytes(data)) is None
-    assert refused > MANY // 4
+        rejected += decoded_or_none(kind, bytes(data)) is None
+    assert rejected > MANY // 4
 
 
 @pytest.mark.parametrize("decode_radio", [decode_beacon, decode_gossip])
-def test_a_turned_bit_is_seen_wherever_it_is(decode_radio):
-    payload = sealed(encode(GOOD[Beacon if decode_radio is decode_beacon else Gossip]))
+def test_a_flipped_bit_is_detected_anywhere(decode_radio):
+    payload = add_checksum(encode(GOOD[Beacon if decode_radio is decode_beacon else Gossip]))
     assert decode_radio(payload) in GOOD.values()
     for bit in range(8 * len(payload)):
         turned = bytearray(payload)
@@ -257,18 +318,18 @@ def test_a_turned_bit_is_seen_wherever_it_is(decode_radio):
 
 
 @given(st.binary(max_size=10))
-def test_what_is_too_short_for_a_seal_or_has_none_is_corrupt(payload):
+def test_a_payload_without_a_valid_checksum_is_corrupt(payload):
     for decode_radio in (decode_beacon, decode_gossip):
         with pytest.raises(RejectedError) as caught:
             decode_radio(payload)
-        assert caught.value.cause == "corrupt" or payload == sealed(payload[:-SEAL_B])
+        assert caught.value.cause == "corrupt" or payload == add_checksum(payload[:-CHECKSUM_B])
 
 
 @KINDS
-def test_a_part_of_a_message_is_garbage(kind):
+def test_a_truncated_message_is_garbage(kind):
     whole = encode(GOOD[kind])
-    assert {cause(kind, whole[:cut]) for cut in range(len(whole))} == {"garbage"}
-    assert cause(kind, whole + b"\x00") == "garbage"
+    assert {rejection_cause(kind, whole[:cut]) for cut in range(len(whole))} == {"garbage"}
+    assert rejection_cause(kind, whole + b"\x00") == "garbage"
 
 
 plain = st.recursive(
@@ -287,10 +348,10 @@ plain = st.recursive(
 
 @settings(derandomize=True, deadline=None, max_examples=400)
 @given(plain)
-def test_any_structure_is_refused_or_keeps_the_promise(value):
+def test_any_structure_is_rejected_or_within_bounds(value):
     data = msgpack.packb(value)
     for kind in GOOD:
-        survives(kind, data)
+        decoded_or_none(kind, data)
 
 
 def replaced(value, path, other):
@@ -302,7 +363,7 @@ def replaced(value, path, other):
 
 
 def leaves(value, path=()):
-    """Every number's path in nested tuples."""
+    """Yield (path, value) of every leaf in nested tuples."""
     if isinstance(value, tuple):
         for at, inner in enumerate(value):
             yield from leaves(inner, (*path, at))
@@ -311,7 +372,7 @@ def leaves(value, path=()):
 
 
 def structure(kind):
-    """A good message as nested tuples."""
+    """Return a good message as nested tuples."""
     return msgpack.unpackb(encode(GOOD[kind]), use_list=False)
 
 
@@ -332,28 +393,31 @@ WRONG = {
 
 @KINDS
 @pytest.mark.parametrize("wrong", WRONG.values(), ids=WRONG)
-def test_a_wrong_value_is_refused_wherever_it_stands(kind, wrong):
+def test_a_wrong_value_is_rejected_in_any_field(kind, wrong):
     good = structure(kind)
     for path, value in leaves(good):
         if isinstance(value, bytes) and isinstance(wrong, bytes):
             continue
-        refused_as = cause(kind, msgpack.packb(replaced(good, path, wrong)))
-        assert refused_as == "invalid"
+        cause = rejection_cause(kind, msgpack.packb(replaced(good, path, wrong)))
+        assert cause == "invalid"
 
 
 @KINDS
-def test_a_float_for_a_whole_number_is_refused(kind):
+def test_a_float_for_a_whole_number_is_rejected(kind):
     good = structure(kind)
     for path, value in leaves(good):
         if isinstance(value, int):
-            assert cause(kind, msgpack.packb(replaced(good, path, float(value)))) == "invalid"
+            assert (
+                rejection_cause(kind, msgpack.packb(replaced(good, path, float(value))))
+                == "invalid"
+            )
 
 
 @KINDS
-def test_a_field_too_few_or_too_many_is_refused(kind):
+def test_a_missing_or_extra_field_is_rejected(kind):
     good = structure(kind)
     for other in (good[:-1], (*good, 0), (*good, None), {}, dict.fromkeys("abc", 0), (), None, 1):
-        assert cause(kind, msgpack.packb(other)) == "invalid"
+        assert rejection_cause(kind, msgpack.packb(other)) == "invalid"
 
 
 BOMBS = {
@@ -366,35 +430,35 @@ BOMBS = {
     "4 GiB of extension": b"\xc9\xff\xff\xff\xff\x05",
     "a short timestamp": b"\xd6\xff\x00\x00\x00\x01",
     "an empty timestamp": b"\xc7\x00\xff",
-    "text that is none": b"\xa2\xff\xfe",
+    "invalid text": b"\xa2\xff\xfe",
     "a reserved byte": b"\xc1",
     "a number for a key": b"\x81\x01\x02",
-    "nothing at all": b"",
+    "no data": b"",
 }
 
 
 @KINDS
 @pytest.mark.parametrize("data", BOMBS.values(), ids=BOMBS)
 def test_a_bomb_is_garbage(kind, data):
-    assert cause(kind, data) in {"garbage", "invalid"}
+    assert rejection_cause(kind, data) in {"garbage", "invalid"}
 
 
 @KINDS
-def test_what_is_too_large_is_not_even_decoded(kind, monkeypatch):
+def test_an_oversize_message_is_rejected_before_decoding(kind, monkeypatch):
     monkeypatch.setattr(msgpack, "unpackb", lambda *_, **__: pytest.fail("it was decoded"))
-    assert cause(kind, bytes(LIMIT_B[kind] + 1)) == "oversize"
+    assert rejection_cause(kind, bytes(LIMIT_B[kind] + 1)) == "oversize"
 
 
-def test_lists_longer_than_allowed_are_refused():
+def test_lists_longer_than_allowed_are_rejected():
     good = GOOD[Beacon]
     many = msgspec.structs.replace(good, echoes=((1, 1),) * 129)
-    assert cause(Beacon, encode(many)) == "invalid"
-    told = msgspec.structs.replace(GOOD[Command].telemetry, heard=(1,) * 257)
-    assert cause(Command, encode(msgspec.structs.replace(GOOD[Command], telemetry=told))) == (
-        "invalid"
-    )
+    assert rejection_cause(Beacon, encode(many)) == "invalid"
+    telemetry = msgspec.structs.replace(GOOD[Command].telemetry, heard=(1,) * 257)
+    assert rejection_cause(
+        Command, encode(msgspec.structs.replace(GOOD[Command], telemetry=telemetry))
+    ) == ("invalid")
 
 
-def test_messages_cannot_be_changed():
+def test_messages_are_immutable():
     with pytest.raises(AttributeError):
         GOOD[Beacon].sequence = 1

@@ -1,4 +1,4 @@
-"""Controllers: how they are found by name, what is taken of theirs, and how they fail."""
+"""Controllers: how they are found by name, how intents are checked, and how they fail."""
 
 from math import hypot, inf, nan
 from pathlib import Path
@@ -19,28 +19,37 @@ from worldsim.scenario.file import load as load_scenario
 SCENARIO = Path(__file__).parents[2] / "deploy" / "scenarios" / "flocking-9.toml"
 REST = (0.0, 0.0, 0.0)
 HERE = (1.0, 2.0, 3.0)
-HOVER = Intent(REST, REST, 0.5, 0.0, HERE)
+HOVER = Intent(wanted=REST, velocity=REST, yaw=0.5, force=0.0, heading_for=HERE)
 MISSION = Missions(3, load_scenario(SCENARIO).formation, spacing=1.0).flown
-SENSES = Senses(2.5, HERE, REST, 0.5, (), (), tuple, MISSION)
+SENSES = Senses(
+    now_s=2.5,
+    position=HERE,
+    velocity=REST,
+    yaw=0.5,
+    vehicles=(),
+    neighbours=(),
+    team=tuple,
+    mission=MISSION,
+)
 
 
-class Puppet:
-    """Returns, or raises, what a test tells it to."""
+class StubController:
+    """Returns, or raises, the result that a test sets."""
 
-    says: Any = HOVER
+    result: Any = HOVER
 
     def __init__(self, setup: AgentSetup) -> None:
-        if isinstance(self.says, OSError):
-            raise self.says
+        if isinstance(self.result, OSError):
+            raise self.result
 
     def decide(self, senses: Senses) -> Intent:
-        if isinstance(self.says, Exception):
-            raise self.says
-        return self.says  # type: ignore[no-any-return]
+        if isinstance(self.result, Exception):
+            raise self.result
+        return self.result  # type: ignore[no-any-return]
 
 
-class Mute:
-    """Has nothing to decide with."""
+class NoController:
+    """Has no method 'decide'."""
 
 
 def setup_of(controller: str) -> AgentSetup:
@@ -48,12 +57,12 @@ def setup_of(controller: str) -> AgentSetup:
 
 
 @pytest.fixture
-def puppet(monkeypatch: pytest.MonkeyPatch) -> Any:
-    def saying(words: Any) -> CheckedController:
-        monkeypatch.setattr(Puppet, "says", words)
-        return CheckedController(setup_of(f"{__name__}:Puppet"))
+def controller_with(monkeypatch: pytest.MonkeyPatch) -> Any:
+    def make(result: Any) -> CheckedController:
+        monkeypatch.setattr(StubController, "result", result)
+        return CheckedController(setup_of(f"{__name__}:StubController"))
 
-    return saying
+    return make
 
 
 @pytest.mark.parametrize(
@@ -68,7 +77,7 @@ def test_a_name_finds_its_class(name: str, found: type) -> None:
     assert load(name) is found
 
 
-def test_an_installed_package_names_controllers_but_not_those_that_ship(
+def test_an_installed_package_adds_controllers_but_cannot_replace_built_in_ones(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     info = tmp_path / "others-1.0.dist-info"
@@ -92,30 +101,39 @@ def test_an_installed_package_names_controllers_but_not_those_that_ship(
         ("bird", "q_structure, flocking"),
         ("no.such.module:Class", "No module named 'no'"),
         ("agent.guidance.flocking:Bird", "'Bird'"),
-        (f"{__name__}:Mute", "no method 'decide'"),
-        (":Flocking", "neither known"),
-        ("agent.guidance.flocking:", "neither known"),
+        (f"{__name__}:NoController", "no method 'decide'"),
+        (":Flocking", "neither a known controller"),
+        ("agent.guidance.flocking:", "neither a known controller"),
     ],
 )
-def test_a_controller_that_cannot_be_had_is_told_why(name: str, why: str) -> None:
+def test_the_error_of_a_controller_that_cannot_be_loaded_says_why(name: str, why: str) -> None:
     with pytest.raises(ControllerError) as refused:
         load(name)
     assert repr(name) in str(refused.value)
     assert why in str(refused.value)
 
 
-def test_what_is_plain_is_taken_as_it_is() -> None:
+def test_a_plain_intent_is_returned_unchanged() -> None:
     assert plain(HOVER) is HOVER
 
 
-def test_numbers_of_numpy_become_plain_floats() -> None:
+def test_numpy_numbers_become_plain_floats() -> None:
     zero, here = np.zeros(3, dtype=np.float32), np.array(HERE)
-    taken = plain(Intent(zero, zero, np.float64(0.5), np.float32(0.0), here, here))
+    taken = plain(
+        Intent(
+            wanted=zero,
+            velocity=zero,
+            yaw=np.float64(0.5),
+            force=np.float32(0.0),
+            heading_for=here,
+            target=here,
+        )
+    )
     assert taken == replace(HOVER, target=HERE)
     assert {type(number) for number in (*taken.wanted, *taken.heading_for, taken.yaw)} == {float}
 
 
-def test_far_from_the_origin_is_no_fault() -> None:
+def test_positions_far_from_the_origin_are_allowed() -> None:
     far = replace(HOVER, heading_for=(-9e5, 9e5, 100.5), target=(9e5, 0.0, 0.0), force=1e6)
     assert plain(far) == far
 
@@ -136,13 +154,13 @@ def test_far_from_the_origin_is_no_fault() -> None:
         ("tilt", (0.0, 0.0, 0.0)),
     ],
 )
-def test_what_no_command_may_hold_is_refused_by_name(field: str, value: Any) -> None:
+def test_a_number_outside_a_commands_bounds_is_rejected_by_name(field: str, value: Any) -> None:
     with pytest.raises(ValueError, match=f"Intent's {field} "):
         plain(replace(HOVER, **{field: value}))
 
 
 @pytest.mark.parametrize(
-    ("says", "told"),
+    ("result", "text"),
     [
         (ZeroDivisionError("division by zero"), "ZeroDivisionError: division by zero"),
         (None, "TypeError: decide returned NoneType, not an Intent"),
@@ -151,25 +169,25 @@ def test_what_no_command_may_hold_is_refused_by_name(field: str, value: Any) -> 
     ],
 )
 def test_a_failure_in_flight_names_controller_agent_and_time(
-    says: Any, told: str, puppet: Any
+    result: Any, text: str, controller_with: Any
 ) -> None:
-    pilot = puppet(says)
+    controller = controller_with(result)
     with pytest.raises(FaultyControllerError) as failed:
-        pilot.decide(SENSES)
-    begin = f"controller '{__name__}:Puppet' of agent 3 failed at 2.5 s: "
-    assert str(failed.value).startswith(begin + told)
+        controller.decide(SENSES)
+    begin = f"controller '{__name__}:StubController' of agent 3 failed at 2.5 s: "
+    assert str(failed.value).startswith(begin + text)
 
 
-def test_a_failure_at_the_start_names_controller_and_agent(puppet: Any) -> None:
+def test_a_failure_at_the_start_names_controller_and_agent(controller_with: Any) -> None:
     with pytest.raises(FaultyControllerError) as failed:
-        puppet(OSError("no battery"))
-    assert str(failed.value) == (
-        f"controller '{__name__}:Puppet' of agent 3 failed when it was made: OSError: no battery"
-    )
+        controller_with(OSError("no battery"))
+    begin = f"controller '{__name__}:StubController' of agent 3 failed in its constructor: "
+    assert str(failed.value) == begin + "OSError: no battery"
 
 
 def heard(x: float, velocity: tuple[float, float, float] = REST) -> Heard:
-    return Heard(1, 0.0, (x, 0.0, 0.0), velocity, (x, 0.0, 0.0), None)
+    at = (x, 0.0, 0.0)
+    return Heard(id=1, age_s=0.0, position=at, velocity=velocity, target=at, place=None)
 
 
 def flock(*neighbours: Heard) -> Intent:
@@ -177,18 +195,18 @@ def flock(*neighbours: Heard) -> Intent:
     return Flocking(setup_of("flocking")).decide(senses)
 
 
-def test_a_bird_alone_hovers() -> None:
+def test_an_agent_alone_hovers() -> None:
     assert flock().wanted == REST
 
 
 @pytest.mark.parametrize(("x", "way"), [(0.9, -1), (1.0, 0), (1.1, 1)])
-def test_birds_draw_together_and_keep_apart_about_spacing_m(x: float, way: int) -> None:
+def test_a_flock_keeps_about_spacing_m_apart(x: float, way: int) -> None:
     assert np.sign(flock(heard(x)).wanted[0]) == way
 
 
-def test_birds_fly_alike() -> None:
+def test_a_flock_aligns_its_velocities() -> None:
     assert flock(heard(1.0, (0.0, 0.2, 0.1))).wanted == pytest.approx((0.0, 0.1, 0.05))
 
 
-def test_birds_keep_the_limits_of_their_vehicles() -> None:
+def test_a_flock_keeps_the_limits_of_its_vehicles() -> None:
     assert hypot(*flock(heard(0.01)).wanted) == pytest.approx(0.5)

@@ -1,4 +1,4 @@
-"""An agent's process between two rings: what it takes when, and what it tells of that."""
+"""The free-running shell: which frames it uses when, and what it reports about that."""
 
 from collections import defaultdict
 from pathlib import Path
@@ -14,32 +14,32 @@ from worldsim.scenario.file import load
 
 WEDGE = Path("deploy/scenarios/wedge-9.toml")
 STILL = (0.0, 0.0, 0.0)
-JUNK = Frame(1, 0, 0, 5, b"junk")
+JUNK = Frame(source=1, incarnation=0, channel=0, count=5, payload=b"junk")
 
 
-class Waiting(list):
+class FakeSubscriber(list):
     def drain(self, quota):
         taken, self[:quota] = self[:quota], []
         return taken
 
 
-class FakePost:
-    """What an agent hears, and what it says, by topic."""
+class FakeBus:
+    """Holds what an agent receives, and what it publishes by topic."""
 
     def __init__(self):
-        self.heard = Waiting()
-        self.said = defaultdict(list)
+        self.received = FakeSubscriber()
+        self.published = defaultdict(list)
 
-    def subscriber(self, _topic, _who, _size):
-        return self.heard
+    def subscriber(self, _topic, _agent, _size):
+        return self.received
 
-    def publisher(self, topic, _who):
-        return self.said[topic].append
+    def publisher(self, topic, _agent):
+        return self.published[topic].append
 
 
 @pytest.fixture
 def bus():
-    return FakePost()
+    return FakeBus()
 
 
 @pytest.fixture
@@ -47,45 +47,54 @@ def shell(bus):
     return FreeRunningAgent(bus, load(WEDGE, {}).agent_setup(0, 2, 2))
 
 
-def seen(slot):
-    return encode(Observation(slot, slot / 80.0, STILL, STILL, 0.0, (), (), (), ()))
+def observation(slot):
+    return encode(
+        Observation(
+            slot=slot,
+            time_s=slot / 80.0,
+            position=STILL,
+            velocity=STILL,
+            yaw=0.0,
+            vehicles=(),
+            obstacles=(),
+            orders=(),
+            scans=(),
+        )
+    )
 
 
-def told(shell, bus):
+def last_report(shell, bus):
     shell.report()
-    return unpack_report(bus.said["arrivals"][-1])
+    return unpack_report(bus.published["arrivals"][-1])
 
 
-def test_frames_are_counted_from_when_they_were_due_to_when_they_are_used(shell, bus):
-    bus.heard.append(pack(Delivery(4, (JUNK, JUNK), (0, 25_000))))
-    shell.see(seen(8))
-    counts = told(shell, bus).counts[0]
-    assert [at for at, count in enumerate(counts) if count] == [
-        4 * BINS_PER_SLOT,
-        6 * BINS_PER_SLOT,
-    ]
-    assert told(shell, bus).incarnation == 2
+def test_a_frames_delay_is_counted_from_its_due_time_to_its_use(shell, bus):
+    bus.received.append(pack(Delivery(4, (JUNK, JUNK), (0, 25_000))))
+    shell.observe(observation(8))
+    counts = last_report(shell, bus).counts[0]
+    assert [at for at, count in enumerate(counts) if count] == [4 * BINS_PER_SLOT, 6 * BINS_PER_SLOT]
+    assert last_report(shell, bus).incarnation == 2
 
 
-def test_what_is_of_a_later_slot_waits_for_its_observation(shell, bus):
-    bus.heard += [pack(Delivery(slot, (JUNK,), (0,))) for slot in (4, 8)]
-    shell.see(seen(4))
-    assert sum(told(shell, bus).counts[0]) == 1
-    shell.see(seen(8))
-    counts = told(shell, bus).counts[0]
+def test_a_batch_of_a_later_slot_waits_for_its_observation(shell, bus):
+    bus.received += [pack(Delivery(slot, (JUNK,), (0,))) for slot in (4, 8)]
+    shell.observe(observation(4))
+    assert sum(last_report(shell, bus).counts[0]) == 1
+    shell.observe(observation(8))
+    counts = last_report(shell, bus).counts[0]
     assert counts[0] == sum(counts) == 2
 
 
-def test_it_tells_about_once_a_second(shell, bus):
+def test_it_reports_about_once_a_second(shell, bus):
     for tick in range(201):
-        shell.see(seen(4 * tick))
-    assert len(bus.said["command"]) == len(bus.said["tx"]) == 201
-    assert len(bus.said["arrivals"]) == 10
+        shell.observe(observation(4 * tick))
+    assert len(bus.published["command"]) == len(bus.published["tx"]) == 201
+    assert len(bus.published["arrivals"]) == 10
 
 
-def test_what_is_no_delivery_is_counted_and_hurts_nothing(shell, bus):
-    bus.heard += [b"junk", pack(Batch(4, (JUNK,))), pack(Delivery(4, (JUNK,), ()))]
-    shell.see(seen(4))
-    shell.see(b"junk")
-    assert shell._controls.core.rejected == {"batch": 3, "observation": 1}
-    assert len(bus.said["command"]) == 1
+def test_an_invalid_message_is_counted_and_changes_nothing(shell, bus):
+    bus.received += [b"junk", pack(Batch(4, (JUNK,))), pack(Delivery(4, (JUNK,), ()))]
+    shell.observe(observation(4))
+    shell.observe(b"junk")
+    assert shell._stepper.core.rejected == {"batch": 3, "observation": 1}
+    assert len(bus.published["command"]) == 1

@@ -14,7 +14,7 @@ class ByNumber:
         self.cost_m = 0.0
         self.blocked = ()
 
-    def made(self, senses: Senses) -> OwnTarget:
+    def select(self, senses: Senses) -> OwnTarget:
         """Return the place of one's number among two."""
         layout = senses.mission.formation.layout(2)
         place = layout.places[self._own_id]
@@ -26,4 +26,4 @@ class Swapping(QStructure):
 
     def __init__(self, setup: AgentSetup) -> None:
         super().__init__(setup)
-        self._choice = ByNumber(setup.id)  # type: ignore[assignment]
+        self._slot_selection = ByNumber(setup.id)  # type: ignore[assignment]

@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -41,3 +42,13 @@ def test_every_requirement_is_pinned() -> None:
     block = project.partition("dependencies = [")[2].partition("]\n\n[project.scripts")[0]
     for name in re.findall(r'"([A-Za-z0-9-]+)', block):
         assert f"\n{name.lower()}==" in pins
+
+
+def test_of_netem_the_agents_core_may_import_only_the_channels() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    contracts = project["tool"]["importlinter"]["contracts"]
+    (core,) = [each for each in contracts if "agent.core" in each.get("source_modules", [])]
+    files = (ROOT / "netem").rglob("*.py")
+    modules = {".".join(file.relative_to(ROOT).with_suffix("").parts) for file in files}
+    modules -= {"netem.__init__", "netem.wire.__init__", "netem.wire.channels"}
+    assert {each for each in core["forbidden_modules"] if each.startswith("netem")} == modules

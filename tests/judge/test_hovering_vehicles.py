@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agent.comms.unidentified_vehicles import SILENCE_S
+from agent.comms.unidentified_vehicles import UNIDENTIFIED_AFTER_S
 from agent.messages import Place
 from tests.recording.flights import straight_flight, wedge
 from worldsim.judge.hovering_vehicles import HoveringVehicles
@@ -41,5 +41,5 @@ def test_who_flies_past_takes_none(speed):
 
 
 def test_nobody_is_known_to_stand_before_it_did_so_for_a_while():
-    assert blocked((0.0, 0.0, 0.0), SILENCE_S - 0.1) == frozenset()
-    assert blocked((0.0, 0.0, 0.0), SILENCE_S + 0.1) == {APEX}
+    assert blocked((0.0, 0.0, 0.0), UNIDENTIFIED_AFTER_S - 0.1) == frozenset()
+    assert blocked((0.0, 0.0, 0.0), UNIDENTIFIED_AFTER_S + 0.1) == {APEX}

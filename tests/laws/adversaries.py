@@ -13,7 +13,7 @@ from time import perf_counter
 
 import numpy as np
 
-from agent.guidance.cone import SLACK
+from agent.guidance.cone import SLACK_RAD
 from agent.guidance.movement import DEAD_BAND_MPS
 from agent.guidance.safety_filter import PASSES, ROUNDING_MPS, SHARE
 
@@ -126,7 +126,7 @@ def _in_cone(velocity, yaw, cone):
     x, y = velocity[:, 0], velocity[:, 1]
     error = np.arctan2(y, x) - yaw
     error = error - 2.0 * pi * np.rint(error / (2.0 * pi))
-    inside = (-cone[:, 1] - SLACK <= error) & (error <= cone[:, 0] + SLACK)
+    inside = (-cone[:, 1] - SLACK_RAD <= error) & (error <= cone[:, 0] + SLACK_RAD)
     return inside | (np.hypot(x, y) <= DEAD_BAND_MPS)
 
 

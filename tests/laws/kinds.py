@@ -1,4 +1,4 @@
-"""Adversaries of every kind of vehicle under the guard that flies, one pair at a time.
+"""Adversaries of every kind of vehicle under the safety monitor that flies, one pair at a time.
 
 They want the worst: straight at the other, past it, round it, or anything, with commands that come
 late and expire, and headings that turn while they fly.
@@ -11,7 +11,7 @@ import numpy as np
 
 from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.controller import Senses
-from agent.guidance.safety_monitor import Guard
+from agent.guidance.safety_monitor import SafetyMonitor
 from tests.laws.speck import SPECK
 from worldsim.truth.vehicle import Vehicles
 
@@ -27,8 +27,8 @@ class Craft:
     vehicle: Vehicle
     ticks: int
 
-    def guard(self, fastest):
-        return Guard(
+    def safety_monitor(self, fastest):
+        return SafetyMonitor(
             AgentSetup(
                 id=0,
                 incarnation=0,
@@ -45,12 +45,12 @@ class Craft:
 
 
 class Pair:
-    """Two vehicles in truth, each with its guard; the second may be a thing that stands."""
+    """Two vehicles in truth, each with its monitor; the second may be a thing that stands."""
 
     def __init__(self, random, crafts, start, standing=False):
         self.random, self.crafts, self.standing = random, crafts, standing
         fastest = max(craft.vehicle.max_speed_mps for craft in crafts)
-        self.guards = [craft.guard(fastest) for craft in crafts]
+        self.safety_monitors = [craft.safety_monitor(fastest) for craft in crafts]
         position = np.array([(0.0, 0.0, 0.0), start])
         yaws = np.array([random.uniform(-pi, pi) for _ in crafts])
         self.fleet = Vehicles(position, yaws, [craft.vehicle for craft in crafts])
@@ -69,17 +69,17 @@ class Pair:
         wanted = tuple(speed * w for w in self.wish[me](self.random, towards, slot))
         near = (towards,)
         senses = Senses(
-            slot * DT,
-            tuple(here),
-            tuple(self.fleet.velocity[me].tolist()),
-            float(self.fleet.yaw[me]),
-            () if self.standing else near,
-            (),
-            tuple,
-            None,
+            now_s=slot * DT,
+            position=tuple(here),
+            velocity=tuple(self.fleet.velocity[me].tolist()),
+            yaw=float(self.fleet.yaw[me]),
+            vehicles=() if self.standing else near,
+            neighbours=(),
+            team=tuple,
+            mission=None,
             obstacles=near if self.standing else (),
         )
-        safe = self.guards[me].safe(wanted, senses, list)
+        safe = self.safety_monitors[me].safe_velocity(wanted, senses, list)
         yaw = self.random.uniform(-pi, pi)
         ends = slot + self.crafts[me].ticks * SLOTS
         self.coming[me].append((slot + self.late[me], safe, yaw, ends))

@@ -142,10 +142,14 @@ def noise_changes_no_order() -> None:
     flips = 0
     for update in range(600):
         team = [
-            Peer(who, tuple(x + random.gauss(0.0, 0.01) for x in true[who]), claims[who])  # type: ignore[arg-type]
+            Peer(
+                id=who,
+                position=tuple(x + random.gauss(0.0, 0.01) for x in true[who]),  # type: ignore[arg-type]
+                place=claims[who],
+            )
             for who in (1, 2)
         ]
-        chosen = allocation.allot(team, places, slots)
+        chosen = allocation.allocate(team, places, slots)
         flips += update > 0 and chosen != claims
         claims = dict(chosen)
     assert flips == 0, f"{flips} flips in 600 updates"

@@ -7,7 +7,7 @@ import pytest
 
 from agent.config import Vehicle
 from agent.guidance import safety_monitor
-from agent.guidance.nonholonomic import forward_kept
+from agent.guidance.nonholonomic import forward_limited
 from agent.guidance.safety_filter import Bound, approach_of
 from tests.laws.kinds import Craft, anything, least_distance, straight
 
@@ -51,7 +51,7 @@ def test_nobody_comes_nearer_to_what_stands_than_its_clearance(name):
 
 
 def test_without_reckoning_the_brakes_they_collide(monkeypatch):
-    monkeypatch.setattr(safety_monitor.Guard, "_stopping_s", lambda self, speed: 0.0)
+    monkeypatch.setattr(safety_monitor.SafetyMonitor, "_stopping_s", lambda self, speed: 0.0)
     crafts = [CRAFTS["fast"]] * 2
     assert min(least_distance(Random(seed), crafts)[1] for seed in range(60)) < D_OB - 0.01
 
@@ -62,7 +62,7 @@ def test_a_way_ahead_keeps_its_bounds_wherever_it_may_turn():
         yaw, sway = random.uniform(-pi, pi), random.uniform(0.0, 0.5)
         x, y, z = straight(random, tuple(random.gauss(0, 1) for _ in range(3)), 0)
         bound = Bound((x, y, z), random.uniform(0.0, 0.3))
-        u, v, w = forward_kept(anything(random, None, 0), [bound], yaw, sway)
+        u, v, w = forward_limited(anything(random, None, 0), [bound], yaw, sway)
         forward = hypot(u, v)
         for turn in (-sway, -0.4 * sway, 0.0, 0.7 * sway, sway):
             there = (forward * cos(yaw + turn), forward * sin(yaw + turn), w)
@@ -74,7 +74,7 @@ def test_a_way_ahead_is_only_shortened():
     for _ in range(500):
         yaw = random.uniform(-pi, pi)
         wanted = anything(random, None, 0)
-        u, v, w = forward_kept(wanted, [Bound((1.0, 0.0, 0.0), 0.1)], yaw, 0.2)
+        u, v, w = forward_limited(wanted, [Bound((1.0, 0.0, 0.0), 0.1)], yaw, 0.2)
         assert hypot(u, v, w) <= 1.0 + 1e-9
         assert abs(cos(yaw) * v - sin(yaw) * u) <= 1e-12
         assert cos(yaw) * u + sin(yaw) * v >= 0.0

@@ -3,7 +3,7 @@
 import pytest
 
 from agent.comms import allocation
-from agent.comms.gossip import Table
+from agent.comms.gossip import RecordTable
 from agent.guidance import bobber as bobber_room
 from agent.guidance import movement
 from agent.guidance.potential import Potential
@@ -48,9 +48,9 @@ LITERAL = {
     "E11": ("E7", bobber_room, {"bobber": literal.bobber_never_head_on}),
     "E11 Lemma 9": ("Lemma 9", bobber_room, {"bobber": literal.bobber_never_head_on}),
     "E13": ("E13", Queue, {"_behind": literal.members_by_chord}),
-    "E14": ("E14", Table, {"adopt": literal.adopt_nothing}),
+    "E14": ("E14", RecordTable, {"adopt": literal.adopt_nothing}),
     "E16": ("E16", Formation, {"_holders": literal.holders_queue_by_queue}),
-    "E17": ("E17", allocation, {"allot": literal.allot_by_distance}),
+    "E17": ("E17", allocation, {"allocate": literal.allot_by_distance}),
 }
 
 

@@ -12,7 +12,8 @@ from netem.link import LinkModel
 from netem.link_keys import Conditions, DirectedLink, GilbertElliott, LinkKeys, PathLoss
 from netem.medium import Medium
 from netem.messages import MediumSetup
-from netem.wire.frame import LOCAL, MULTIHOP, Outgoing, Transmission
+from netem.wire.channels import LOCAL, MULTIHOP
+from netem.wire.frame import Outgoing, Transmission
 from tests.netem.ordering import begin, end
 
 FIELDS = LinkKeys.__struct_fields__

@@ -9,14 +9,8 @@ from hypothesis import strategies as st
 from netem.free_running import Intake
 from netem.link_keys import Conditions
 from netem.messages import MediumSetup
-from netem.wire.frame import (
-    MAX_OUTGOING,
-    MAX_PAYLOAD_B,
-    MAX_TRANSMISSION_B,
-    Outgoing,
-    Transmission,
-    pack,
-)
+from netem.wire.channels import MAX_PAYLOAD_B
+from netem.wire.frame import MAX_OUTGOING, MAX_TRANSMISSION_B, Outgoing, Transmission, pack
 
 CAUSES = {"oversize", "malformed", "incarnation", "ahead", "stale", "repeated"}
 

@@ -10,11 +10,10 @@ from hypothesis import strategies as st
 from netem.link_keys import Conditions, DirectedLink, LinkKeys
 from netem.medium import Medium
 from netem.messages import MediumSetup
+from netem.wire.channels import LOCAL, MULTIHOP
 from netem.wire.frame import (
-    LOCAL,
     MAX_BATCH_B,
     MAX_FRAMES,
-    MULTIHOP,
     Batch,
     Outgoing,
     Transmission,

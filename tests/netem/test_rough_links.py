@@ -22,7 +22,8 @@ from netem.messages import MediumSetup
 from netem.random_draws import MAX_QUANTILE, SHAPES, FrameDraws, correlated_share
 from netem.range_index import ARRAYS_FROM, RangeIndex
 from netem.rate_queue import RateQueue
-from netem.wire.frame import LOCAL, MULTIHOP, Outgoing, Transmission
+from netem.wire.channels import LOCAL, MULTIHOP
+from netem.wire.frame import Outgoing, Transmission
 
 EDGE = PathLoss(3.0, 40.0, 70.0)
 NOTHING_RARE = FrameDraws(

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS, admit
-from worldsim.engine.virtual import COMMAND_TICKS
+from worldsim.engine.preflight import admit
 from worldsim.scenario.file import load
 from worldsim.scenario.rules import cautions, too_fast
 from worldsim.scenario.tables import Scenario
@@ -55,10 +54,6 @@ def test_fast_vehicles_need_a_tick_rate_that_does(
     assert f"fleet.tick_hz = {tick_hz} would do" in found.detail
     faster = wedge(vehicle__max_speed_mps=speed, fleet__tick_hz=str(tick_hz))
     assert too_fast(faster, ticks) is None
-
-
-def test_admission_knows_the_virtual_clock() -> None:
-    assert VIRTUAL_COMMAND_TICKS == COMMAND_TICKS
 
 
 def refusal(tmp_path: Path, scenario: Scenario) -> str:

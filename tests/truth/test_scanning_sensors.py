@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from agent.config import Laser, Sensors, Sonar, Vehicle
-from agent.sensing.ray_pattern import KINDS, pattern_of
+from agent.messages import NO_ECHO_MM
+from agent.sensing.ray_pattern import SCANNERS, pattern_of
 from worldsim.scenario.obstacle_tables import Sphere, Wall
 from worldsim.truth.obstacles import Obstacles
-from worldsim.truth.scanning_sensors import NO_ECHO_MM, ScanningSensors
+from worldsim.truth.scanning_sensors import ScanningSensors
 
 BALL = Sphere(centre_m=(2.0, 0.0, 0.0), radius_m=0.5)
 WALL = Wall(from_m=(-9, 1.0, -5), to_m=(9, 1.0, -5), height_m=10.0, thickness_m=0.0002)
@@ -21,7 +22,7 @@ HERE = np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.0], [np.nan] * 3])
 YAW = np.array([0.0, pi / 2, np.nan])
 
 
-def scans(sensors=Sensors(), kinds=KINDS, obstacles=(), seed=1):  # noqa: B008
+def scans(sensors=Sensors(), kinds=SCANNERS, obstacles=(), seed=1):  # noqa: B008
     vehicles = [Vehicle(sensors=kinds)] * 3
     return ScanningSensors(vehicles, sensors, seed, 20.0, Obstacles(obstacles))
 
@@ -101,7 +102,7 @@ def test_a_sensor_scans_at_its_rate_on_its_carriers_only():
     assert not scans(kinds=("proximity",)).any
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SCANNERS)
 def test_a_pattern_is_of_unit_vectors(kind):
     pattern = pattern_of(kind, Sensors(laser=Laser(rings=5, elevation_deg=60)), 20.0)
     for beam in pattern.beams:

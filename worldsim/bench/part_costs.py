@@ -12,7 +12,8 @@ from agent.qstructure.formation import Formation
 from agent.qstructure.target_frame import Frame
 from netem.link_keys import Conditions
 from netem.medium import Medium
-from netem.wire.frame import LOCAL, Outgoing, Transmission
+from netem.wire.channels import LOCAL
+from netem.wire.frame import Outgoing, Transmission
 from worldsim.bench.fleets import EIGHT_IN_RANGE_M, wedge
 
 PAYLOAD_B = 280

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from agent.messages import CAUSES, Command
 from netem.messages import MediumCounters
-from netem.wire.frame import CHANNELS
+from netem.wire.channels import CHANNELS
 
 
 class RadioUse:

@@ -3,7 +3,7 @@
 from typing import assert_never
 
 from agent.codec import encode_formation
-from agent.comms.mission import ORIGINS
+from agent.comms.mission import KEYS_PER_VERSION
 from agent.messages import Mission
 from agent.qstructure.formation import FormationSpec
 from worldsim.engine.operations import GiveMission
@@ -31,7 +31,7 @@ class Missions:
     @property
     def newest(self) -> int:
         """The version of the newest mission, issued here or reported by an agent."""
-        return max(self._issued, max(self._flown) // ORIGINS)
+        return max(self._issued, max(self._flown) // KEYS_PER_VERSION)
 
     def changed(self, change: MissionChange, at_s: float) -> GiveMission:
         """Return the mission that changes the formation or the frame at a time [s]."""
@@ -48,7 +48,7 @@ class Missions:
         """Make a mission pending, newer than any reported so far; return its key."""
         self._issued = mission.version or self.newest + 1
         self.to = mission.to
-        key = self._issued * ORIGINS
+        key = self._issued * KEYS_PER_VERSION
         self.pending = Mission(key, mission.path, encode_formation(mission.formation))
         return key
 

@@ -16,8 +16,9 @@ from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.start_positions import StartError, start_poses_of
 
 VIRTUAL_COMMAND_TICKS = 1
+"""Life of a command in virtual time and in lockstep, where none is late [ticks]."""
 PROCESS_COMMAND_TICKS = 2
-"""For how many ticks a command lives under each clock: H of docs/method.md."""
+"""Life of a command in free-running processes [ticks]; H of docs/method.md follows from it."""
 
 
 def admit(scenario: Scenario, file: str | Path, command_ticks: int, by_hand: bool = False) -> None:

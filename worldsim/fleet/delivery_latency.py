@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from itertools import accumulate
 from typing import Any
 
-from netem.wire.frame import CHANNELS, WireError
+from netem.wire.channels import CHANNELS
+from netem.wire.frame import WireError
 from netem.wire.latency import BINS_PER_SLOT, LatencyReport, bin_of, unpack_report
 
 PERCENTILES = (1, 5, 50, 95, 99)

@@ -16,7 +16,7 @@ from netem.conditions import LinkModels, NetworkConditions
 from netem.link import burst_variance_factor, mean_loss
 from netem.link_keys import Conditions
 from netem.random_draws import MAX_QUANTILE
-from netem.wire.frame import MULTIHOP
+from netem.wire.channels import MULTIHOP
 from worldsim.judge.radio_events import order_of
 from worldsim.judge.run_events import RadioRunEvent
 from worldsim.judge.tick import Tick

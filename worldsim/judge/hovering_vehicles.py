@@ -9,7 +9,7 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from agent.comms.unidentified_vehicles import SAME_BODY_M, SILENCE_S
+from agent.comms.unidentified_vehicles import SAME_VEHICLE_M, UNIDENTIFIED_AFTER_S
 from agent.controller import Flown
 from agent.guidance.target_on_queue import TargetOnQueue
 from agent.messages import Place
@@ -29,17 +29,17 @@ class HoveringVehicles:
         """Remember where everybody is; ticks come in order."""
         past = self._past
         past.append((tick.time_s, tick.position))
-        while len(past) > 1 and past[1][0] <= tick.time_s - SILENCE_S:
+        while len(past) > 1 and past[1][0] <= tick.time_s - UNIDENTIFIED_AFTER_S:
             past.popleft()
 
     def standing(self, tick: Tick) -> NDArray[np.bool_]:
         """Return who stands (N,): in the world, and within 0.2 m of where it was 1.5 s ago."""
         since_s, before = self._past[0]
-        if since_s > tick.time_s - SILENCE_S:
+        if since_s > tick.time_s - UNIDENTIFIED_AFTER_S:
             return np.zeros(len(before), dtype=np.bool_)
         off = tick.position - before
         square = off * off
-        stands: NDArray[np.bool_] = square[:, 0] + square[:, 1] + square[:, 2] < SAME_BODY_M**2
+        stands: NDArray[np.bool_] = square[:, 0] + square[:, 1] + square[:, 2] < SAME_VEHICLE_M**2
         return stands
 
     def layout(self, tick: Tick, phase: Phase, team: list[int]) -> Layout:
@@ -52,4 +52,4 @@ class HoveringVehicles:
         others[team] = False
         bodies = [(x, y, z) for x, y, z in tick.position[others].tolist()]
         flown = Flown(phase.mission, phase.formation, phase.frame(tick.time_s))
-        return frozenset(self._targets.blocked(flown, len(team), bodies))
+        return frozenset(self._targets.taken_by(flown, len(team), bodies))

@@ -9,6 +9,7 @@ import numpy as np
 
 from netem.link import Cause, LinkModel, mean_loss, reception_probability
 from netem.random_draws import SHAPES
+from netem.wire.channels import LOCAL, Channel
 from worldsim.link_check.intervals import (
     KOLMOGOROV,
     Z,
@@ -44,7 +45,7 @@ class Finding(NamedTuple):
 Fly = Callable[..., Flight]
 
 
-def findings(link: LinkModel, seed: int, channel: int = 0) -> Iterator[Finding]:
+def findings(link: LinkModel, seed: int, channel: Channel = LOCAL) -> Iterator[Finding]:
     """Fly up to PACKETS packets over a link for each of its parameters, and compare."""
 
     def fly(model: LinkModel, **how: float) -> Flight:

@@ -14,6 +14,7 @@ from netem.link import Cause, LinkModel
 from netem.link_keys import Conditions, LinkKeys
 from netem.medium import Medium
 from netem.messages import MediumSetup
+from netem.wire.channels import Channel
 from netem.wire.frame import Outgoing, Transmission
 
 PACKETS = 100_000
@@ -40,7 +41,7 @@ class Flight:
         self,
         model: LinkModel,
         seed: int,
-        channel: int = 0,
+        channel: Channel = 0,
         distance_m: float = 0.0,
         gap_s: float = 0.01,
         packets: int = PACKETS,
@@ -81,7 +82,7 @@ class Flight:
         return turns[1::2] - turns[::2]
 
 
-def _logged(medium: Medium, channel: int, gap_s: float, packets: int) -> bytes:
+def _logged(medium: Medium, channel: Channel, gap_s: float, packets: int) -> bytes:
     """Send packets from agent 0; return the delivery log's pages for agent 1."""
     one = Transmission(0, 0, (Outgoing(channel, bytes(SIZE_B)),))
     pages = []

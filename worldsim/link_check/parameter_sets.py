@@ -6,7 +6,7 @@ from typing import NamedTuple
 from netem.conditions import LinkModels, overlaid
 from netem.link import LinkModel
 from netem.link_keys import Conditions
-from netem.wire.frame import CHANNELS
+from netem.wire.channels import CHANNELS, NUMBERS, Channel
 from worldsim.scenario.tables import Scenario
 
 
@@ -15,7 +15,7 @@ class ParameterSet(NamedTuple):
 
     name: str
     """Which links have it, and from when on."""
-    channel: int
+    channel: Channel
     """The channel on which it is measured."""
     link: LinkModel
 
@@ -38,9 +38,9 @@ def _conditions(scenario: Scenario) -> Iterator[tuple[str, Conditions]]:
 
 def _links(since: str, conditions: Conditions) -> Iterator[ParameterSet]:
     models = LinkModels(conditions)
-    for channel, name in enumerate(CHANNELS):
+    for channel, name in zip(NUMBERS, CHANNELS, strict=True):
         yield ParameterSet(f"{name}{since}", channel, models.of_channel(channel))
     for link in conditions.link:
-        for channel, name in enumerate(CHANNELS):
+        for channel, name in zip(NUMBERS, CHANNELS, strict=True):
             model = models.of_link(channel, link.source, link.to)
             yield ParameterSet(f"{link.source} to {link.to}, {name}{since}", channel, model)

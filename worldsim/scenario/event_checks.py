@@ -10,20 +10,20 @@ from pathlib import Path
 from typing import NamedTuple
 
 from agent.codec import encode_formation
+from agent.guidance.potential import TARGET_FLOOR_M
+from agent.messages import MAX_ORDER_B
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from netem.link_keys import Conditions
 from worldsim.scenario.events import ACTIONS, UNDONE, EventTable
 from worldsim.scenario.faults import Join
 from worldsim.scenario.radio_checks import radio_findings
-from worldsim.scenario.rules import TARGET_FLOOR_M, Finding, tilts_where_asked
+from worldsim.scenario.rules import Finding, tilts_where_asked
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.tables import MAX_AGENTS, Scenario
 from worldsim.scenario.target_frame import FrameTable, broken_key, changed
 from worldsim.scenario.timeline import Step, steps
 from worldsim.scenario.toml import ScenarioError
 
-MAX_ORDER_B = 3000
-"""What a Mission may hold of a formation [bytes]."""
 COME_BACK = frozenset({"restart", "resume"})
 """Who comes back holds no place by which to be found."""
 UNKNOWN_NUMBER = -1

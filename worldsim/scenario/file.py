@@ -12,11 +12,12 @@ from typing import Any
 import msgspec
 import tomli_w
 
+from agent.guidance.potential import TARGET_FLOOR_M
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from worldsim.scenario.decoding import decode
 from worldsim.scenario.event_checks import Whose, check_course
 from worldsim.scenario.obstacle_tables import resolved
-from worldsim.scenario.rules import TARGET_FLOOR_M, check, tilts_where_asked
+from worldsim.scenario.rules import check, tilts_where_asked
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import Data, ScenarioError, override, read, tables
 

@@ -8,6 +8,7 @@ from math import ceil, degrees, dist, hypot
 from pathlib import Path
 from typing import NamedTuple
 
+from agent.guidance.potential import TARGET_FLOOR_M
 from agent.qstructure.formation import Formation
 from agent.qstructure.frame_path import tip_speed
 from worldsim.scenario.obstacle_tables import obstacle_problem
@@ -16,8 +17,6 @@ from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 from worldsim.scenario.target_frame import broken_key, path_of
 from worldsim.scenario.toml import ScenarioError
 
-TARGET_FLOOR_M = 0.25
-"""E1: targets nearer than separation_m plus this are no equilibrium of the potential."""
 MAX_STEP_M = 0.1
 """docs/method.md: the safety filter holds for v_max H up to this, H a command's longest life."""
 

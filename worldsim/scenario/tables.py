@@ -9,7 +9,17 @@ from typing import Annotated, Any, get_type_hints
 import msgspec
 from msgspec import Meta
 
-from agent.config import AgentSetup, Comms, Control, Hertz, Positive, Sensors, Table, Vehicle
+from agent.config import (
+    DEFAULT_CAST_FAR_M,
+    AgentSetup,
+    Comms,
+    Control,
+    Hertz,
+    Positive,
+    Sensors,
+    Table,
+    Vehicle,
+)
 from agent.messages import AgentId
 from agent.qstructure.formation import FormationSpec
 from netem.link_keys import Conditions
@@ -21,7 +31,6 @@ from worldsim.scenario.target_frame import FrameTable, path_of
 
 SLOTS_PER_TICK = 4
 MAX_AGENTS = 1000
-CAST_FAR_M = 0.5
 """d_c2 where the range allows it; the paper's value."""
 
 RunName = Annotated[
@@ -147,7 +156,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
         """Return [control] with the bobber's reach that the radio's range allows (Lemma 7, E20)."""
         if self.control.cast_far_m is not None:
             return self.control
-        reach = CAST_FAR_M
+        reach = DEFAULT_CAST_FAR_M
         range_m = self.netem.local.range_m or self.netem.range_m
         if range_m is not None:
             reach = min(reach, 0.25 * (range_m - self.control.spacing_m))

@@ -3,15 +3,12 @@
 import msgspec
 import numpy as np
 
-from agent.messages import Vector
+from agent.messages import MAX_OBSTACLE_POINTS, PROXIMITY_RANGE_M, Vector
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
 
-PROXIMITY_RANGE_M = 2.0
 ARRAYS_FROM = 40
 """Number of vehicles from which arrays are faster."""
-MAX_POINTS = 32
-"""Greatest number of obstacle points in a reading: an Observation holds no more."""
 
 
 class ProximityReading(msgspec.Struct, frozen=True, gc=False):
@@ -75,9 +72,9 @@ class ProximitySensor:
         found = []
         for row in range(len(agents)):
             near = np.flatnonzero(distance[row] <= PROXIMITY_RANGE_M)
-            if len(near) > MAX_POINTS:
+            if len(near) > MAX_OBSTACLE_POINTS:
                 order = np.argsort(distance[row, near], kind="stable")
-                near = np.sort(near[order[:MAX_POINTS]])
+                near = np.sort(near[order[:MAX_OBSTACLE_POINTS]])
             found.append(-distance[row, near, None] * outward[row, near])
         return found
 

@@ -11,14 +11,11 @@ from typing import assert_never
 import numpy as np
 
 from agent.config import Laser, Sensors, Sonar, Vehicle
-from agent.messages import Scan
-from agent.sensing.ray_pattern import KINDS, Pattern, ScanKind, pattern_of
+from agent.messages import NO_ECHO_MM, Scan
+from agent.sensing.ray_pattern import SCANNERS, Pattern, ScannerKind, pattern_of
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.raycast import cast, cast_at_spheres
 from worldsim.truth.vehicle import Floats
-
-NO_ECHO_MM = 0xFFFF
-"""Range in a Scan of a ray that hits nothing within the sensor's range."""
 
 
 class ScanningSensor:
@@ -27,7 +24,7 @@ class ScanningSensor:
     def __init__(
         self, pattern: Pattern, sensors: Sensors, seed: int, radius: Floats, obstacles: Obstacles
     ) -> None:
-        settings = _settings(KINDS[pattern.kind], sensors)
+        settings = _settings(SCANNERS[pattern.kind], sensors)
         self._pattern = pattern
         self._rays = np.array(pattern.beams).reshape(-1, 3)
         self._rays_per_beam = len(pattern.beams[0])
@@ -89,7 +86,7 @@ class ScanningSensor:
         return measured.astype("<u2").tobytes()
 
 
-def _settings(kind: ScanKind, sensors: Sensors) -> Laser | Sonar:
+def _settings(kind: ScannerKind, sensors: Sensors) -> Laser | Sonar:
     match kind:
         case "laser":
             return sensors.laser
@@ -117,7 +114,7 @@ class ScanningSensors:
                 ),
                 frozenset(row for row, each in enumerate(vehicles) if kind in each.sensors),
             )
-            for kind in KINDS
+            for kind in SCANNERS
         ]
         """Each kind of sensor, and the agents that carry it."""
         self.any = any(carriers for _, carriers in self._carriers)

@@ -7,12 +7,12 @@ from typing import assert_never
 
 import numpy as np
 
-from agent.messages import Scan, Vector
-from agent.sensing.ray_pattern import KINDS
+from agent.messages import PROXIMITY_RANGE_M, Scan, Vector
+from agent.sensing.ray_pattern import SCANNERS
 from worldsim.scenario.faults import FailureMode
-from worldsim.truth.proximity_sensor import NO_READING, PROXIMITY_RANGE_M, ProximityReading
+from worldsim.truth.proximity_sensor import NO_READING, ProximityReading
 
-SENSORS = ("proximity", *KINDS)
+SENSORS = ("proximity", *SCANNERS)
 KEY_SALT = 1 << 60
 
 
@@ -58,7 +58,7 @@ class SensorFaults:
         return tuple(scan for scan in scans if scan is not None)
 
     def _scan(self, agent: int, true: Scan, slot: int) -> Scan | None:
-        name = KINDS[true.kind]
+        name = SCANNERS[true.kind]
         mode = self._modes.get((agent, name))
         match mode:
             case None:

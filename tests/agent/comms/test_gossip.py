@@ -1,4 +1,4 @@
-"""Knowledge passed on: merging is a maximum, the gone stay gone, and everything fits its frame."""
+"""Gossip: merging is a maximum, departed agents stay away, and every frame has its limit."""
 
 from itertools import permutations
 from random import Random
@@ -7,13 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agent.codec import MAX_RADIO_B, decode_gossip, encode
-from agent.comms.gossip import FRAME_HEAD_B, MAX_KNOWN, Table
-from agent.messages import Gossip, Place
+from agent.codec import decode_gossip, encode
+from agent.comms.gossip import FRAME_HEAD_B, MAX_SUBJECTS, RecordTable
+from agent.messages import Place
+from netem.wire.channels import MAX_PAYLOAD_B
 from netem.wire.frame import MAX_OUTGOING
-from tests.agent.comms.making import (
+from tests.agent.comms.builders import (
     LATE_S,
     beacon,
+    gossip,
     greatest_record,
     peer,
     record,
@@ -23,7 +25,7 @@ OWN = 0
 SLACK_S = 0.1
 ROUND_S = 0.5
 RELAYED_SILENCE_S = 6.0
-"""12 rounds at 2 Hz, for one whose records come at once."""
+"""12 rounds at 2 Hz, for a subject whose records arrive at once."""
 OLDEST_S = 2.0 * RELAYED_SILENCE_S
 
 numbers = st.tuples(st.integers(1, 4), st.integers(0, 2), st.integers(0, 5))
@@ -31,20 +33,16 @@ gossips = st.lists(numbers, max_size=6)
 
 
 def table(own=OWN):
-    return Table(own, 1.0 / ROUND_S)
-
-
-def told(*records, source=9, stamp_s=1.0):
-    return Gossip(source, stamp_s, records, None)
+    return RecordTable(own, 1.0 / ROUND_S)
 
 
 def adopted(known, *records, now_s=1.0):
-    known.adopt(told(*records), now_s, SLACK_S)
+    known.adopt(gossip(9, 1.0, records), now_s, SLACK_S)
     return known
 
 
 def content(known, now_s=1.0):
-    """What a table passes on, the own record excepted, by subject."""
+    """Return what a table passes on, without the own record, by subject."""
     payloads = known.frames(record(OWN, 1, now_s))
     records = [each for payload in payloads for each in decode_gossip(payload).records]
     assert records[0].id == OWN
@@ -52,10 +50,10 @@ def content(known, now_s=1.0):
 
 
 def merged(sequence):
-    """A table that heard gossips of (subject, incarnation, version), one after the other."""
+    """Return the content of a table after lists of (subject, incarnation, version) in turn."""
     known = table()
-    for gossip in sequence:
-        adopted(known, *(record(who, v, 1.0, incarnation=i) for who, i, v in gossip))
+    for frame in sequence:
+        adopted(known, *(record(subject, v, 1.0, incarnation=i) for subject, i, v in frame))
     return content(known)
 
 
@@ -63,9 +61,9 @@ def merged(sequence):
 @given(st.lists(gossips, max_size=4))
 def test_merging_is_the_maximum_of_incarnation_and_version(sequence):
     newest = {}
-    for who, incarnation, version in (each for gossip in sequence for each in gossip):
-        newest[who] = max(newest.get(who, (-1, -1)), (incarnation, version))
-    found = {who: (each.incarnation, each.version) for who, each in merged(sequence).items()}
+    for subject, incarnation, version in (each for frame in sequence for each in frame):
+        newest[subject] = max(newest.get(subject, (-1, -1)), (incarnation, version))
+    found = {key: (each.incarnation, each.version) for key, each in merged(sequence).items()}
     assert found == newest
 
 
@@ -82,18 +80,18 @@ def test_the_order_of_merging_does_not_matter(sequence):
     assert all(each == results[0] for each in results)
 
 
-def test_a_number_never_goes_back():
+def test_a_version_never_decreases():
     random, known, last = Random(2), table(), {}
     for _ in range(3000):
-        who, incarnation, version = (random.randrange(n) for n in (5, 3, 50))
-        adopted(known, record(who + 1, version, 1.0, incarnation=incarnation))
+        index, incarnation, version = (random.randrange(n) for n in (5, 3, 50))
+        adopted(known, record(index + 1, version, 1.0, incarnation=incarnation))
         for subject, each in content(known).items():
             now = (each.incarnation, each.version)
             assert now >= last.get(subject, (-1, -1))
             last[subject] = now
 
 
-def test_nobody_tells_an_agent_about_itself():
+def test_an_agent_ignores_records_about_itself():
     known = adopted(table(), record(OWN, 99, incarnation=5, at=(9.0, 9.0, 9.0)))
     assert known.team(peer(OWN)) == (peer(OWN),)
 
@@ -109,18 +107,18 @@ def test_nobody_tells_an_agent_about_itself():
         (0.0, False),
     ],
 )
-def test_a_stamp_that_cannot_be_or_is_too_old_is_not_adopted(stamp_s, taken):
+def test_a_record_with_a_future_or_too_old_stamp_is_not_adopted(stamp_s, taken):
     known = adopted(table(), record(3, 1, stamp_s), now_s=100.0)
     assert (3 in content(known)) is taken
 
 
-def test_a_refused_record_blocks_no_later_one():
+def test_a_rejected_record_does_not_block_a_later_one():
     known = adopted(table(), record(3, 2**53 - 1, 500.0), now_s=100.0)
     adopted(known, record(3, 5, 100.0), now_s=100.0)
     assert content(known)[3].version == 5
 
 
-def test_a_beacon_is_a_record_too():
+def test_a_beacon_counts_as_a_record():
     known = table()
     known.adopt_beacon(beacon(3, 7, 1.0, at=(1.0, 2.0, 3.0)))
     assert content(known)[3] == record(3, 7, 1.0, at=(1.0, 2.0, 3.0))
@@ -130,7 +128,7 @@ def test_a_beacon_is_a_record_too():
     assert content(known)[3].version == 8
 
 
-def test_the_team_is_everybody_known_in_order_of_ids():
+def test_the_team_is_all_known_members_in_order_of_ids():
     known = adopted(
         table(own=4), record(7, 1, queue=1, rank=2), record(2, 1, at=(1.0, 0.0, 0.0), queue=0)
     )
@@ -146,19 +144,19 @@ def test_a_neighbour_that_fell_silent_is_dropped():
     known = table()
     known.adopt_beacon(beacon(3, 7, 10.0))
     known.forget_silent(20.0, {3})
-    assert 3 in content(known), "its beacons are the neighbours' to judge"
+    assert 3 in content(known), "a neighbour's silence is judged by Neighbours"
     known.forget_silent(20.0, {4})
     assert content(known) == {}
 
 
-def test_one_given_up_is_dropped_unless_others_tell_of_it_later():
+def test_a_lost_neighbour_is_dropped_unless_a_later_record_is_relayed():
     known = adopted(table(), record(3, 7, 10.0), record(4, 7, 10.5), now_s=11.0)
     departed = known.forget_silent(12.0, (), {3: 10.2, 4: 10.2})
     assert set(content(known)) == {4}
     assert [gone.stamp_s for gone in departed] == [10.0]
 
 
-def test_one_known_by_relay_may_be_silent_for_as_long_as_relays_take():
+def test_a_subject_known_by_relay_may_be_silent_for_as_long_as_relays_take():
     known = adopted(table(), record(3, 7, 10.0), now_s=10.0)
     known.forget_silent(10.0 + RELAYED_SILENCE_S - 0.01, ())
     assert 3 in content(known)
@@ -166,7 +164,7 @@ def test_one_known_by_relay_may_be_silent_for_as_long_as_relays_take():
     assert content(known) == {}
 
 
-def test_the_departed_do_not_come_back_by_their_old_records():
+def test_old_records_do_not_bring_back_a_departed_agent():
     known = table()
     known.adopt_beacon(beacon(3, 7, 10.0))
     known.forget_silent(12.0, ())
@@ -174,11 +172,11 @@ def test_the_departed_do_not_come_back_by_their_old_records():
         adopted(known, record(3, version, 10.0), now_s=12.0)
     assert content(known) == {}
     adopted(known, record(3, 8, 11.9), now_s=12.0)
-    assert 3 in content(known), "one that is alive after all comes back"
+    assert 3 in content(known), "a newer record brings it back"
 
 
-def test_the_departed_leave_a_team_that_keeps_talking_about_them():
-    """Everybody relays to everybody, with loss: after the relayed silence nobody knows the gone."""
+def test_a_team_that_relays_records_forgets_a_departed_agent():
+    """All relay to all, with loss: after the relayed silence no agent knows the departed one."""
     random, team = Random(11), [table(own) for own in range(1, 8)]
     team[0].adopt_beacon(beacon(99, 500, 0.0))
     for index in range(1, 60):
@@ -198,43 +196,46 @@ def test_the_departed_leave_a_team_that_keeps_talking_about_them():
     assert [each.id for each in newcomer.team(peer(50))] == [*range(1, 8), 50]
 
 
-def test_the_head_has_its_greatest_size():
+def test_the_head_has_its_longest_encoding():
     many = (record(1, 1),) * 20
-    whole = len(encode(Gossip(2**16 - 1, LATE_S, many, None)))
+    whole = len(encode(gossip(2**16 - 1, LATE_S, many)))
     assert whole == FRAME_HEAD_B + 20 * len(encode(record(1, 1)))
 
 
-@pytest.mark.parametrize("known", [0, 1, 17, 18, 19, 200, MAX_KNOWN])
-def test_the_whole_table_fits_whatever_its_numbers(known):
+@pytest.mark.parametrize("known", [0, 1, 17, 18, 19, 200, MAX_SUBJECTS])
+def test_the_whole_table_fits_with_the_greatest_numbers(known):
     records = [greatest_record(2**16 - 1 - k) for k in range(known)]
     full = adopted(table(), *records, now_s=LATE_S)
     payloads = full.frames(greatest_record(OWN))
-    assert max(map(len, payloads)) <= MAX_RADIO_B
+    assert max(map(len, payloads)) <= MAX_PAYLOAD_B
     assert len(payloads) < MAX_OUTGOING
-    told_of = [each for payload in payloads for each in decode_gossip(payload).records]
-    assert told_of == [greatest_record(OWN), *reversed(records)]
+    sent = [each for payload in payloads for each in decode_gossip(payload).records]
+    assert sent == [greatest_record(OWN), *reversed(records)]
 
 
-def test_a_table_does_not_grow_without_end():
+def test_a_table_has_a_greatest_size():
     known = table()
     for first in range(1, 4000, 16):
-        adopted(known, *(record(who, 1, 1.0) for who in range(first, first + 16)))
-    assert len(content(known)) == MAX_KNOWN
+        adopted(known, *(record(subject, 1, 1.0) for subject in range(first, first + 16)))
+    assert len(content(known)) == MAX_SUBJECTS
     adopted(known, record(1, 2, 1.0))
-    assert content(known)[1].version == 2, "who is known stays known"
+    assert content(known)[1].version == 2, "a known subject is still updated"
     known.forget_silent(60.0, ())
     assert len(content(adopted(known, record(5000, 1, 60.0), now_s=60.0))) == 1
 
 
 def play_line(line, rounds, loss, seed=3):
-    """Pass tables along a line, where each hears only the next on either side; yield each round."""
+    """Pass tables along a line of agents that hear only their neighbours in it.
+
+    Yields after each round the size of the team that each agent knows.
+    """
     random, end = Random(seed), len(line) - 1
     for index in range(1, rounds + 1):
         now_s = index * ROUND_S
         for known in line:
             known.forget_silent(now_s, ())
-        said = [known.frames(record(own, index, now_s)) for own, known in enumerate(line)]
-        for own, payloads in enumerate(said):
+        sent = [known.frames(record(own, index, now_s)) for own, known in enumerate(line)]
+        for own, payloads in enumerate(sent):
             for neighbour in sorted({max(own - 1, 0), min(own + 1, end)} - {own}):
                 if random.random() >= loss:
                     for payload in payloads:
@@ -243,7 +244,7 @@ def play_line(line, rounds, loss, seed=3):
 
 
 @pytest.mark.parametrize("agents", [2, 9, 20])
-def test_word_reaches_the_end_of_a_line_in_one_round_a_hop(agents):
+def test_a_record_travels_one_hop_a_round(agents):
     line = [table(own) for own in range(agents)]
     for index, teams in enumerate(play_line(line, agents - 1, 0.0), start=1):
         assert teams[0] == teams[-1] == index + 1
@@ -254,15 +255,15 @@ def test_word_reaches_the_end_of_a_line_in_one_round_a_hop(agents):
     ("agents", "loss", "missing"),
     [(20, 0.0, 0.0), (9, 0.2, 0.0), (20, 0.2, 0.0), (3, 0.5, 1e-3), (5, 0.5, 1e-3), (9, 0.5, 1e-2)],
 )
-def test_the_far_end_stays_known_though_its_records_are_old(agents, loss, missing):
-    """T_d = (2 D + 10) / (1 - loss) rounds: who is far is not taken for gone."""
+def test_the_far_end_stays_known_with_old_records(agents, loss, missing):
+    """T_d = (2 D + 10) / (1 - loss) rounds: a distant agent does not count as departed."""
     line = [table(own) for own in range(agents)]
     teams = list(play_line(line, 300, loss))[80:]
     known = sum(map(sum, teams)) / (len(teams) * agents * agents)
     assert 1.0 - known <= missing
 
 
-def test_the_far_end_is_missed_when_it_is_gone():
+def test_the_far_end_is_dropped_when_it_is_gone():
     line = [table(own) for own in range(9)]
     assert list(play_line(line, 30, 0.0))[-1] == [9] * 9
     for known in line:

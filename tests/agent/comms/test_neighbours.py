@@ -1,4 +1,4 @@
-"""Neighbours: what is believed of what is heard, how it ages, and when silence means gone."""
+"""Neighbours: which beacons are accepted, how they age, and when silence means departed."""
 
 from math import dist, log
 from random import Random
@@ -6,8 +6,8 @@ from random import Random
 import pytest
 
 from agent.codec import RejectedError
-from agent.comms.neighbours import FORWARD_S, LEAST_SILENCE_S, MAX_AGE_S, Neighbours
-from tests.agent.comms.making import beacon
+from agent.comms.neighbours import LEAST_SILENCE_S, MAX_AGE_S, MAX_EXTRAPOLATION_S, Neighbours
+from tests.agent.comms.builders import beacon
 
 HZ = 20.0
 SLACK_S = 0.1
@@ -18,38 +18,38 @@ def neighbours(hz=HZ):
     return Neighbours(0, hz, SLACK_S)
 
 
-def cause(known, heard, now_s, own_sent_s=None):
+def rejection_cause(known, received, now_s, own_sent_s=None):
     with pytest.raises(RejectedError) as caught:
-        known.hear(heard, now_s, own_sent_s or {})
+        known.receive(received, now_s, own_sent_s or {})
     return caught.value.cause
 
 
-def believed(known):
+def accepted(known):
     return [(each.id, each.incarnation, each.sequence) for each in known.beacons()]
 
 
-def test_a_replay_is_refused():
+def test_a_replay_is_rejected():
     known = neighbours()
-    known.hear(beacon(OTHER, 5, 1.0), 1.0, {})
-    assert cause(known, beacon(OTHER, 5, 1.0), 1.0) == "replay"
-    assert cause(known, beacon(OTHER, 5, 1.1), 1.1) == "replay"
-    assert believed(known) == [(OTHER, 0, 5)]
+    known.receive(beacon(OTHER, 5, 1.0), 1.0, {})
+    assert rejection_cause(known, beacon(OTHER, 5, 1.0), 1.0) == "replay"
+    assert rejection_cause(known, beacon(OTHER, 5, 1.1), 1.1) == "replay"
+    assert accepted(known) == [(OTHER, 0, 5)]
 
 
-def test_what_was_overtaken_is_refused():
+def test_an_overtaken_beacon_is_rejected():
     known = neighbours()
-    known.hear(beacon(OTHER, 7, 1.10), 1.2, {})
-    assert cause(known, beacon(OTHER, 6, 1.05), 1.2) == "replay"
-    assert believed(known) == [(OTHER, 0, 7)]
+    known.receive(beacon(OTHER, 7, 1.10), 1.2, {})
+    assert rejection_cause(known, beacon(OTHER, 6, 1.05), 1.2) == "replay"
+    assert accepted(known) == [(OTHER, 0, 7)]
 
 
-def test_each_beacon_counts_once_in_whatever_order_copies_come():
+def test_each_beacon_counts_once_in_any_order_of_copies():
     random, known = Random(5), neighbours()
     arrivals = [(k / HZ + random.uniform(0.0, 0.4), k) for k in range(1, 400) for _ in range(2)]
     taken = []
     for now_s, sequence in sorted(arrivals):
         try:
-            known.hear(beacon(OTHER, sequence, sequence / HZ), now_s, {})
+            known.receive(beacon(OTHER, sequence, sequence / HZ), now_s, {})
             taken.append(sequence)
         except RejectedError as error:
             assert error.cause == "replay"
@@ -57,26 +57,26 @@ def test_each_beacon_counts_once_in_whatever_order_copies_come():
     assert taken[-1] == 399
 
 
-def test_a_restart_beats_any_sequence():
+def test_a_new_incarnation_beats_any_sequence():
     known = neighbours()
-    known.hear(beacon(OTHER, 900, 1.0), 1.0, {})
-    known.hear(beacon(OTHER, 1, 1.1, incarnation=1), 1.1, {})
-    assert believed(known) == [(OTHER, 1, 1)]
-    assert cause(known, beacon(OTHER, 901, 1.2), 1.2) == "replay"
+    known.receive(beacon(OTHER, 900, 1.0), 1.0, {})
+    known.receive(beacon(OTHER, 1, 1.1, incarnation=1), 1.1, {})
+    assert accepted(known) == [(OTHER, 1, 1)]
+    assert rejection_cause(known, beacon(OTHER, 901, 1.2), 1.2) == "replay"
 
 
-def test_the_number_outlives_the_neighbour():
+def test_the_last_sequence_outlives_the_neighbour():
     known = neighbours()
-    known.hear(beacon(OTHER, 5, 1.0), 1.0, {})
+    known.receive(beacon(OTHER, 5, 1.0), 1.0, {})
     known.forget_silent(3.0)
-    assert believed(known) == []
-    assert cause(known, beacon(OTHER, 5, 3.0), 3.0) == "replay"
-    known.hear(beacon(OTHER, 6, 3.1), 3.1, {})
-    assert believed(known) == [(OTHER, 0, 6)]
+    assert accepted(known) == []
+    assert rejection_cause(known, beacon(OTHER, 5, 3.0), 3.0) == "replay"
+    known.receive(beacon(OTHER, 6, 3.1), 3.1, {})
+    assert accepted(known) == [(OTHER, 0, 6)]
 
 
 @pytest.mark.parametrize(
-    ("stamp_s", "refused_as"),
+    ("stamp_s", "expected_cause"),
     [
         (10.0 + SLACK_S + 1e-6, "future"),
         (1e9, "future"),
@@ -84,34 +84,34 @@ def test_the_number_outlives_the_neighbour():
         (0.0, "old"),
     ],
 )
-def test_a_stamp_that_cannot_be_is_refused(stamp_s, refused_as):
+def test_an_implausible_stamp_is_rejected(stamp_s, expected_cause):
     known = neighbours()
-    assert cause(known, beacon(OTHER, 5, stamp_s), 10.0) == refused_as
-    assert believed(known) == []
+    assert rejection_cause(known, beacon(OTHER, 5, stamp_s), 10.0) == expected_cause
+    assert accepted(known) == []
 
 
 @pytest.mark.parametrize("stamp_s", [10.0 + SLACK_S - 1e-6, 10.0, 10.0 - MAX_AGE_S + 1e-6])
-def test_a_stamp_that_can_be_is_taken(stamp_s):
+def test_a_plausible_stamp_is_accepted(stamp_s):
     known = neighbours()
-    known.hear(beacon(OTHER, 5, stamp_s), 10.0, {})
-    assert believed(known) == [(OTHER, 0, 5)]
+    known.receive(beacon(OTHER, 5, stamp_s), 10.0, {})
+    assert accepted(known) == [(OTHER, 0, 5)]
 
 
-def test_what_is_refused_blocks_nothing():
-    """A stamp refused for its time does not use up the sequence it came with."""
+def test_a_rejected_beacon_blocks_no_later_one():
+    """A beacon rejected for its stamp does not use up its sequence."""
     known = neighbours()
-    assert cause(known, beacon(OTHER, 2**53 - 1, 99.0), 10.0) == "future"
-    known.hear(beacon(OTHER, 5, 10.0), 10.0, {})
-    assert believed(known) == [(OTHER, 0, 5)]
+    assert rejection_cause(known, beacon(OTHER, 2**53 - 1, 99.0), 10.0) == "future"
+    known.receive(beacon(OTHER, 5, 10.0), 10.0, {})
+    assert accepted(known) == [(OTHER, 0, 5)]
 
 
-def test_nobody_else_speaks_under_ones_own_id():
-    assert cause(neighbours(), beacon(0, 5, 1.0), 1.0) == "spoofed"
+def test_a_beacon_with_the_own_id_is_rejected():
+    assert rejection_cause(neighbours(), beacon(0, 5, 1.0), 1.0) == "spoofed"
 
 
 @pytest.mark.parametrize("behind_s", [0.35, 1.0, 3.0])
-def test_a_clock_that_is_behind_is_found_by_its_echoes(behind_s):
-    """E22: a beacon that echoes my sequence s was sent after I sent s, whatever its stamp says."""
+def test_a_late_clock_is_found_by_its_echoes(behind_s):
+    """E22: a beacon that echoes an own sequence was sent after it, whatever its stamp says."""
     known, sent_s, latency_s = neighbours(), {}, 0.1
     for tick in range(1, 60):
         now_s = 10.0 + tick / HZ
@@ -119,12 +119,12 @@ def test_a_clock_that_is_behind_is_found_by_its_echoes(behind_s):
         echoed = tick - round(2 * latency_s * HZ)
         if echoed < 1:
             continue
-        told = beacon(OTHER, tick, now_s - latency_s - behind_s, echoes=[(7, 1), (0, echoed)])
-        assert cause(known, told, now_s, sent_s) == "offset"
-    assert believed(known) == []
+        received = beacon(OTHER, tick, now_s - latency_s - behind_s, echoes=[(7, 1), (0, echoed)])
+        assert rejection_cause(known, received, now_s, sent_s) == "offset"
+    assert accepted(known) == []
 
 
-def test_a_true_clock_is_never_taken_for_an_offset():
+def test_a_true_clock_is_never_rejected_for_an_offset():
     random, known, sent_s = Random(8), neighbours(), {}
     delivered = []
     for tick in range(1, 2000):
@@ -134,64 +134,64 @@ def test_a_true_clock_is_never_taken_for_an_offset():
         echoed = tick - 1 - int(random.uniform(0.0, 1.5) * HZ)
         delivered.append((now_s + latency_s, beacon(OTHER, tick, now_s, echoes=[(0, echoed)])))
     taken = 0
-    for now_s, told in sorted(delivered, key=lambda each: each[0]):
+    for now_s, received in sorted(delivered, key=lambda each: each[0]):
         try:
-            known.hear(told, now_s, sent_s)
+            known.receive(received, now_s, sent_s)
             taken += 1
         except RejectedError as error:
             assert error.cause == "replay"
     assert taken > 100
 
 
-@pytest.mark.parametrize(("before_s", "believed_too"), [(0.09, True), (0.11, False)])
-def test_an_echo_is_allowed_the_same_slack_as_a_stamp(before_s, believed_too):
-    known, told = neighbours(), beacon(OTHER, 5, 1.0 - before_s, echoes=[(0, 1)])
-    if believed_too:
-        known.hear(told, 1.2, {1: 1.0})
+@pytest.mark.parametrize(("before_s", "is_accepted"), [(0.09, True), (0.11, False)])
+def test_an_echo_has_the_same_slack_as_a_stamp(before_s, is_accepted):
+    known, received = neighbours(), beacon(OTHER, 5, 1.0 - before_s, echoes=[(0, 1)])
+    if is_accepted:
+        known.receive(received, 1.2, {1: 1.0})
     else:
-        assert cause(known, told, 1.2, {1: 1.0}) == "offset"
+        assert rejection_cause(known, received, 1.2, {1: 1.0}) == "offset"
 
 
-def test_an_echo_of_what_was_never_sent_proves_nothing():
+def test_an_echo_of_an_unknown_sequence_proves_nothing():
     known = neighbours()
-    known.hear(beacon(OTHER, 5, 1.0, echoes=[(0, 77)]), 1.0, {1: 0.9})
-    assert believed(known) == [(OTHER, 0, 5)]
+    known.receive(beacon(OTHER, 5, 1.0, echoes=[(0, 77)]), 1.0, {1: 0.9})
+    assert accepted(known) == [(OTHER, 0, 5)]
 
 
-def test_the_last_sequence_of_each_is_echoed_in_order_of_ids():
+def test_the_last_sequence_of_each_neighbour_is_echoed_in_order_of_ids():
     known = neighbours()
-    for who, sequence in ((9, 4), (2, 8), (9, 6), (5, 1)):
-        known.hear(beacon(who, sequence, 1.0), 1.0, {})
+    for sender, sequence in ((9, 4), (2, 8), (9, 6), (5, 1)):
+        known.receive(beacon(sender, sequence, 1.0), 1.0, {})
     assert known.echoes() == ((2, 8), (5, 1), (9, 6))
 
 
-def test_a_neighbour_is_brought_forward_along_its_velocity_but_not_for_ever():
+def test_a_position_is_extrapolated_along_the_velocity_for_a_limited_time():
     known, velocity = neighbours(), (0.3, -0.4, 0.1)
-    known.hear(beacon(OTHER, 1, 10.0, at=(1.0, 2.0, 3.0), velocity=velocity), 10.0, {})
+    known.receive(beacon(OTHER, 1, 10.0, at=(1.0, 2.0, 3.0), velocity=velocity), 10.0, {})
     for later_s in (0.0, 0.02, 0.5, 1.0, 1.5, 60.0):
         (heard,) = known.heard(10.0 + later_s)
-        along_s = min(later_s, FORWARD_S)
+        along_s = min(later_s, MAX_EXTRAPOLATION_S)
         wanted = [x + along_s * v for x, v in zip((1.0, 2.0, 3.0), velocity, strict=True)]
         assert dist(heard.position, wanted) < 1e-9
         assert heard.age_s == pytest.approx(later_s)
 
 
-def test_a_stamp_ahead_within_the_slack_is_not_brought_backward():
+def test_a_stamp_ahead_within_the_slack_is_not_extrapolated_backward():
     known = neighbours()
-    known.hear(beacon(OTHER, 1, 10.05, velocity=(0.5, 0.0, 0.0)), 10.0, {})
+    known.receive(beacon(OTHER, 1, 10.05, velocity=(0.5, 0.0, 0.0)), 10.0, {})
     (heard,) = known.heard(10.0)
     assert heard.position == (0.0, 0.0, 0.0)
     assert heard.age_s == 0.0
 
 
 def stream(loss, hz, seconds, seed):
-    """Hear one neighbour over a lossy link; return (false alarms, heard, T_lost at the end)."""
+    """Receive one neighbour over a lossy link; return (false alarms, beacons, final T_lost)."""
     random, known = Random(seed), neighbours(hz)
     alarms = heard = 0
     for sequence in range(1, round(seconds * hz)):
         now_s = sequence / hz
         if random.random() >= loss:
-            known.hear(beacon(OTHER, sequence, now_s), now_s, {})
+            known.receive(beacon(OTHER, sequence, now_s), now_s, {})
             heard += 1
         there = bool(known.beacons())
         known.forget_silent(now_s)
@@ -200,29 +200,29 @@ def stream(loss, hz, seconds, seed):
 
 
 @pytest.mark.parametrize(("loss", "hz"), [(0.0, 20.0), (0.2, 20.0), (0.5, 20.0), (0.8, 20.0)])
-def test_chance_alone_makes_nobody_gone(loss, hz):
-    """E17: with a probability of 1e-6 for each gap, none is to be expected in so many."""
+def test_chance_alone_makes_no_neighbour_depart(loss, hz):
+    """E17: with a probability of 1e-6 for each gap, none is expected in so few gaps."""
     alarms, heard, _ = stream(loss, hz, 60_000 / hz, seed=1)
     assert heard > 10_000
     assert alarms == 0
 
 
-def test_chance_alone_makes_nobody_gone_at_a_slow_rate():
-    """At 5 Hz and 50 % it is the measured loss that decides, not the least silence."""
+def test_chance_alone_makes_no_neighbour_depart_at_a_slow_rate():
+    """At 5 Hz and 50 % the measured loss decides, not the least silence."""
     alarms, heard, _ = stream(0.5, 5.0, 40_000, seed=2)
     assert heard > 90_000
     assert alarms == 0
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.2, 0.5, 0.8])
-def test_who_is_gone_is_missed_by_t_lost(loss):
+def test_a_departed_neighbour_is_dropped_after_t_lost(loss):
     """E17: T_lost = max(1.5 s, ln 1e-6 / ln loss beacons) + latency; the loss is measured."""
     for seed in range(20):
         known, random, last_s = neighbours(), Random(seed), 0.0
         for sequence in range(1, 2000):
             if random.random() >= loss:
                 last_s = sequence / HZ
-                known.hear(beacon(OTHER, sequence, last_s), last_s + 0.2, {})
+                known.receive(beacon(OTHER, sequence, last_s), last_s + 0.2, {})
         limit_s = known.silences_s()[OTHER]
         literal = max(LEAST_SILENCE_S, log(1e-6) / log(loss) / HZ if loss else 0.0)
         assert literal * 0.5 <= limit_s - 0.2 <= literal * 2.2
@@ -232,9 +232,9 @@ def test_who_is_gone_is_missed_by_t_lost(loss):
         assert known.beacons() == []
 
 
-def test_latency_is_allowed_for():
+def test_t_lost_includes_the_latency():
     near, far = neighbours(), neighbours()
     for sequence in range(1, 200):
-        near.hear(beacon(OTHER, sequence, sequence / HZ), sequence / HZ, {})
-        far.hear(beacon(OTHER, sequence, sequence / HZ), sequence / HZ + 2.0, {})
+        near.receive(beacon(OTHER, sequence, sequence / HZ), sequence / HZ, {})
+        far.receive(beacon(OTHER, sequence, sequence / HZ), sequence / HZ + 2.0, {})
     assert far.silences_s()[OTHER] - near.silences_s()[OTHER] == pytest.approx(2.0)

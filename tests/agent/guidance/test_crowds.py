@@ -1,4 +1,4 @@
-"""The safety filter against several at once: each pair of a crowd keeps its distance."""
+"""The safety filter in crowds: every pair of vehicles keeps its distance."""
 
 from itertools import combinations
 from math import cos, dist, hypot, pi, sin
@@ -15,7 +15,7 @@ TICKS = 60
 
 
 class Flyer:
-    """A vehicle among others: it wants into the midst of them, or round them, or anywhere."""
+    """A vehicle among others that wants to their centre, round them, anywhere, or to stand."""
 
     def __init__(self, random, position, max_speed, ticks_valid):
         self.random = random
@@ -60,7 +60,7 @@ class Flyer:
 
 
 def crowd(seed, count, max_speed, ticks_valid):
-    """Return one vehicle and the others round it, 0.3 to 0.8 m off, in three dimensions."""
+    """Return one vehicle and others round it, 0.3 to 0.8 m away, in three dimensions."""
     random = Random(seed)
     found = [(0.0, 0.0, 0.0)]
     while len(found) < count:

@@ -1,4 +1,4 @@
-"""Where the origin is, which way is north and who is called what decide nothing."""
+"""Invariance: the origin, the direction of north and the agents' ids decide nothing."""
 
 from math import cos, dist, hypot, pi, remainder, sin, tau
 from random import Random
@@ -27,7 +27,7 @@ WEDGE = FormationSpec(
 
 
 class Move(NamedTuple):
-    """A move of the whole world: turned about the vertical [rad], then shifted [m]."""
+    """A motion of the whole world: a turn about the vertical [rad], then a shift [m]."""
 
     yaw: float
     shift: tuple
@@ -43,8 +43,8 @@ class Move(NamedTuple):
 STAY = Move(0.0, (0.0, 0.0, 0.0))
 
 
-def decided(controller, seed, move=STAY, names=tuple(range(TEAM))):
-    """Return what agent 0 decides in a random situation that is moved and renamed."""
+def decided(controller, seed, move=STAY, ids=tuple(range(TEAM))):
+    """Return agent 0's intent in a random situation that is moved and renumbered."""
     random = Random(seed)
     place = [tuple(random.uniform(-3, 3) for _ in range(3)) for _ in range(TEAM)]
     speed = [tuple(random.uniform(-0.3, 0.3) for _ in range(3)) for _ in range(TEAM)]
@@ -55,30 +55,32 @@ def decided(controller, seed, move=STAY, names=tuple(range(TEAM))):
     random.shuffle(claims)
     heard = sorted(
         Heard(
-            names[i],
-            0.05,
-            move.moved(place[i]),
-            move.turned(speed[i]),
-            move.moved(goal[i]),
-            claims[i],
+            id=ids[i],
+            age_s=0.05,
+            position=move.moved(place[i]),
+            velocity=move.turned(speed[i]),
+            target=move.moved(goal[i]),
+            place=claims[i],
         )
         for i in range(1, TEAM)
     )
-    team = tuple(sorted(Peer(names[i], move.moved(place[i]), claims[i]) for i in range(TEAM)))
+    team = tuple(
+        sorted(Peer(id=ids[i], position=move.moved(place[i]), place=claims[i]) for i in range(TEAM))
+    )
     near = [tuple(b - a for a, b in zip(place[0], p, strict=True)) for p in place[1:]]
     senses = Senses(
-        1.0,
-        move.moved(place[0]),
-        move.turned(speed[0]),
-        remainder(yaw + move.yaw, tau),
-        tuple(move.turned(v) for v in near if hypot(*v) <= 2.0),
-        tuple(heard),
-        lambda: team,
-        Flown(0, formation, Frame(move.shift, move.yaw)),
+        now_s=1.0,
+        position=move.moved(place[0]),
+        velocity=move.turned(speed[0]),
+        yaw=remainder(yaw + move.yaw, tau),
+        vehicles=tuple(move.turned(v) for v in near if hypot(*v) <= 2.0),
+        neighbours=tuple(heard),
+        team=lambda: team,
+        mission=Flown(key=0, formation=formation, frame=Frame(move.shift, move.yaw)),
     )
-    mind = load(controller)(setup(names[0]))
-    mind.decide(msgspec.structs.replace(senses, now_s=0.0))  # it listens first
-    return mind.decide(senses)
+    made = load(controller)(setup(ids[0]))
+    made.decide(msgspec.structs.replace(senses, now_s=0.0))  # it listens first
+    return made.decide(senses)
 
 
 def setup(own_id):
@@ -97,7 +99,7 @@ def setup(own_id):
 
 
 def assert_same(one, other, move):
-    """Assert that two intents are one and the same, but for the move."""
+    """Assert that two intents are equal but for the move."""
     for turned in ("wanted", "velocity"):
         assert dist(move.turned(getattr(one, turned)), getattr(other, turned)) < ROUNDING
     assert dist(move.moved(one.heading_for), other.heading_for) < ROUNDING
@@ -110,7 +112,7 @@ def assert_same(one, other, move):
 
 
 @pytest.mark.parametrize("controller", ["q_structure", "flocking"])
-def test_a_moved_world_is_decided_alike(controller):
+def test_a_moved_world_gives_a_moved_intent(controller):
     random = Random(1)
     for seed in range(150):
         shift = tuple(random.uniform(-50, 50) for _ in range(3))
@@ -123,15 +125,15 @@ def test_a_moved_world_is_decided_alike(controller):
 
 
 @pytest.mark.parametrize("controller", ["q_structure", "flocking"])
-def test_who_is_called_what_decides_nothing(controller):
+def test_ids_decide_nothing(controller):
     random = Random(2)
     for seed in range(300):
-        names = tuple(random.sample(range(1000), TEAM))
-        assert_same(decided(controller, seed), decided(controller, seed, names=names), STAY)
+        ids = tuple(random.sample(range(1000), TEAM))
+        assert_same(decided(controller, seed), decided(controller, seed, ids=ids), STAY)
 
 
 def test_the_situations_are_of_every_kind():
-    """Some turn and some fly, some are pushed, some have a place of their own and some change."""
+    """Some agents turn, some fly; their places differ."""
     intents = [decided("q_structure", seed) for seed in range(150)]
     assert 20 < sum(each.velocity == each.wanted for each in intents) < 140
     assert len({each.place for each in intents}) == TEAM

@@ -1,4 +1,4 @@
-"""The safety filter against adversaries: whatever they want, the gap between two never closes."""
+"""The safety filter against adversaries: the gap between two vehicles never closes."""
 
 from math import cos, dist, hypot, pi, sin
 from random import Random
@@ -9,9 +9,9 @@ from agent.guidance.cone import Cone
 from agent.guidance.safety_filter import (
     PROMISE_S,
     Bound,
+    NeighbourReport,
     PromiseFilter,
     RangingFilter,
-    TelemetryRow,
     limited,
     shortened,
 )
@@ -21,7 +21,7 @@ SLOTS = 4
 
 
 class Vehicle:
-    """A vehicle that wants the worst, filtered, with commands that come late and expire."""
+    """A filtered adversarial vehicle, with commands that arrive late and expire."""
 
     def __init__(self, random, position, max_speed, dt, horizon_slots):
         self.random = random
@@ -38,7 +38,7 @@ class Vehicle:
         self.velocity, self.expires = (0.0, 0.0, 0.0), 0
 
     def wants(self, towards):
-        """Straight at the other, or past it, or anything."""
+        """Return a velocity straight at the other vehicle, or a random one."""
         kind = self.random.random()
         if kind < 0.6:
             scale = self.max_speed / max(hypot(*towards), 1e-9)
@@ -81,7 +81,7 @@ def test_ranging_keeps_adversarial_pairs_apart(max_speed, ticks_valid):
     assert least >= D_OB - 1e-9
 
 
-def test_the_filter_is_what_keeps_them_apart():
+def test_without_the_filters_share_and_margin_they_collide():
     """The same adversaries collide when each may close almost half of the gap in a step."""
     collided = 0
     for pair in range(250):
@@ -100,8 +100,8 @@ def test_the_filter_is_what_keeps_them_apart():
     assert collided > 0
 
 
-class Speaker:
-    """A vehicle that knows of the other only what it was told, late and with losses."""
+class BlindVehicle:
+    """A vehicle that knows the other only by its reports, late and with losses."""
 
     def __init__(self, random, position, dt):
         self.random = random
@@ -117,11 +117,11 @@ class Speaker:
                 self.heard = message
         stamp, position, cap = self.heard
         relative = tuple(b - a for a, b in zip(self.position, position, strict=True))
-        told = [TelemetryRow(relative, now - stamp, cap)]
-        self.filter.promise(now, told)
+        reports = [NeighbourReport(relative=relative, age_s=now - stamp, speed_cap=cap)]
+        self.filter.promise(now, reports)
         self.cap = self.filter.speed_cap
         wanted = tuple(0.5 * x / max(hypot(*relative), 1e-9) for x in relative)
-        safe = limited(wanted, self.filter.bounds(told), 0.0, Cone(pi, pi))
+        safe = limited(wanted, self.filter.bounds(reports), 0.0, Cone(pi, pi))
         self.velocity = shortened(safe, self.cap)
         return (now, self.position, self.cap)
 
@@ -136,8 +136,8 @@ def test_promises_keep_blind_pairs_apart(loss, delay_s):
     dt, least = 0.05, 1e9
     for pair in range(40):
         random = Random(pair)
-        one = Speaker(random, (0.0, 0.0, 0.0), dt)
-        two = Speaker(random, (random.uniform(0.4, 3.0), 0.0, 0.0), dt)
+        one = BlindVehicle(random, (0.0, 0.0, 0.0), dt)
+        two = BlindVehicle(random, (random.uniform(0.4, 3.0), 0.0, 0.0), dt)
         one.heard, two.heard = (0.0, two.position, 0.5), (0.0, one.position, 0.5)
         flying = []
         for tick in range(300):
@@ -156,7 +156,7 @@ def test_promises_keep_blind_pairs_apart(loss, delay_s):
 
 def test_a_promise_is_kept_for_three_seconds():
     promises = PromiseFilter(D_OB, 0.5, 0.05)
-    near = [TelemetryRow((0.4, 0.0, 0.0), 0.0, 0.5)]
+    near = [NeighbourReport(relative=(0.4, 0.0, 0.0), age_s=0.0, speed_cap=0.5)]
     low = promises.promise(0.0, near)
     for tick in range(1, 60):
         promises.promise(tick * 0.05, [])
@@ -165,7 +165,7 @@ def test_a_promise_is_kept_for_three_seconds():
     assert promises.speed_cap == 0.5
 
 
-def test_what_leaves_the_cone_is_only_shortened():
+def test_a_slide_that_leaves_the_cone_is_only_shortened():
     random = Random(5)
     for _ in range(500):
         velocity = tuple(random.uniform(-0.5, 0.5) for _ in range(3))

@@ -1,4 +1,4 @@
-"""What cannot be flown is refused, by the name of the queue and by the key."""
+"""Formations that cannot be flown are rejected, with the queue's name and the key."""
 
 import pytest
 
@@ -12,7 +12,7 @@ VERTICES = {"V1": (0.0, 0.0, 0.0), "V2": (6.0, 0.0, 0.0)}
 
 
 def checked(queue, agents=6, spacing=1.0, vertices=VERTICES, others=()):
-    """Check a formation of one queue, and of others if there are any."""
+    """Check a formation of one queue, and of other queues if given."""
     used = {name for each in (queue, *others) for name in each.vertices}
     kept = {name: at for name, at in vertices.items() if name in used}
     Formation(FormationSpec("f", kept, (queue, *others)), spacing).check(agents, LEAST_M)
@@ -26,7 +26,7 @@ def oriented(**angles):
     return QueueSpec("bent", ("V1",), AWAY, None, OrientationSpec(**angles))
 
 
-REFUSED = {
+REJECTED = {
     "a pole on the way": (curve("1/(2-s)"), "shape"),
     "a pole that no step meets": (curve("s", "1/(s-pi)"), "shape"),
     "a pole at the vertex": (curve("1/s"), "shape"),
@@ -60,41 +60,41 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize(("queue", "key"), REFUSED.values(), ids=REFUSED)
-def test_what_cannot_be_flown_is_refused_by_its_queue(queue, key):
-    with pytest.raises(FormationError) as refused:
+@pytest.mark.parametrize(("queue", "key"), REJECTED.values(), ids=REJECTED)
+def test_a_queue_that_cannot_be_flown_is_rejected_by_name(queue, key):
+    with pytest.raises(FormationError) as rejected:
         checked(queue, vertices={**VERTICES, "V3": (0.9, 0.0, 0.0)})
-    assert "'bent'" in refused.value.key
-    assert refused.value.key.endswith(key)
-    assert "\n" not in str(refused.value)
+    assert "'bent'" in rejected.value.key
+    assert rejected.value.key.endswith(key)
+    assert "\n" not in str(rejected.value)
 
 
-def test_a_spacing_under_the_floor_is_refused():
-    with pytest.raises(FormationError, match=r"two of its slots are 0\.450 m apart") as refused:
+def test_a_spacing_under_the_floor_is_rejected():
+    with pytest.raises(FormationError, match=r"two of its slots are 0\.450 m apart") as rejected:
         checked(QueueSpec("bent", ("V1",), AWAY), spacing=0.45)
-    assert refused.value.key == "queue 'bent'"
+    assert rejected.value.key == "queue 'bent'"
     checked(QueueSpec("bent", ("V1",), AWAY), spacing=0.5)
 
 
-def test_slots_that_are_near_by_the_chord_are_refused():
+def test_slots_that_are_near_by_the_chord_are_rejected():
     folded = Polyline(((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (3.0, 0.3, 0.0), (0.0, 0.3, 0.0)))
-    with pytest.raises(FormationError, match="two of its slots") as refused:
+    with pytest.raises(FormationError, match="two of its slots") as rejected:
         checked(QueueSpec("bent", ("V1",), folded))
-    assert "'bent'" in refused.value.key
+    assert "'bent'" in rejected.value.key
 
 
 def test_queues_that_cross_too_near_name_both():
     others = (QueueSpec("other", ("V2",), Ray((-1.0, 0.0, 0.0))),)
-    with pytest.raises(FormationError) as refused:
+    with pytest.raises(FormationError) as rejected:
         checked(QueueSpec("bent", ("V1",), Ray((1.0, 0.0, 0.0))), 14, others=others)
-    assert refused.value.key == "queue 'bent' and 'other'"
+    assert rejected.value.key == "queue 'bent' and 'other'"
 
 
-def test_a_closed_queue_whose_share_does_not_fit_is_refused():
+def test_a_closed_queue_whose_share_does_not_fit_is_rejected():
     others = (QueueSpec("other", ("V2",), AWAY),)
-    with pytest.raises(FormationError, match="its capacity asks for 10 members, 6 fit") as refused:
+    with pytest.raises(FormationError, match="its capacity asks for 10 members, 6 fit") as rejected:
         checked(QueueSpec("bent", ("V1", "V2")), 20, others=others)
-    assert refused.value.key == "queue 'bent'"
+    assert rejected.value.key == "queue 'bent'"
 
 
 def test_all_closed_and_full_says_how_many_are_left():
@@ -114,5 +114,5 @@ SOUND = {
 
 
 @pytest.mark.parametrize("queue", SOUND.values(), ids=SOUND)
-def test_what_can_be_flown_is_not_refused(queue):
+def test_a_queue_that_can_be_flown_is_not_rejected(queue):
     checked(queue)

@@ -1,4 +1,4 @@
-"""How a team divides over its queues: vertices first, shares after capacity, within what fits."""
+"""Division of a team over its queues: vertices first, then by capacity, within the room."""
 
 from itertools import pairwise
 from math import dist, inf
@@ -16,7 +16,7 @@ AWAY = Ray((0.0, 0.0, 1.0))
 
 @st.composite
 def formations(draw, closed=True):
-    """Return a formation of open and closed queues, with vertices of their own or shared."""
+    """Return a formation of open and closed queues, with own or shared vertices."""
     vertices, queues = {}, []
     weights = draw(st.lists(st.integers(1, 20), min_size=1, max_size=6))
     for j, weight in enumerate(weights):
@@ -36,7 +36,7 @@ def formations(draw, closed=True):
 
 
 def room(formation):
-    """Return how many each queue can hold besides common vertices, and how many it must first."""
+    """Return each queue's own vertices, and how many agents it can hold besides shared vertices."""
     common = set(formation.common)
     owned = [
         sum(
@@ -58,7 +58,7 @@ TEAMS = st.integers(0, 80)
 
 @given(formations(), TEAMS)
 @settings(deadline=None)
-def test_everybody_has_one_place_or_all_are_full(formation, agents):
+def test_every_agent_has_one_place_or_all_queues_are_full(formation, agents):
     _, most = room(formation)
     counts, layout = formation.divide(agents), formation.layout(agents)
     common = min(agents, len(formation.common))
@@ -71,7 +71,7 @@ def test_everybody_has_one_place_or_all_are_full(formation, agents):
 
 @given(formations(), TEAMS)
 @settings(deadline=None)
-def test_vertices_are_manned_first(formation, agents):
+def test_vertices_are_filled_first(formation, agents):
     owned, _ = room(formation)
     free = agents - len(formation.common)
     assume(free >= sum(owned))
@@ -83,7 +83,7 @@ def test_vertices_are_manned_first(formation, agents):
 @given(formations(closed=False), st.integers(130, 300))
 @settings(deadline=None)
 def test_shares_are_within_one_of_capacity_where_nothing_binds(formation, agents):
-    """So large a team that even the least share of all is more than its queue's vertex."""
+    """The team is so large that even the least share exceeds its queue's vertex."""
     free = agents - len(formation.common)
     for capacity, count in zip(formation.capacities, formation.divide(agents), strict=True):
         assert abs(count - capacity * free) < 1.0 + 1e-6
@@ -91,7 +91,7 @@ def test_shares_are_within_one_of_capacity_where_nothing_binds(formation, agents
 
 @given(formations(), TEAMS)
 @settings(deadline=None)
-def test_what_does_not_fit_goes_to_open_queues(formation, agents):
+def test_agents_that_do_not_fit_go_to_open_queues(formation, agents):
     _, most = room(formation)
     assume(inf in most)
     assert formation.layout(agents).unplaced == 0
@@ -99,7 +99,7 @@ def test_what_does_not_fit_goes_to_open_queues(formation, agents):
 
 @given(formations(), TEAMS)
 @settings(deadline=None)
-def test_no_two_of_a_queue_are_nearer_than_d_ir_along_it(formation, agents):
+def test_no_two_slots_of_a_queue_are_nearer_than_d_ir_along_it(formation, agents):
     slots = formation.layout(agents).slots
     for j in range(len(formation.queues)):
         along = sorted(slot.arc_length for place, slot in slots.items() if place.queue == j)
@@ -107,7 +107,7 @@ def test_no_two_of_a_queue_are_nearer_than_d_ir_along_it(formation, agents):
 
 
 def test_a_shared_vertex_has_one_place_and_one_point():
-    """V2 lies on both queues: as the end of the first, and in the middle of the second."""
+    """V2 lies on both queues: at the end of the first, and in the middle of the second."""
     vertices = {
         "V1": (0.0, 0.0, 0.0),
         "V2": (4.0, 0.0, 0.0),
@@ -125,7 +125,7 @@ def test_a_shared_vertex_has_one_place_and_one_point():
     assert len(points) == 8
 
 
-def test_a_place_on_an_open_queue_stays_where_it_is():
+def test_a_place_on_an_open_queue_does_not_depend_on_the_team():
     formation = Formation(
         FormationSpec("line", {"V1": (1.0, 0.0, 0.0)}, (QueueSpec("Q1", ("V1",), AWAY),)), 0.8
     )

@@ -1,4 +1,4 @@
-"""Expressions: arithmetic in one variable or a refusal, and never code."""
+"""Expressions: arithmetic in one variable or an error, and never code."""
 
 import builtins
 from math import inf, isfinite, pi, sqrt
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from agent.qstructure.expression import (
     CONSTANTS,
     FUNCTIONS,
-    MAX_LENGTH,
+    MAX_EXPRESSION_LENGTH,
     Expression,
     ExpressionError,
 )
@@ -33,7 +33,7 @@ VALUES = {
 
 
 @pytest.mark.parametrize(("text", "value"), VALUES.items())
-def test_arithmetic_is_arithmetic(text, value):
+def test_arithmetic_is_evaluated(text, value):
     assert Expression(text, "s")(3.0) == pytest.approx(value)
 
 
@@ -45,12 +45,12 @@ NO_EXPRESSION = [
     *("s // 2", "s % 2", "s @ s", "~s", "s << 2", "s | 1", "s ^ 1", "(s := 2)", "*s"),
     *("'s'", "'a' * 3", "f'{s}'", "f'{1:>999999999}'", "b's'", "1j", "True", "None", "..."),
     *("max(1, 2, key=sin)", "min(*s)", "s[0]", "await s", "yield s", "1 < 2 < s", "(1, 2)"),
-    "s" + "+s" * MAX_LENGTH,
+    "s" + "+s" * MAX_EXPRESSION_LENGTH,
 ]
 
 
 @pytest.mark.parametrize("text", NO_EXPRESSION)
-def test_what_is_no_arithmetic_is_refused_before_it_is_evaluated(text):
+def test_other_texts_are_rejected_before_evaluation(text):
     with pytest.raises(ExpressionError):
         Expression(text, "s")
 
@@ -64,7 +64,7 @@ NO_NUMBER = [
 
 
 @pytest.mark.parametrize("text", NO_NUMBER)
-def test_where_there_is_no_number_it_says_so(text):
+def test_a_value_that_is_not_a_finite_number_is_an_error(text):
     with pytest.raises(ExpressionError):
         Expression(text, "s")(0.0)
 
@@ -92,7 +92,7 @@ TEXTS = st.one_of(st.text(max_size=40), st.recursive(ATOMS, _grown, max_leaves=1
 @example("(" * 149 + "s" + ")" * 149, 1.0)
 @example("sin(" * 60 + "s" + ")" * 60, 1.0)
 @example("s**s", inf)
-def test_any_text_is_a_number_or_a_refusal(text, value):
+def test_any_text_gives_a_number_or_an_error(text, value):
     try:
         number = Expression(text, "s")(value)
     except ExpressionError:
@@ -116,13 +116,13 @@ ATTEMPTS = [
 
 @pytest.mark.parametrize("text", ATTEMPTS)
 def test_no_code_runs(monkeypatch, text):
-    sung = []
-    monkeypatch.setattr(builtins, "canary", lambda *_: sung.append(text) or 1.0, raising=False)
+    called = []
+    monkeypatch.setattr(builtins, "canary", lambda *_: called.append(text) or 1.0, raising=False)
     with pytest.raises(ExpressionError):
         Expression(text, "s")(0.0)
-    assert sung == []
+    assert called == []
 
 
-def test_the_names_are_those_of_the_documentation():
+def test_the_documented_names_are_available():
     assert pi == CONSTANTS["pi"]
     assert {"sin", "cos", "sqrt", "min", "max", "abs", "atan2", "exp", "log"} <= FUNCTIONS.keys()

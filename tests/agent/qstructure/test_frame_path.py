@@ -14,18 +14,18 @@ metres = st.integers(-20, 20).map(float)
 waypoints = st.lists(st.tuples(metres, metres, metres), min_size=2, max_size=6, unique=True)
 paths = st.builds(
     FramePath,
-    waypoints.map(tuple),
-    st.floats(0.5, 2.0),
-    st.floats(0.0, 10.0),
-    st.floats(-3.0, 3.0),
-    st.sampled_from([0.0, 0.5, 2.0]),
-    st.lists(st.floats(0.0, 3.0), max_size=6).map(tuple),
+    waypoints=waypoints.map(tuple),
+    speed=st.floats(0.5, 2.0),
+    start_s=st.floats(0.0, 10.0),
+    yaw=st.floats(-3.0, 3.0),
+    turn_rate=st.sampled_from([0.0, 0.5, 2.0]),
+    waits_s=st.lists(st.floats(0.0, 3.0), max_size=6).map(tuple),
 )
 
 
 @settings(derandomize=True, deadline=None, max_examples=50)
 @given(paths)
-def test_it_never_jumps_and_says_how_fast_it_is(path):
+def test_it_never_jumps_and_its_velocity_is_true(path):
     track, moved_m, last = Track(path), 0.0, Track(path).at(0.0)
     for tick in range(1, int(track.arrives_s / STEP_S) + 3):
         frame = track.at(tick * STEP_S)
@@ -39,7 +39,12 @@ def test_it_never_jumps_and_says_how_fast_it_is(path):
 
 
 def test_it_waits_turns_on_the_spot_and_goes_on():
-    path = FramePath(((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 1.0, 0.0)), 0.5, 1.0, 0.0, pi / 4)
+    path = FramePath(
+        waypoints=((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 1.0, 0.0)),
+        speed=0.5,
+        start_s=1.0,
+        turn_rate=pi / 4,
+    )
     track = Track(path)
     assert track.at(0.5).origin == (0.0, 0.0, 0.0)
     assert track.at(3.0).origin == pytest.approx((1.0, 0.0, 0.0))
@@ -49,8 +54,10 @@ def test_it_waits_turns_on_the_spot_and_goes_on():
     assert track.arrives_s == pytest.approx(9.0)
 
 
-def test_a_slot_moves_with_the_frame_and_round_it():
-    path = FramePath(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0)), 0.5, 0.0, 0.0, 0.2)
+def test_a_slot_moves_with_the_frame_and_turns_with_it():
+    path = FramePath(
+        waypoints=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0)), speed=0.5, turn_rate=0.2
+    )
     track = Track(path)
     for time_s in (0.5, 3.0, 5.0, 11.0):
         frame, later = track.at(time_s), track.at(time_s + 1e-6)
@@ -59,6 +66,6 @@ def test_a_slot_moves_with_the_frame_and_round_it():
         assert frame.velocity_at(here) == pytest.approx(seen, abs=1e-5)
 
 
-def test_at_one_waypoint_it_stands_and_no_tip_moves():
+def test_with_one_waypoint_it_rests_and_no_tip_moves():
     assert Track(AT_HOME).rests
     assert tip_speed(AT_HOME, 5.0) == 0.0

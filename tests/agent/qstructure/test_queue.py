@@ -1,4 +1,4 @@
-"""Queues: who stands where along a curve that has one vertex, or passes through several."""
+"""Queues: the members' positions along a curve with one vertex or several."""
 
 from itertools import pairwise
 from math import dist, pi
@@ -19,7 +19,7 @@ def straight(*vertices, spacing=1.0):
 
 
 def circle(spacing=1.0):
-    """A queue on half a circle of 3 m about the origin, with a vertex half way."""
+    """Return a queue on half a circle of 3 m about the origin, with a vertex half way."""
     vertices = [(3.0, 0.0, 0.0), (0.0, 3.0, 0.0), (-3.0, 0.0, 0.0)]
     return Queue("Q", vertices, shape_of(Arc(3.0, 180.0, 90.0)), spacing)
 
@@ -29,7 +29,7 @@ def gaps(queue, count):
     return [b - a for a, b in pairwise(sorted([*queue.stations, *queue.members(count)]))]
 
 
-def test_an_open_queue_goes_on_for_ever():
+def test_an_open_queue_has_no_end():
     queue = Queue("Q", [(1.0, 2.0, 3.0)], shape_of(Ray((0.0, 0.0, 2.0))), 0.7)
     assert not queue.closed
     assert queue.room is None
@@ -44,7 +44,7 @@ def test_a_closed_queue_passes_through_its_vertices():
         assert dist(queue.point(station), vertex) < WITHIN_M
 
 
-def test_its_members_stand_evenly_between_two_vertices():
+def test_members_stand_evenly_between_two_vertices():
     queue = straight((0.0, 0.0, 0.0), (10.0, 0.0, 0.0))
     for count in range(1, 10):
         assert gaps(queue, count) == pytest.approx([10.0 / (count + 1)] * (count + 1))
@@ -81,13 +81,13 @@ def test_the_longer_segment_gets_more():
     assert sum(s < 2.0 for s in queue.members(6)) == 1
 
 
-def test_a_full_queue_is_d_ir_apart():
+def test_members_of_a_full_queue_are_d_ir_apart():
     queue = circle()
     assert queue.room == 6
     assert min(gaps(queue, 6)) >= 1.0
 
 
-def test_a_closed_queue_bends_as_its_shape_does():
+def test_a_closed_queue_follows_its_shape():
     queue = Queue(
         "Q",
         [(1.0, 1.0, 0.0), (1.0 + pi, 1.0, 0.0)],
@@ -99,7 +99,7 @@ def test_a_closed_queue_bends_as_its_shape_does():
     assert (x, y) == pytest.approx((1.0 + pi / 2, 2.0), abs=WITHIN_M)
 
 
-REFUSED = {
+REJECTED = {
     "misses its vertex": ([(0, 0, 0), (2.0, 0.5, 0.0)], Ray((1.0, 0.0, 0.0)), "shape", "misses"),
     "runs the other way": ([(0, 0, 0), (-2.0, 0, 0)], Ray((1.0, 0.0, 0.0)), "shape", "misses"),
     "too short": ([(0, 0, 0), (0.9, 0, 0)], Ray((1.0, 0.0, 0.0)), "vertices", "too short"),
@@ -112,19 +112,19 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize(("vertices", "shape", "key", "text"), REFUSED.values(), ids=REFUSED)
-def test_what_cannot_be_stood_on_is_refused(vertices, shape, key, text):
-    with pytest.raises(QueueError, match=text) as refused:
+@pytest.mark.parametrize(("vertices", "shape", "key", "text"), REJECTED.values(), ids=REJECTED)
+def test_a_queue_that_cannot_hold_members_is_rejected(vertices, shape, key, text):
+    with pytest.raises(QueueError, match=text) as rejected:
         Queue("Q", vertices, shape_of(shape), 1.0)
-    assert refused.value.key == key
+    assert rejected.value.key == key
 
 
-def test_angles_follow_the_arc_length_and_what_is_left_out_is_free():
+def test_angles_follow_the_arc_length_and_omitted_angles_are_free():
     turning = Orientation(OrientationSpec(yaw_deg="10*d", roll_deg=-5))
     queue = Queue("Q", [(0, 0, 0)], shape_of(Ray((0, 3, 0))), 0.5, turning)
     for s in queue.members(5):
-        yaw, pitch, presence = queue.attitude(s)
+        yaw, pitch, roll = queue.attitude(s)
         assert yaw == pytest.approx(s * 10.0 * pi / 180.0)
         assert pitch is None
-        assert presence == pytest.approx(-5.0 * pi / 180.0)
+        assert roll == pytest.approx(-5.0 * pi / 180.0)
     assert straight((0, 0, 0), (5, 0, 0)).attitude(1.0) == (None, None, None)

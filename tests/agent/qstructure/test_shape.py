@@ -1,4 +1,4 @@
-"""Shapes by arc length: whatever a curve is written in, a metre along it is a metre."""
+"""Shapes by arc length: a metre along a curve is a metre, whatever its parameter."""
 
 from itertools import pairwise
 from math import cos, dist, pi, sin
@@ -38,7 +38,7 @@ SHAPES = {
 
 
 def length(shape, start, end):
-    """Return the length of a piece of a shape, by the sum of many short chords [m]."""
+    """Return the length of a part of a shape, by the sum of many short chords [m]."""
     points = [shape.point(start + (end - start) * k / FINE) for k in range(FINE + 1)]
     return sum(dist(a, b) for a, b in pairwise(points))
 
@@ -86,7 +86,7 @@ SPEEDS = {
     ],
     ids=["circle", "line", "screw"],
 )
-def test_the_parameters_speed_does_not_show(parameter, x, y, z, at):
+def test_the_parameters_speed_does_not_matter(parameter, x, y, z, at):
     """``at`` is the same curve at unit speed."""
     shape = shape_of(Curve(*(each.format(parameter) for each in (x, y, z))))
     for k in range(41):
@@ -100,7 +100,7 @@ def test_the_parameters_speed_does_not_show(parameter, x, y, z, at):
     heading=st.floats(-360.0, 360.0),
 )
 @settings(max_examples=30, deadline=None)
-def test_an_arc_keeps_its_radius_then_goes_straight_on(radius, sweep, left, heading):
+def test_an_arc_keeps_its_radius_and_then_continues_straight(radius, sweep, left, heading):
     side, turn = (1.0, sweep) if left else (-1.0, -sweep)
     shape = shape_of(Arc(radius, turn, heading))
     assert shape.end == pytest.approx(radius * sweep * pi / 180.0, abs=WITHIN_M * (1.0 + radius))
@@ -112,7 +112,7 @@ def test_an_arc_keeps_its_radius_then_goes_straight_on(radius, sweep, left, head
     assert beyond == pytest.approx(2.0, abs=1e-9)
 
 
-def test_a_helix_climbs_its_pitch_in_a_turn():
+def test_a_helix_climbs_its_pitch_in_one_turn():
     turn = (4.0 * pi * pi * 1.5 * 1.5 + 0.8 * 0.8) ** 0.5
     x, y, z = shape_of(SHAPES["helix"]).point(turn)
     assert (x, y, z) == pytest.approx((0.0, 0.0, 0.8), abs=WITHIN_M)
@@ -127,7 +127,7 @@ def test_a_spline_and_a_polyline_pass_through_their_points():
             assert min(dist(where, each) for each in fine) < shape.end / FINE
 
 
-REFUSED = {
+REJECTED = {
     "a ray without direction": (Ray((0.0, 0.0, 0.0)), "direction"),
     "an arc without sweep": (Arc(1.0, 0.0), "sweep_deg"),
     "two points in one": (Polyline(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))), "points_m"),
@@ -141,11 +141,11 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize(("spec", "key"), REFUSED.values(), ids=REFUSED)
-def test_what_is_no_shape_is_refused_by_its_key(spec, key):
-    with pytest.raises(ShapeError) as refused:
+@pytest.mark.parametrize(("spec", "key"), REJECTED.values(), ids=REJECTED)
+def test_an_invalid_shape_is_rejected_by_its_key(spec, key):
+    with pytest.raises(ShapeError) as rejected:
         shape_of(spec)
-    assert refused.value.key == key
+    assert rejected.value.key == key
 
 
 WITHOUT_AN_END = {
@@ -159,6 +159,6 @@ WITHOUT_AN_END = {
 
 
 @pytest.mark.parametrize("texts", WITHOUT_AN_END.values(), ids=WITHOUT_AN_END)
-def test_a_curve_that_cannot_be_followed_says_so(texts):
+def test_a_curve_that_cannot_be_followed_is_an_error(texts):
     with pytest.raises((CurveError, ExpressionError)):
         shape_of(Curve(*texts)).check(5.0)

@@ -1,4 +1,4 @@
-"""The map of points: what was seen stays for a while, what is passed through goes."""
+"""The point map: points stay for a while, and go when a ray passes through them."""
 
 from array import array
 from math import hypot, pi
@@ -6,8 +6,8 @@ from math import hypot, pi
 import pytest
 
 from agent.config import Laser, Sensors
-from agent.messages import Scan
-from agent.sensing.point_map import KEPT_S, MOST_NEAR, NOTHING, PointMap
+from agent.messages import NO_ECHO_MM, Scan
+from agent.sensing.point_map import KEPT_S, MAX_NEAR_POINTS, PointMap
 from agent.sensing.ray_pattern import pattern_of
 
 SENSORS = Sensors(laser=Laser(rays=61))
@@ -16,10 +16,10 @@ AHEAD = 30
 
 
 def scan(**metres):
-    ranges = array("H", [NOTHING] * 61)
+    ranges = array("H", [NO_ECHO_MM] * 61)
     for ray, far in metres.items():
         ranges[int(ray[1:])] = round(1000 * far)
-    return Scan(0, ranges.tobytes())
+    return Scan(kind=0, ranges=ranges.tobytes())
 
 
 def points():
@@ -28,64 +28,62 @@ def points():
 
 def test_an_echo_ahead_is_a_point_ahead():
     known = points()
-    known.take(scan(r30=1.5), (1.0, 2.0, 3.0), pi / 2, 0.0)
-    assert known.near((1.0, 2.0, 3.0), 0.0) == (pytest.approx((0.0, 1.5, 0.0)),)
-    assert known.near((1.0, 3.0, 3.0), 0.0) == (pytest.approx((0.0, 0.5, 0.0)),)
-    assert known.near((9.0, 2.0, 3.0), 0.0) == ()
+    known.add_scan(scan(r30=1.5), (1.0, 2.0, 3.0), pi / 2, 0.0)
+    assert known.near_points((1.0, 2.0, 3.0), 0.0) == (pytest.approx((0.0, 1.5, 0.0)),)
+    assert known.near_points((1.0, 3.0, 3.0), 0.0) == (pytest.approx((0.0, 0.5, 0.0)),)
+    assert known.near_points((9.0, 2.0, 3.0), 0.0) == ()
 
 
-def test_it_stays_while_one_looks_elsewhere_and_is_forgotten_in_time():
+def test_a_point_stays_while_the_sensor_looks_elsewhere_and_is_forgotten_in_time():
     known = points()
-    known.take(scan(r30=1.5), ORIGIN, 0.0, 0.0)
-    known.take(scan(), ORIGIN, pi, 3.0)
-    assert len(known.near(ORIGIN, KEPT_S)) == 1
-    assert known.near(ORIGIN, KEPT_S + 0.1) == ()
+    known.add_scan(scan(r30=1.5), ORIGIN, 0.0, 0.0)
+    known.add_scan(scan(), ORIGIN, pi, 3.0)
+    assert len(known.near_points(ORIGIN, KEPT_S)) == 1
+    assert known.near_points(ORIGIN, KEPT_S + 0.1) == ()
 
 
-def test_what_a_ray_passes_through_is_gone():
+def test_a_point_that_a_ray_passes_through_is_gone():
     known = points()
-    known.take(scan(r30=1.5), ORIGIN, 0.0, 0.0)
-    known.take(scan(r30=2.5), ORIGIN, 0.0, 0.1)
-    assert [round(hypot(*p), 3) for p in known.near(ORIGIN, 0.1)] == []
+    known.add_scan(scan(r30=1.5), ORIGIN, 0.0, 0.0)
+    known.add_scan(scan(r30=2.5), ORIGIN, 0.0, 0.1)
+    assert [round(hypot(*p), 3) for p in known.near_points(ORIGIN, 0.1)] == []
     assert len(known) == 1
 
 
-def test_one_ray_that_meets_nothing_may_be_a_dropout_two_are_not():
+def test_one_ray_without_an_echo_may_be_a_dropout_two_are_not():
     known = points()
-    known.take(scan(r30=1.5), ORIGIN, 0.0, 0.0)
-    known.take(scan(), ORIGIN, 0.0, 0.1)
+    known.add_scan(scan(r30=1.5), ORIGIN, 0.0, 0.0)
+    known.add_scan(scan(), ORIGIN, 0.0, 0.1)
     assert len(known) == 1
-    known.take(scan(), ORIGIN, 0.0, 0.2)
+    known.add_scan(scan(), ORIGIN, 0.0, 0.2)
     assert len(known) == 0
 
 
-def test_a_ray_beside_a_point_says_nothing_of_it():
+def test_a_ray_beside_a_point_does_not_remove_it():
     known = points()
-    known.take(scan(r30=1.5), ORIGIN, 0.0, 0.0)
+    known.add_scan(scan(r30=1.5), ORIGIN, 0.0, 0.0)
     for tick in range(5):
-        known.take(scan(r30=3.0), (0.0, 0.0, -0.2), 0.0, 0.1 * tick)
-    assert any(hypot(*point) < 1.6 for point in known.near(ORIGIN, 0.5))
+        known.add_scan(scan(r30=3.0), (0.0, 0.0, -0.2), 0.0, 0.1 * tick)
+    assert any(hypot(*point) < 1.6 for point in known.near_points(ORIGIN, 0.5))
 
 
 def test_a_neighbour_is_no_obstacle():
     known = points()
-    known.take(scan(r30=1.5), ORIGIN, 0.0, 0.0, others=[(1.6, 0.1, 0.0)])
+    known.add_scan(scan(r30=1.5), ORIGIN, 0.0, 0.0, others=[(1.6, 0.1, 0.0)])
     assert len(known) == 0
 
 
-def test_of_many_the_nearest_are_told():
+def test_of_many_points_the_nearest_are_returned():
     known = points()
-    known.take(scan(**{f"r{ray}": 1.0 + 0.01 * ray for ray in range(0, 61)}), ORIGIN, 0.0, 0.0)
-    told = known.near(ORIGIN, 0.0)
-    assert len(told) <= MOST_NEAR
-    assert [hypot(*point) for point in told] == sorted(hypot(*point) for point in told)
-    assert hypot(*told[0]) == pytest.approx(1.0, abs=0.05)
+    known.add_scan(scan(**{f"r{ray}": 1.0 + 0.01 * ray for ray in range(0, 61)}), ORIGIN, 0.0, 0.0)
+    near = known.near_points(ORIGIN, 0.0)
+    assert len(near) <= MAX_NEAR_POINTS
+    assert [hypot(*point) for point in near] == sorted(hypot(*point) for point in near)
+    assert hypot(*near[0]) == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.parametrize(
-    "odd", [Scan(0, b""), Scan(0, b"\x01"), Scan(0, b"\x01\x02"), Scan(7, b"ab")]
-)
-def test_a_scan_that_is_not_of_the_pattern_says_nothing(odd):
+@pytest.mark.parametrize(("kind", "ranges"), [(0, b""), (0, b"\x01"), (0, b"\x01\x02"), (7, b"ab")])
+def test_a_scan_that_does_not_fit_the_pattern_is_ignored(kind, ranges):
     known = points()
-    known.take(odd, ORIGIN, 0.0, 0.0)
+    known.add_scan(Scan(kind=kind, ranges=ranges), ORIGIN, 0.0, 0.0)
     assert len(known) == 0

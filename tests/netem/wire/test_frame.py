@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from netem.wire.channels import MAX_PAYLOAD_B
 from netem.wire.frame import (
     BATCH_HEAD_B,
     FRAME_HEAD_B,
@@ -17,7 +18,6 @@ from netem.wire.frame import (
     MAX_EARLY_US,
     MAX_FRAMES,
     MAX_OUTGOING,
-    MAX_PAYLOAD_B,
     MAX_TRANSMISSION_B,
     Batch,
     Delivery,

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netem.wire.frame import CHANNELS, Frame, WireError, pack
+from netem.wire.channels import CHANNELS
+from netem.wire.frame import Frame, WireError, pack
 from netem.wire.latency import (
     BINNED_SLOTS,
     BINS,
