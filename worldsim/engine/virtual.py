@@ -35,11 +35,11 @@ from worldsim.engine.operations import (
     SetSensorMode,
     StartProcesses,
 )
+from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
 from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
 from worldsim.judge.run_events import RunEvent
 from worldsim.scenario.tables import Scenario
 
-COMMAND_TICKS = 1
 """A command is valid for one tick: in virtual time none is ever late."""
 PROGRESS_EVERY_S = 0.5
 
@@ -66,7 +66,7 @@ class VirtualFleet:
         self._agents = {agent: self._started(agent, 0) for agent in range(scenario.fleet.agents)}
         self._inboxes = [deque[bytes](maxlen=BATCH_RING) for _ in range(scenario.rows)]
         self.loop = SlotLoop(
-            scenario, world_of(scenario, COMMAND_TICKS), recorder, self._medium.packets
+            scenario, world_of(scenario, VIRTUAL_COMMAND_TICKS), recorder, self._medium.packets
         )
 
     @property
@@ -112,7 +112,7 @@ class VirtualFleet:
                 assert_never(operation)
 
     def _started(self, agent: int, incarnation: int) -> Agent:
-        setup = self._scenario.agent_setup(agent, incarnation, COMMAND_TICKS)
+        setup = self._scenario.agent_setup(agent, incarnation, VIRTUAL_COMMAND_TICKS)
         return Agent(setup, self._decoders)
 
     def _step(self, agent: int, observed: bytes, opened: Opened) -> None:

@@ -35,6 +35,7 @@ from worldsim.engine.operations import (
     SetSensorMode,
     StartProcesses,
 )
+from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
 from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
 from worldsim.fleet.control import Control, Reception
 from worldsim.fleet.launcher_link import LauncherLink
@@ -45,7 +46,6 @@ from worldsim.judge.tick import Packets
 from worldsim.scenario.tables import Scenario
 
 DONE_LOOK_EVERY_S = 0.02
-COMMAND_TICKS = 1
 """As in virtual time: none is ever late."""
 
 
@@ -67,7 +67,9 @@ class LockstepFleet:
         shards: int,
     ) -> None:
         rows = range(scenario.rows)
-        self.loop = SlotLoop(scenario, world_of(scenario, COMMAND_TICKS), recorder, self._packets)
+        self.loop = SlotLoop(
+            scenario, world_of(scenario, VIRTUAL_COMMAND_TICKS), recorder, self._packets
+        )
         self.medium_counters: MediumCounters | None = None
         self.real_time_factor: float | None = None
         self.failure: str | None = None
