@@ -1,4 +1,4 @@
-"""Distances and packet conservation from rows of truth, as docs/method.md defines them."""
+"""Distances and packet conservation from rows of truth, as docs/scenario.md defines them."""
 
 import numpy as np
 
