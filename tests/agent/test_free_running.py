@@ -72,7 +72,10 @@ def test_a_frames_delay_is_counted_from_its_due_time_to_its_use(shell, bus):
     bus.received.append(pack(Delivery(4, (JUNK, JUNK), (0, 25_000))))
     shell.observe(observation(8))
     counts = last_report(shell, bus).counts[0]
-    assert [at for at, count in enumerate(counts) if count] == [4 * BINS_PER_SLOT, 6 * BINS_PER_SLOT]
+    assert [at for at, count in enumerate(counts) if count] == [
+        4 * BINS_PER_SLOT,
+        6 * BINS_PER_SLOT,
+    ]
     assert last_report(shell, bus).incarnation == 2
 
 

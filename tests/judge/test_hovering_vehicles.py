@@ -1,4 +1,4 @@
-"""A vehicle of no member takes a place where it stands, and none that it flies past (E18)."""
+"""A vehicle outside the team occupies a place where it hovers, not one that it passes (E18)."""
 
 from dataclasses import replace
 
@@ -16,30 +16,30 @@ TEAM = list(range(8))
 APEX = Place(0, 0)
 
 
-def blocked(velocity, seconds):
-    """What is taken from the first eight as the ninth passes the apex, after so many seconds."""
-    bodies, phase = HoveringVehicles(1.0), Judge(SCENARIO).phases[0]
-    taken = frozenset()
+def occupied(velocity, seconds):
+    """Places occupied by the ninth vehicle, which reaches the apex after so many seconds."""
+    vehicles, phase = HoveringVehicles(1.0), Judge(SCENARIO).phases[0]
+    places = frozenset()
     for tick in straight_flight(SCENARIO):
         if tick.time_s > seconds:
-            return taken
+            return places
         position = tick.position.copy()
         position[-1] = np.array(velocity) * (tick.time_s - seconds)
         passing = replace(tick, position=position)
-        bodies.see(passing)
-        taken = bodies.blocked(passing, phase, TEAM)
-    return taken
+        vehicles.see(passing)
+        places = vehicles.occupied_places(passing, phase, TEAM)
+    return places
 
 
-def test_who_stands_there_takes_a_place():
-    assert blocked((0.0, 0.0, 0.0), 4.0) == {APEX}
+def test_a_hovering_vehicle_occupies_a_place():
+    assert occupied((0.0, 0.0, 0.0), 4.0) == {APEX}
 
 
 @pytest.mark.parametrize("speed", [0.15, 0.5])
-def test_who_flies_past_takes_none(speed):
-    assert blocked((speed, 0.0, 0.0), 4.0) == frozenset()
+def test_a_vehicle_that_flies_past_occupies_none(speed):
+    assert occupied((speed, 0.0, 0.0), 4.0) == frozenset()
 
 
-def test_nobody_is_known_to_stand_before_it_did_so_for_a_while():
-    assert blocked((0.0, 0.0, 0.0), UNIDENTIFIED_AFTER_S - 0.1) == frozenset()
-    assert blocked((0.0, 0.0, 0.0), UNIDENTIFIED_AFTER_S + 0.1) == {APEX}
+def test_a_vehicle_hovers_only_after_some_time_in_place():
+    assert occupied((0.0, 0.0, 0.0), UNIDENTIFIED_AFTER_S - 0.1) == frozenset()
+    assert occupied((0.0, 0.0, 0.0), UNIDENTIFIED_AFTER_S + 0.1) == {APEX}

@@ -1,4 +1,4 @@
-"""The least distance to obstacles, between ticks too, for those that move and those that stand."""
+"""The least distance to resting and moving obstacles, between ticks too."""
 
 import numpy as np
 import pytest
@@ -21,15 +21,15 @@ def test_passing_between_two_ticks_counts():
     assert least((-3, 0.2, 0), (3, 0.2, 0), BALL) == pytest.approx([-0.3])
 
 
-def test_a_moving_one_meets_who_stands():
+def test_a_moving_obstacle_meets_a_resting_vehicle():
     assert least((0, 0.7, 0), (0, 0.7, 0), COMING) == pytest.approx([0.2])
 
 
-def test_the_nearest_of_all_counts():
+def test_the_nearest_obstacle_counts():
     wall = Box(centre_m=(0, 3, 0), size_m=(10.0, 1.0, 2.0))
     assert least((-3, 2, 0), (3, 2, 0), BALL, wall) == pytest.approx([0.5])
 
 
-def test_nobody_is_near_nothing():
+def test_a_missing_vehicle_has_no_distance():
     nowhere = np.full((2, 3), np.nan)
     assert np.isnan(swept_obstacle_distance(nowhere, nowhere, Obstacles([BALL]), (0.0, 1.0))).all()

@@ -1,4 +1,4 @@
-"""A run to record: a fleet that flies straight from random starts to its slots."""
+"""Runs to record: a fleet that flies straight from random starts to its slots."""
 
 from collections.abc import Iterator
 
@@ -16,7 +16,7 @@ SPEED_MPS = 0.5
 
 
 def wedge(agents: int, duration_s: float = 8.0) -> Scenario:
-    """Return a scenario of a pyramidal wedge."""
+    """Return the scenario of a pyramidal wedge."""
     queues = tuple(
         QueueSpec(name=f"Q{index}", vertices=("V1",), shape=Ray(direction=edge))
         for index, edge in enumerate(EDGES)
@@ -32,7 +32,7 @@ def wedge(agents: int, duration_s: float = 8.0) -> Scenario:
 
 
 def straight_flight(scenario: Scenario) -> Iterator[Tick]:
-    """Return the ticks of a fleet that knows its slots from the start and flies straight there."""
+    """Yield the ticks of a fleet that has its slots from the start and flies straight there."""
     agents, tick_hz = scenario.fleet.agents, scenario.fleet.tick_hz
     formation = Formation(scenario.formation, scenario.control.spacing_m)
     filled = formation.layout(agents)
@@ -63,7 +63,7 @@ def straight_flight(scenario: Scenario) -> Iterator[Tick]:
 
 
 def _packets(index: int) -> dict[str, int]:
-    """A tick sends a frame to eight others; of what does not arrive a part is lost by then."""
+    """Each tick sends one frame to eight others; of those that do not arrive, a third is lost."""
     delivered, lost = 7 * index, index // 3
     fates = {"delivered": delivered, "dropped_loss": lost, "in_flight": index - lost}
     return {"sent": index, "addressed": 8 * index, **fates}
@@ -74,7 +74,7 @@ def _level(yaw: np.ndarray) -> np.ndarray:
 
 
 def record(recorder: RunRecorder, scenario: Scenario, ticks: list[Tick]) -> Judge:
-    """Judge and record ticks as a run does, and end the recording; return the judge."""
+    """Judge and record ticks as a run does, and close the recording; return the judge."""
     judge = Judge(scenario)
     for tick in ticks:
         figures: Figures = judge.see(tick)
@@ -83,8 +83,8 @@ def record(recorder: RunRecorder, scenario: Scenario, ticks: list[Tick]) -> Judg
     return judge
 
 
-def told(judge: Judge) -> tuple[object, ...]:
-    """Return everything that a verdict is made of."""
+def verdict_parts(judge: Judge) -> tuple[object, ...]:
+    """Return everything that a verdict consists of."""
     phases = [(phase.converge_s, phase.residual_m) for phase in judge.phases]
     rows: list[Expectation] = judge.expectations()
     return (

@@ -1,4 +1,4 @@
-"""What a recording shows of tiers, roles and queues, beside what is judged."""
+"""The recorded hierarchy: tiers, parents, roles and queue residuals."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +9,7 @@ from rerun.chunk import Chunk, RrdReader
 
 from agent.comms.hierarchy import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
 from tests.recording.flights import record, straight_flight, wedge
-from worldsim.judge.tick import Standings, Tick
+from worldsim.judge.tick import HierarchyRows, Tick
 from worldsim.recording.hierarchy_columns import parent_lines
 from worldsim.recording.recorder import RunRecorder
 
@@ -19,26 +19,29 @@ TIER = (0, 1, 2, 2, -1)
 ROLE = (VERTEX, SUB_VERTEX, MEMBER, MEMBER, DISTRESS)
 
 
-def standings(role: tuple[int, ...] = ROLE) -> Standings:
-    ages = np.full(AGENTS, 0.3, dtype=np.float32)
-    tier, parent = np.array(TIER, dtype=np.int16), np.array(PARENT, dtype=np.int32)
-    return Standings(tier, parent, np.array(role, dtype=np.int8), ages)
+def hierarchy(role: tuple[int, ...] = ROLE) -> HierarchyRows:
+    return HierarchyRows(
+        tier=np.array(TIER, dtype=np.int16),
+        parent=np.array(PARENT, dtype=np.int32),
+        role=np.array(role, dtype=np.int8),
+        record_age_s=np.full(AGENTS, 0.3, dtype=np.float32),
+    )
 
 
 def ticks() -> list[Tick]:
-    """Two seconds; after one, the agent in distress is a member."""
+    """Two seconds; after the first, the agent in distress is a member."""
     found = (*ROLE[:-1], MEMBER)
     return [
-        replace(tick, standings=standings(ROLE if tick.time_s < 1.0 else found))
+        replace(tick, hierarchy=hierarchy(ROLE if tick.time_s < 1.0 else found))
         for tick in straight_flight(wedge(AGENTS, duration_s=2.0))
     ]
 
 
 @pytest.fixture(scope="module")
 def chunks(tmp_path_factory: pytest.TempPathFactory) -> list[Chunk]:
-    path: Path = tmp_path_factory.mktemp("standings") / "run.rrd"
+    path: Path = tmp_path_factory.mktemp("hierarchy") / "run.rrd"
     scenario = wedge(AGENTS, duration_s=2.0)
-    record(RunRecorder(path, scenario, "standings", mode="virtual"), scenario, ticks())
+    record(RunRecorder(path, scenario, "hierarchy", mode="virtual"), scenario, ticks())
     return list(RrdReader(path).stream())
 
 
@@ -52,35 +55,33 @@ def rows(chunks: list[Chunk], entity: str, component: str) -> list[list[object]]
     return [row for column in having for row in column.to_pylist()]
 
 
-def test_figures_are_taken_four_times_a_second(chunks: list[Chunk]) -> None:
+def test_figures_have_a_row_four_times_a_second(chunks: list[Chunk]) -> None:
     for entity, first in (
         ("/metrics/tier", [0.0, 1.0, 2.0, 2.0, -1.0]),
         ("/metrics/record_age", pytest.approx([0.3] * AGENTS)),
         ("/metrics/neighbours", [4.0] * AGENTS),
     ):
-        told = rows(chunks, entity, "Scalars:scalars")
-        assert len(told) == 2 * 4 + 1
-        assert told[0] == first
+        found = rows(chunks, entity, "Scalars:scalars")
+        assert len(found) == 2 * 4 + 1
+        assert found[0] == first
 
 
 def test_each_queue_has_a_residual_of_its_own(chunks: list[Chunk]) -> None:
-    told = rows(chunks, "/metrics/queue_residual", "Scalars:scalars")
-    assert {len(row) for row in told} == {4}
-    assert len(told) == 2 * 4 + 1
+    found = rows(chunks, "/metrics/queue_residual", "Scalars:scalars")
+    assert {len(row) for row in found} == {4}
+    assert len(found) == 2 * 4 + 1
 
 
-def test_a_line_leads_from_each_agent_to_its_parent(chunks: list[Chunk]) -> None:
-    told = rows(chunks, "/world/hierarchy", "LineStrips3D:strips")
-    assert {len(row) for row in told} == {3}
+def test_each_agent_with_a_parent_has_a_line_to_it(chunks: list[Chunk]) -> None:
+    found = rows(chunks, "/world/hierarchy", "LineStrips3D:strips")
+    assert {len(row) for row in found} == {3}
     tick = ticks()[0]
-    ends, tiers = parent_lines(tick, standings())
+    ends, tiers = parent_lines(tick.position, hierarchy())
     assert tiers.tolist() == [1, 2, 2]
     np.testing.assert_array_equal(ends[0], tick.position[[1, 0]])
 
 
-def test_roles_are_told_when_they_change_beside_the_vehicle_and_in_a_lane(
-    chunks: list[Chunk],
-) -> None:
+def test_labels_and_roles_have_a_row_where_they_change(chunks: list[Chunk]) -> None:
     labels = rows(chunks, "/world/vehicles", "Boxes3D:labels")
     assert [row for row in labels if row] == [
         ["a0 vertex", "a1 sub-vertex 1", "a2", "a3", "a4 distress"],

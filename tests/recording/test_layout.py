@@ -1,4 +1,4 @@
-"""The recording's layout is a contract: other tools find these entities and timelines."""
+"""The recording's layout is a contract: other tools rely on these entities and timelines."""
 
 import pytest
 from rerun.chunk import Chunk, RrdReader
@@ -54,7 +54,7 @@ def test_entities_hold_one_row_for_each_agent(
         assert not {"log_time", "log_tick"} & set(batch.schema.names)
 
 
-def test_a_second_of_an_entity_is_one_chunk(chunks: list[Chunk]) -> None:
+def test_each_second_of_an_entity_is_one_chunk(chunks: list[Chunk]) -> None:
     rows = [
         chunk.num_rows
         for chunk in chunks
@@ -72,8 +72,8 @@ def test_series_are_named_after_their_agents(chunks: list[Chunk]) -> None:
     assert names == [[[f"a{agent}" for agent in range(AGENTS)]]]
 
 
-def test_events_warn_of_a_kill(chunks: list[Chunk]) -> None:
+def test_a_kill_is_logged_as_a_warning(chunks: list[Chunk]) -> None:
     (log,) = [chunk.to_record_batch() for chunk in chunks if chunk.entity_path == "/log/events"]
-    assert log.column("TextLog:text").to_pylist() == [["kill a4: planned True"]]
+    assert log.column("TextLog:text").to_pylist() == [["a4 killed (scheduled)"]]
     assert log.column("TextLog:level").to_pylist() == [["WARN"]]
     assert log.column("tick").to_pylist() == [10]

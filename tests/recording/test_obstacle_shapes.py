@@ -1,4 +1,4 @@
-"""Obstacles in a recording: shapes that last, those that move at every tick, and a verdict."""
+"""Recorded obstacles: static shapes, positions of moving ones, and the verdict on distances."""
 
 from pathlib import Path
 
@@ -43,7 +43,7 @@ def rows(flown: Flown, entity: str, component: str, static: bool) -> list[list[l
     return [row for batch in having for row in batch.column(component).to_pylist()]
 
 
-def test_what_stands_is_told_once(flown: Flown) -> None:
+def test_resting_obstacles_are_static(flown: Flown) -> None:
     under = "/world/obstacles"
     (spheres,) = rows(flown, f"{under}/spheres", "Ellipsoids3D:centers", static=True)
     assert spheres == [[4.0, 0.0, 0.0]]
@@ -55,7 +55,7 @@ def test_what_stands_is_told_once(flown: Flown) -> None:
     assert lengths == [4.0]
 
 
-def test_what_moves_is_told_at_every_tick(flown: Flown) -> None:
+def test_moving_obstacles_have_a_position_at_every_tick(flown: Flown) -> None:
     entity = "/world/obstacles/moving/spheres"
     (sizes,) = rows(flown, entity, "Ellipsoids3D:half_sizes", static=True)
     assert sizes == [pytest.approx([0.3, 0.3, 0.3])]
@@ -64,10 +64,10 @@ def test_what_moves_is_told_at_every_tick(flown: Flown) -> None:
     assert [centres[0][0], centres[20][0]] == [[5.0, -2.0, 0.0], [5.0, -1.0, 0.0]]
 
 
-def test_each_agent_has_its_distance(flown: Flown) -> None:
+def test_each_agent_has_an_obstacle_distance(flown: Flown) -> None:
     distances = rows(flown, "/metrics/obstacle_distance", "Scalars:scalars", static=False)
     assert [len(row) for row in distances] == [5] * TICKS
-    assert min(map(min, distances)) == flown[1].min_obstacle_distance_m  # type: ignore[type-var]
+    assert min(min(row) for row in distances) == flown[1].min_obstacle_distance_m
 
 
 def test_the_recording_alone_gives_the_same_distance(flown: Flown) -> None:
@@ -78,7 +78,7 @@ def test_the_recording_alone_gives_the_same_distance(flown: Flown) -> None:
     assert (row.wanted, row.got) == (0.5, judge.min_obstacle_distance_m)
 
 
-def test_without_obstacles_nothing_is_told_of_them(tmp_path: Path) -> None:
+def test_without_obstacles_there_are_no_entities_of_them(tmp_path: Path) -> None:
     scenario = wedge(3, duration_s=1.0)
     recorder = RunRecorder(tmp_path / "run.rrd", scenario, "none", mode="virtual")
     judge = record(recorder, scenario, list(straight_flight(scenario)))

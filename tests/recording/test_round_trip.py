@@ -1,18 +1,22 @@
-"""What is read back is what was judged."""
+"""The ticks that are read back are those that were judged."""
 
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import msgspec
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.recording.flights import record, straight_flight, told, wedge
-from worldsim.judge.run_events import Healed, Killed, SlotChanged
+from netem.link_keys import Conditions
+from tests.recording.flights import record, straight_flight, verdict_parts, wedge
+from worldsim.judge.run_events import ConditionsChanged, Killed, SlotChanged
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge
 from worldsim.recording.readback import read_run
 from worldsim.recording.recorder import RunRecorder
+from worldsim.scenario.tables import Fleet
 
 AGENTS = 5
 SPOOFED = 40_000
@@ -20,7 +24,7 @@ SPOOFED = 40_000
 
 @st.composite
 def wild_ticks(draw: st.DrawFn) -> list[Tick]:
-    """Ticks of anything: vehicles that are not there, no places, no targets, false neighbours."""
+    """Ticks with anything in them: missing vehicles, places and targets, false neighbours."""
     generator = np.random.default_rng(draw(st.integers(0, 2**32)))
     count = draw(st.integers(1, 50))
     return [_wild_tick(generator, index) for index in range(count)]
@@ -55,7 +59,7 @@ def _wild_tick(generator: np.random.Generator, index: int) -> Tick:
 
 @settings(max_examples=12, deadline=None)
 @given(ticks=wild_ticks())
-def test_the_judge_meets_the_same_numbers_in_the_recording(ticks: list[Tick]) -> None:
+def test_a_recording_holds_the_numbers_that_were_judged(ticks: list[Tick]) -> None:
     scenario = wedge(AGENTS)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "run.rrd"
@@ -65,7 +69,7 @@ def test_the_judge_meets_the_same_numbers_in_the_recording(ticks: list[Tick]) ->
     for before, after in zip(ticks, readback.ticks, strict=True):
         _assert_equal(before, after)
         again.see(after)
-    assert told(again) == told(judged)
+    assert verdict_parts(again) == verdict_parts(judged)
 
 
 def _assert_equal(before: Tick, after: Tick) -> None:
@@ -79,13 +83,20 @@ def _assert_equal(before: Tick, after: Tick) -> None:
     assert after.packets == before.packets
 
 
-def test_scenario_and_events_come_back(tmp_path: Path) -> None:
+def test_scenario_and_events_are_read_back(tmp_path: Path) -> None:
     scenario = wedge(9, duration_s=1.0)
     recorder = RunRecorder(tmp_path / "run.rrd", scenario, "events", mode="virtual")
     events = [
         SlotChanged(t_s=0.0125, agent=3, place=(1, 2), before=None),
-        Killed(t_s=0.5, agent=4, planned=True),
-        Healed(t_s=0.75, agent=None, planned=True),
+        Killed(t_s=0.5, agent=4, planned=False, signal=9),
+        ConditionsChanged(
+            t_s=0.75,
+            agent=None,
+            planned=True,
+            number=0,
+            loss_percent=5.0,
+            conditions=Conditions(loss_percent=5.0, range_m=6.0),
+        ),
     ]
     for event in events:
         recorder.event(event)
@@ -95,17 +106,10 @@ def test_scenario_and_events_come_back(tmp_path: Path) -> None:
     assert readback.scenario == scenario
 
 
-def test_ticks_come_back_at_a_rate_that_is_no_round_number_of_nanoseconds(tmp_path: Path) -> None:
+def test_times_are_exact_where_a_tick_is_no_whole_number_of_nanoseconds(tmp_path: Path) -> None:
     scenario = wedge(4, duration_s=1.0)
-    ticks = [
-        Tick(
-            **{**{name: getattr(tick, name) for name in tick.__slots__}, "time_s": tick.index / 30}
-        )
-        for tick in straight_flight(scenario)
-    ]
-    thirty = type(scenario)(
-        fleet=type(scenario.fleet)(agents=4, tick_hz=30.0), formation=scenario.formation
-    )
+    ticks = [replace(tick, time_s=tick.index / 30) for tick in straight_flight(scenario)]
+    thirty = msgspec.structs.replace(scenario, fleet=Fleet(agents=4, tick_hz=30.0))
     record(RunRecorder(tmp_path / "run.rrd", thirty, "thirty", mode="virtual"), thirty, ticks)
     assert [tick.time_s for tick in read_run(tmp_path / "run.rrd").ticks] == [
         tick.time_s for tick in ticks

@@ -1,4 +1,4 @@
-"""Processes are killed and disks are full: the recording ends, what was kept is readable."""
+"""Killed processes and full disks: the recording ends early, and what it holds is readable."""
 
 import os
 import signal
@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.recording.flights import record, straight_flight, wedge
+from worldsim.judge.run_events import Killed
 from worldsim.recording.readback import read_run
 from worldsim.recording.recorder import RunRecorder
 
@@ -55,30 +56,30 @@ def run(code: str, path: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_of_a_killed_process_all_but_the_last_second_is_kept(tmp_path: Path) -> None:
+def test_a_killed_process_loses_the_last_second_at_most(tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
     assert run(KILLED, path).returncode == -signal.SIGKILL
     assert [tick.index for tick in read_run(path).ticks][:41] == list(range(41))
     assert len(read_run(path).ticks) in {40, 60}
 
 
-def test_a_full_disk_is_said_once_and_the_run_ends_cleanly(tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_once_and_the_run_ends_cleanly(tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
     ended = run(FULL, path)
     assert ended.returncode == 0
     assert ended.stdout == "161\n"
     assert ended.stderr.count("recording: ") == 1
-    assert "run.rrd ends here, the run goes on: File too large" in ended.stderr
+    assert "run.rrd ends here, the run continues: File too large" in ended.stderr
     assert read_run(path).ticks
 
 
-def test_a_full_disk_that_holds_stderr_too_ends_no_run(tmp_path: Path) -> None:
+def test_a_full_disk_that_holds_stderr_too_does_not_end_the_run(tmp_path: Path) -> None:
     ended = run(f"import sys; sys.stderr = open('/dev/full', 'w')\n{FULL}", tmp_path / "run.rrd")
     assert ended.stdout == "161\n"
 
 
 @pytest.mark.parametrize("kept", [0.5, 0.75, 0.9, 0.999, 1.0])
-def test_a_file_cut_anywhere_is_read_as_far_as_it_goes(tmp_path: Path, kept: float) -> None:
+def test_a_truncated_file_is_read_as_far_as_it_goes(tmp_path: Path, kept: float) -> None:
     path = tmp_path / "run.rrd"
     scenario = wedge(9, duration_s=6.0)
     ticks = list(straight_flight(scenario))
@@ -91,34 +92,34 @@ def test_a_file_cut_anywhere_is_read_as_far_as_it_goes(tmp_path: Path, kept: flo
 
 
 def test_a_recording_that_cannot_be_created_does_not_end_the_run(tmp_path: Path) -> None:
-    complaints: list[str] = []
+    reports: list[str] = []
     scenario = wedge(4, duration_s=3.0)
     recorder = RunRecorder(
-        tmp_path / "no" / "run.rrd", scenario, "none", say=complaints.append, mode="virtual"
+        tmp_path / "no" / "run.rrd", scenario, "none", report=reports.append, mode="virtual"
     )
-    recorder.event({"t_s": 0.0, "kind": "kill", "agent": 0})
+    recorder.event(Killed(t_s=0.0, agent=0, planned=True))
     judge = record(recorder, scenario, list(straight_flight(scenario)))
     assert judge.ticks == 61
-    assert len(complaints) == 1
-    assert "No such file" in complaints[0]
+    assert len(reports) == 1
+    assert "No such file" in reports[0]
 
 
 def test_an_earlier_recording_is_not_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
     path.write_text("precious")
-    complaints: list[str] = []
-    RunRecorder(path, wedge(4), "second", say=complaints.append, mode="virtual").close()
+    reports: list[str] = []
+    RunRecorder(path, wedge(4), "second", report=reports.append, mode="virtual").close()
     assert path.read_text() == "precious"
-    assert len(complaints) == 1
+    assert len(reports) == 1
 
 
-def test_rows_that_do_not_fit_end_the_recording_not_the_run(tmp_path: Path) -> None:
-    complaints: list[str] = []
+def test_rows_of_a_wrong_shape_end_the_recording_not_the_run(tmp_path: Path) -> None:
+    reports: list[str] = []
     scenario = wedge(4, duration_s=3.0)
     ticks = list(straight_flight(scenario))
     ticks[30] = replace(ticks[30], target=ticks[30].target[:2])
     path = tmp_path / "run.rrd"
-    recorder = RunRecorder(path, scenario, "odd", mode="virtual", say=complaints.append)
+    recorder = RunRecorder(path, scenario, "odd", mode="virtual", report=reports.append)
     assert record(recorder, scenario, ticks).ticks == 61
-    assert len(complaints) == 1
+    assert len(reports) == 1
     assert [tick.index for tick in read_run(path).ticks] == list(range(20))

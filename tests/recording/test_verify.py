@@ -1,4 +1,4 @@
-"""The verdict from the recording alone, and what it says about a summary that is not true."""
+"""The verdict recomputed from the recording alone, and differences from a false summary."""
 
 import json
 from pathlib import Path
@@ -60,19 +60,17 @@ def test_a_true_summary_does_not_differ(tmp_path: Path, judge: Judge) -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "tampered"),
+    ("key", "changed"),
     [("min_separation_m", 0.9), ("turns_over_limit_fraction", 0.0), ("invariants", {})],
 )
-def test_a_tampered_summary_is_found_out(
-    tmp_path: Path, judge: Judge, key: str, tampered: object
-) -> None:
-    (tmp_path / "summary.json").write_text(json.dumps({**summary_of(judge), key: tampered}))
+def test_a_changed_summary_differs(tmp_path: Path, judge: Judge, key: str, changed: object) -> None:
+    (tmp_path / "summary.json").write_text(json.dumps({**summary_of(judge), key: changed}))
     verification = verify(tmp_path)
     assert {difference.key.split(".")[0] for difference in verification.differences} == {key}
     assert verification.exit_status == 1
 
 
-def test_a_figure_in_a_list_is_found_out(tmp_path: Path, judge: Judge) -> None:
+def test_a_changed_figure_in_a_list_differs(tmp_path: Path, judge: Judge) -> None:
     summary = summary_of(judge)
     residual_m = summary["phases"][0]["residual_m"]
     summary["phases"][0]["residual_m"] = residual_m + 1e-15
@@ -101,7 +99,7 @@ def test_held_is_exit_0_and_a_missed_expectation_1(tmp_path: Path) -> None:
     assert verify(tmp_path / "short").exit_status == 1
 
 
-def test_packets_that_went_missing_are_found_in_the_recording(tmp_path: Path) -> None:
+def test_missing_packets_are_found_in_the_recording(tmp_path: Path) -> None:
     scenario = wedge(4)
     *ticks, last = straight_flight(scenario)
     last.packets["in_flight"] -= 1
@@ -112,7 +110,7 @@ def test_packets_that_went_missing_are_found_in_the_recording(tmp_path: Path) ->
     assert verification.exit_status == 1
 
 
-def test_counters_that_come_late_are_looked_at_from_then_on(tmp_path: Path) -> None:
+def test_packets_are_judged_from_the_first_counters_on(tmp_path: Path) -> None:
     scenario = wedge(4)
     ticks = list(straight_flight(scenario))
     for tick in ticks[:3]:
@@ -125,7 +123,7 @@ def test_counters_that_come_late_are_looked_at_from_then_on(tmp_path: Path) -> N
     assert verification.differences == ()
 
 
-def test_nothing_to_judge_is_exit_2(tmp_path: Path) -> None:
+def test_a_missing_or_unreadable_recording_is_exit_2(tmp_path: Path) -> None:
     (tmp_path / "text.rrd").write_text("hello")
     for run in (tmp_path / "nowhere", tmp_path, tmp_path / "text.rrd"):
         verification = verify(run)

@@ -157,7 +157,7 @@ BROKEN = [
     (
         ["at_s = 5, frame = { waypoints_m = [[0, 0, 0], [0, 0, 0]], speed_mps = 0.2 }"],
         "event[0].frame.waypoints_m[1]",
-        "once more",
+        "the same point as before",
     ),
     (["at_s = 5, join = 0"], "event[0].join", "from 1"),
     (["at_s = 5, join = { coun = 2 }"], "event[0].join.coun", "did you mean 'count'"),

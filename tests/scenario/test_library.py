@@ -12,7 +12,7 @@ from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
 from worldsim.scenario.file import load
-from worldsim.scenario.rules import cautions
+from worldsim.scenario.rules import warnings_for
 
 LIBRARY = Path("deploy/formations")
 SCENARIOS = sorted(Path("deploy/scenarios").glob("*.toml"))
@@ -34,7 +34,7 @@ def slot(team: Formation, queue: int, rank: int) -> Vector:
 def test_every_scenario_of_the_library_is_sound(file: Path) -> None:
     scenario = load(file)
     assert scenario.name == file.stem
-    assert cautions(scenario) == []
+    assert warnings_for(scenario) == []
 
 
 @pytest.mark.parametrize("file", sorted(LIBRARY.glob("*.toml")), ids=lambda file: file.stem)

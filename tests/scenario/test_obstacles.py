@@ -1,4 +1,4 @@
-"""Obstacles in a scenario: what is refused and where, and what a random field resolves to."""
+"""Obstacles in a scenario: refused tables, and the resolution of a random field."""
 
 from math import dist, hypot
 from pathlib import Path
@@ -24,7 +24,7 @@ def with_field(more: str, **overrides: str):
 REFUSED = [
     ("{ shape = 'cone' }", "obstacle[0].shape", "'sphere' or 'box' or 'cylinder' or 'wall'"),
     ("{ shape = 'sphere', centre_m = [0, 0, 9] }", "obstacle[0].radius_m", "is missing"),
-    (f"{{ {BALL} }}", "obstacle[0].centre_m", "where it stands, or waypoints_m"),
+    (f"{{ {BALL} }}", "obstacle[0].centre_m", "to rest there, or waypoints_m"),
     (f"{{ {BALL}, centre_m = [0, 0, 9], {LINE} }}", "obstacle[0].centre_m", "one"),
     (f"{{ {BALL}, {LINE} }}", "obstacle[0].speed_mps", "goes with waypoints_m"),
     (f"{{ {BALL}, centre_m = [0, 0, 9], speed_mps = 1 }}", "obstacle[0].speed_mps", "goes with"),
@@ -54,7 +54,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("table", "key", "says"), REFUSED)
-def test_an_obstacle_that_cannot_be_is_refused(table: str, key: str, says: str) -> None:
+def test_an_inconsistent_obstacle_is_refused(table: str, key: str, says: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         load(WEDGE, {"obstacle": f"[{table}]"})
     assert str(caught.value).startswith(f"{WEDGE}: {key}: ")
@@ -76,7 +76,7 @@ FIELDS = [
 
 
 @pytest.mark.parametrize(("more", "key", "says"), FIELDS)
-def test_a_field_that_cannot_be_is_refused(more: str, key: str, says: str) -> None:
+def test_an_inconsistent_field_is_refused(more: str, key: str, says: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         with_field(more)
     assert str(caught.value).startswith(f"{WEDGE}: obstacle_field.{key}: ")
@@ -89,8 +89,8 @@ def test_an_obstacle_on_top_of_a_start_is_refused() -> None:
     scenario = load(WEDGE, {"fleet.agents": "2", "fleet.start": PAIR, "obstacle": ball})
     with pytest.raises(ScenarioError) as caught:
         admit(scenario, "mine.toml", VIRTUAL_COMMAND_TICKS)
-    told = "mine.toml: fleet.start: obstacle[0] is within 0.5 m of [2, 0, 0]"
-    assert str(caught.value) == told
+    error = "mine.toml: fleet.start: obstacle[0] is within 0.5 m of [2, 0, 0]"
+    assert str(caught.value) == error
 
 
 def test_a_box_of_starts_full_of_obstacle_is_refused() -> None:
@@ -99,21 +99,21 @@ def test_a_box_of_starts_full_of_obstacle_is_refused() -> None:
         admit(scenario, "mine.toml", VIRTUAL_COMMAND_TICKS)
 
 
-def test_a_field_is_resolved_into_obstacles_that_read_back() -> None:
+def test_a_field_becomes_obstacles_that_can_be_written_and_read() -> None:
     scenario = with_field("count = 7")
     assert scenario.obstacle_field is None
     assert len(scenario.obstacle) == 7
     assert parse(dump(scenario)) == scenario
 
 
-def test_a_seed_has_one_field_and_another_seed_another() -> None:
+def test_the_field_depends_on_the_seed_alone() -> None:
     first, again = with_field("count = 7"), with_field("count = 7")
     other = with_field("count = 7", seed="2")
     assert first.obstacle == again.obstacle
     assert first.obstacle != other.obstacle
 
 
-def test_a_density_is_so_many_in_the_box() -> None:
+def test_a_density_counts_obstacles_per_volume() -> None:
     assert len(with_field("density_per_m3 = 0.02").obstacle) == 7
 
 

@@ -1,4 +1,4 @@
-"""What is unwise but allowed, and what only one of the clocks can fly."""
+"""Warnings, and scenarios that no clock or only one of them accepts."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import pytest
 
 from worldsim.engine.preflight import admit
 from worldsim.scenario.file import load
-from worldsim.scenario.rules import cautions, too_fast
+from worldsim.scenario.rules import speed_problem, warnings_for
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
 
@@ -17,43 +17,43 @@ def wedge(**overrides: str) -> Scenario:
     return load(WEDGE, {key.replace("__", "."): value for key, value in overrides.items()})
 
 
-def test_the_library_raises_no_eyebrow() -> None:
-    assert cautions(wedge()) == []
+def test_the_wedge_has_no_warnings() -> None:
+    assert warnings_for(wedge()) == []
 
 
-def test_a_cast_zone_beyond_lemma_7_is_cautioned_with_the_bound() -> None:
-    assert not cautions(wedge(netem__range_m="3", control__cast_far_m="0.5"))
-    (caution,) = cautions(wedge(netem__range_m="2", control__cast_far_m="0.5"))
-    assert caution.key == "control.cast_far_m"
-    assert "at most 0.25 " in caution.detail
+def test_the_warning_of_a_cast_zone_beyond_lemma_7_names_the_bound() -> None:
+    assert not warnings_for(wedge(netem__range_m="3", control__cast_far_m="0.5"))
+    (warning,) = warnings_for(wedge(netem__range_m="2", control__cast_far_m="0.5"))
+    assert warning.key == "control.cast_far_m"
+    assert "at most 0.25 " in warning.detail
 
 
-def test_neighbours_beyond_range_are_cautioned() -> None:
-    (caution,) = cautions(wedge(netem__local__range_m="0.9"))
-    assert caution.key == "netem.range_m"
+def test_neighbours_beyond_range_are_a_warning() -> None:
+    (warning,) = warnings_for(wedge(netem__local__range_m="0.9"))
+    assert warning.key == "netem.range_m"
 
 
-def test_a_run_too_short_to_see_convergence_is_cautioned() -> None:
-    assert not cautions(wedge(duration_s="14"))
-    (caution,) = cautions(wedge(duration_s="13.9"))
-    assert caution.key == "expect.converge_within_s"
+def test_a_run_too_short_to_see_convergence_is_a_warning() -> None:
+    assert not warnings_for(wedge(duration_s="14"))
+    (warning,) = warnings_for(wedge(duration_s="13.9"))
+    assert warning.key == "expect.converge_within_s"
 
 
 @pytest.mark.parametrize(
     ("speed", "ticks", "tick_hz"),
     [("0.5", 1, None), ("1", 2, None), ("1.01", 2, 21), ("2", 1, None), ("2", 2, 40)],
 )
-def test_fast_vehicles_need_a_tick_rate_that_does(
+def test_the_problem_of_fast_vehicles_names_a_tick_rate_that_solves_it(
     speed: str, ticks: int, tick_hz: int | None
 ) -> None:
-    found = too_fast(wedge(vehicle__max_speed_mps=speed), ticks)
+    found = speed_problem(wedge(vehicle__max_speed_mps=speed), ticks)
     if tick_hz is None:
         assert found is None
         return
     assert found is not None
-    assert f"fleet.tick_hz = {tick_hz} would do" in found.detail
+    assert f"fleet.tick_hz = {tick_hz} is enough" in found.detail
     faster = wedge(vehicle__max_speed_mps=speed, fleet__tick_hz=str(tick_hz))
-    assert too_fast(faster, ticks) is None
+    assert speed_problem(faster, ticks) is None
 
 
 def refusal(tmp_path: Path, scenario: Scenario) -> str:
@@ -65,10 +65,10 @@ def refusal(tmp_path: Path, scenario: Scenario) -> str:
 @pytest.mark.parametrize(
     "name", ["q_structur", "no.such:Thing", "json:Nothing", "json:loads", ":", "a b:c", "."]
 )
-def test_a_controller_that_cannot_be_had(tmp_path: Path, name: str) -> None:
-    told = refusal(tmp_path, wedge(control__controller=f"'{name}'"))
-    assert told.startswith("/s.toml: control.controller: ")
-    assert "\n" not in told
+def test_a_controller_that_is_not_found(tmp_path: Path, name: str) -> None:
+    error = refusal(tmp_path, wedge(control__controller=f"'{name}'"))
+    assert error.startswith("/s.toml: control.controller: ")
+    assert "\n" not in error
 
 
 def test_a_controller_that_breaks_while_imported(
@@ -76,11 +76,11 @@ def test_a_controller_that_breaks_while_imported(
 ) -> None:
     (tmp_path / "broken_controller.py").write_text("class :\n")
     monkeypatch.syspath_prepend(str(tmp_path))
-    told = refusal(tmp_path, wedge(control__controller="broken_controller:Mine"))
-    assert "cannot be imported: SyntaxError" in told
+    error = refusal(tmp_path, wedge(control__controller="broken_controller:Mine"))
+    assert "cannot be imported: SyntaxError" in error
 
 
 @pytest.mark.parametrize("agents", ["9", "1000"])
-def test_a_box_without_room_is_refused_soon(tmp_path: Path, agents: str) -> None:
+def test_a_box_without_room_is_refused_quickly(tmp_path: Path, agents: str) -> None:
     scenario = wedge(fleet__agents=agents, fleet__start__size_m="[0.5, 0.5, 0.5]")
     assert refusal(tmp_path, scenario).startswith("/s.toml: fleet.start: no room for ")

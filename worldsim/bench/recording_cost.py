@@ -10,7 +10,7 @@ import numpy as np
 from agent.comms.hierarchy import MEMBER, SUB_VERTEX, VERTEX
 from worldsim.bench.fleets import EIGHT_IN_RANGE_M, wedge
 from worldsim.judge.run_events import SlotChanged
-from worldsim.judge.tick import Standings, Tick
+from worldsim.judge.tick import HierarchyRows, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording.recorder import RunRecorder
 from worldsim.scenario.tables import Scenario
@@ -79,9 +79,15 @@ def _flight(scenario: Scenario) -> Iterator[tuple[Tick, Figures]]:
             links=_links(position),
             mission=np.zeros(agents, dtype=np.int64),
             packets={"sent": agents * index, "delivered": 8 * agents * index},
-            standings=_standings(agents, changed),
+            hierarchy=_hierarchy_rows(agents, changed),
         )
-        yield tick, Figures(error[0], error[1], False, queue_residual=error[0, :QUEUES])
+        figures = Figures(
+            separation=error[0],
+            slot_error=error[1],
+            converged=False,
+            queue_residual=error[0, :QUEUES],
+        )
+        yield tick, figures
 
 
 def _links(position: np.ndarray) -> np.ndarray:
@@ -94,12 +100,17 @@ def _places(agents: int, shift: int) -> np.ndarray:
     return np.stack((number % QUEUES, number // QUEUES), axis=1).astype(np.int16)
 
 
-def _standings(agents: int, shift: int) -> Standings:
+def _hierarchy_rows(agents: int, shift: int) -> HierarchyRows:
     number = np.arange(agents)
     tier = ((number + _moves(agents, shift)) % 7).astype(np.int16)
     role = np.array(ROLES, dtype=np.int8)[np.minimum(tier, len(ROLES) - 1)]
     parent = np.where(number < QUEUES, -1, number - QUEUES).astype(np.int32)
-    return Standings(tier, parent, role, np.linspace(0.1, 0.9, agents, dtype=np.float32))
+    return HierarchyRows(
+        tier=tier,
+        parent=parent,
+        role=role,
+        record_age_s=np.linspace(0.1, 0.9, agents, dtype=np.float32),
+    )
 
 
 def _moves(agents: int, shift: int) -> np.ndarray:

@@ -174,13 +174,13 @@ def check(
     """Check a scenario and print it resolved; warnings go to stderr. Nothing is started."""
     from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
     from worldsim.scenario.file import dump
-    from worldsim.scenario.rules import cautions, too_fast
+    from worldsim.scenario.rules import speed_problem, warnings_for
 
     overrides = overrides_of(settings, agents, seed, duration)
     admitted = _admitted(scenario, overrides, VIRTUAL_COMMAND_TICKS)
-    for caution in cautions(admitted):
+    for caution in warnings_for(admitted):
         _say(f"{scenario}: {caution.key}: warning: {caution.detail}")
-    outrun = too_fast(admitted, PROCESS_COMMAND_TICKS)
+    outrun = speed_problem(admitted, PROCESS_COMMAND_TICKS)
     if outrun is not None:
         _say(f"{scenario}: {outrun.key}: warning: only 'sim' can fly this: {outrun.detail}")
     sys.stdout.write(dump(admitted))

@@ -9,7 +9,7 @@ from agent.qstructure.formation import FormationSpec
 from worldsim.engine.operations import GiveMission
 from worldsim.scenario.faults import MissionChange
 from worldsim.scenario.tables import Scenario
-from worldsim.scenario.target_frame import FrameChange, changed, path_of
+from worldsim.scenario.target_frame import FrameChange, changed_frame, path_of
 
 
 class Missions:
@@ -40,7 +40,7 @@ class Missions:
                 self.formation = change
                 return GiveMission("formation", self.formation, path_of(self.frame))
             case FrameChange():
-                self.frame = changed(self.frame, change, at_s)
+                self.frame = changed_frame(self.frame, change, at_s)
                 return GiveMission("frame", self.formation, path_of(self.frame))
         assert_never(change)
 

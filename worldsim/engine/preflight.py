@@ -9,7 +9,8 @@ from pathlib import Path
 from agent.controller import ControllerError
 from agent.controller import load as load_controller
 from worldsim.scenario.events import ON_PROCESSES
-from worldsim.scenario.rules import Finding, too_fast
+from worldsim.scenario.problem import Problem
+from worldsim.scenario.rules import speed_problem
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
 from worldsim.truth.obstacles import Obstacles
@@ -27,7 +28,7 @@ def admit(scenario: Scenario, file: str | Path, command_ticks: int, by_hand: boo
     by_hand: whether every process is started by hand, so that none can be stopped by a timeline.
     """
     broken = (
-        too_fast(scenario, command_ticks)
+        speed_problem(scenario, command_ticks)
         or (_launcher(scenario) if by_hand else None)
         or _controller(scenario)
         or _room(scenario)
@@ -36,33 +37,33 @@ def admit(scenario: Scenario, file: str | Path, command_ticks: int, by_hand: boo
         raise ScenarioError(file, *broken)
 
 
-def _launcher(scenario: Scenario) -> Finding | None:
+def _launcher(scenario: Scenario) -> Problem | None:
     """Say which event needs somebody who starts and ends processes."""
     for index, event in enumerate(scenario.event):
         if event.kind in ON_PROCESSES:
-            return Finding(
+            return Problem(
                 f"event[{index}].{event.kind}",
                 "needs the launcher (qswarm run): who is started by hand is ended by hand",
             )
     return None
 
 
-def _controller(scenario: Scenario) -> Finding | None:
+def _controller(scenario: Scenario) -> Problem | None:
     name = scenario.control.controller
     try:
         load_controller(name)
     except ControllerError as error:
-        return Finding("control.controller", str(error))
+        return Problem("control.controller", str(error))
     except Exception as error:  # the user's module may raise anything while it is imported
-        return Finding(
+        return Problem(
             "control.controller", f"{name!r} cannot be imported: {type(error).__name__}: {error}"
         )
     return None
 
 
-def _room(scenario: Scenario) -> Finding | None:
+def _room(scenario: Scenario) -> Problem | None:
     try:
         start_poses_of(scenario, Obstacles(scenario.obstacle))
     except StartError as error:
-        return Finding("fleet.start", str(error))
+        return Problem("fleet.start", str(error))
     return None

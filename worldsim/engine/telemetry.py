@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agent.messages import Telemetry, Vector
-from worldsim.judge.tick import Packets, Standings, Tick
+from worldsim.judge.tick import HierarchyRows, Packets, Tick
 from worldsim.truth.world import World
 
 MOVING_MPS = 0.02
@@ -73,7 +73,7 @@ def tick_of(
         mission=np.array([row.mission for row in rows], dtype=np.int64),
         links=_links(rows) if shown else NO_LINKS,
         packets=packets,
-        standings=_standings(rows) if shown else None,
+        hierarchy=_hierarchy_rows(rows) if shown else None,
     )
 
 
@@ -82,8 +82,8 @@ def _links(rows: list[TelemetryRow]) -> NDArray[np.int32]:
     return np.array(pairs, dtype=np.int32).reshape(-1, 2)
 
 
-def _standings(rows: list[TelemetryRow]) -> Standings:
-    return Standings(
+def _hierarchy_rows(rows: list[TelemetryRow]) -> HierarchyRows:
+    return HierarchyRows(
         tier=np.array([row.tier for row in rows], dtype=np.int16),
         parent=np.array([row.parent for row in rows], dtype=np.int32),
         role=np.array([row.role for row in rows], dtype=np.int8),

@@ -4,7 +4,7 @@ import numpy as np
 
 from worldsim.engine.step import SlotLoop
 from worldsim.fleet.launcher_link import LauncherLink, Progress
-from worldsim.judge.phase import CONVERGED_M
+from worldsim.scenario.tables import CONVERGED_M
 
 TELL_EVERY_S = 0.25
 STANDSTILL_S = 2.0

@@ -1,1 +1,1 @@
-"""Metrics, invariants and the verdict, from the truth alone."""
+"""Metrics, invariants and the verdict of a run, from the truth alone."""

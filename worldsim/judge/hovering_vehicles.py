@@ -1,7 +1,8 @@
-"""Vehicles of no member: which places of a formation they take from a team (E18).
+"""Hovering vehicles outside a team, and the places of a formation that they occupy (E18).
 
-They hover dead, or belong to those beyond a partition; a team hears nothing of either. Who only
-flies past a place takes it from nobody: as for the agents, a body is what stays put.
+Such a vehicle belongs to a dead agent, or to an agent beyond a partition: the team hears nothing of
+it. As in the agents' own rule, only a vehicle that stays put occupies a place; one that flies past
+does not.
 """
 
 from collections import deque
@@ -15,41 +16,49 @@ from agent.guidance.target_on_queue import TargetOnQueue
 from agent.messages import Place
 from agent.qstructure.formation import Layout
 from worldsim.judge.phase import Phase
-from worldsim.judge.tick import Singles, Tick
+from worldsim.judge.tick import Float32s, Tick
+
+NO_AGENT = -1
 
 
 class HoveringVehicles:
-    """Finds the layout that is left to the living; spacing: d_ir [m]. Sees every tick."""
+    """Finds the layout that hovering vehicles leave to a team. It must see every tick.
+
+    spacing: d_ir [m].
+    """
 
     def __init__(self, spacing: float) -> None:
-        self._targets = TargetOnQueue(-1, spacing)
-        self._past: deque[tuple[float, Singles]] = deque()
+        self._targets = TargetOnQueue(NO_AGENT, spacing)
+        self._positions: deque[tuple[float, Float32s]] = deque()
 
     def see(self, tick: Tick) -> None:
-        """Remember where everybody is; ticks come in order."""
-        past = self._past
+        """Remember where all vehicles are; ticks come in order."""
+        past = self._positions
         past.append((tick.time_s, tick.position))
         while len(past) > 1 and past[1][0] <= tick.time_s - UNIDENTIFIED_AFTER_S:
             past.popleft()
 
-    def standing(self, tick: Tick) -> NDArray[np.bool_]:
-        """Return who stands (N,): in the world, and within 0.2 m of where it was 1.5 s ago."""
-        since_s, before = self._past[0]
+    def hovering(self, tick: Tick) -> NDArray[np.bool_]:
+        """Return which vehicles hover (N,): within 0.2 m of where they were 1.5 s ago.
+
+        A vehicle that is not in the world does not; at the start of a run none is known to.
+        """
+        since_s, before = self._positions[0]
         if since_s > tick.time_s - UNIDENTIFIED_AFTER_S:
             return np.zeros(len(before), dtype=np.bool_)
-        off = tick.position - before
-        square = off * off
-        stands: NDArray[np.bool_] = square[:, 0] + square[:, 1] + square[:, 2] < SAME_VEHICLE_M**2
-        return stands
+        moved = tick.position - before
+        square = moved * moved
+        hover: NDArray[np.bool_] = square[:, 0] + square[:, 1] + square[:, 2] < SAME_VEHICLE_M**2
+        return hover
 
     def layout(self, tick: Tick, phase: Phase, team: list[int]) -> Layout:
-        """Return how these rows fill the phase's formation, round all other vehicles."""
-        return phase.formation.layout(len(team), self.blocked(tick, phase, team))
+        """Return how a team (rows) fills the phase's formation around hovering vehicles."""
+        return phase.formation.layout(len(team), self.occupied_places(tick, phase, team))
 
-    def blocked(self, tick: Tick, phase: Phase, team: list[int]) -> frozenset[Place]:
-        """Return the places that these rows cannot have."""
-        others = self.standing(tick)
+    def occupied_places(self, tick: Tick, phase: Phase, team: list[int]) -> frozenset[Place]:
+        """Return the places that a team (rows) cannot have: other vehicles hover there."""
+        others = self.hovering(tick)
         others[team] = False
-        bodies = [(x, y, z) for x, y, z in tick.position[others].tolist()]
-        flown = Flown(phase.mission, phase.formation, phase.frame(tick.time_s))
-        return frozenset(self._targets.taken_by(flown, len(team), bodies))
+        positions = [(x, y, z) for x, y, z in tick.position[others].tolist()]
+        mission = Flown(phase.mission, phase.formation, phase.frame(tick.time_s))
+        return frozenset(self._targets.taken_by(mission, len(team), positions))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from agent.messages import Place
 from worldsim.judge.connectivity import Components, Connectivity
 from worldsim.judge.hovering_vehicles import HoveringVehicles
-from worldsim.judge.phase import CONVERGED_S, Phase
+from worldsim.judge.phase import Phase
 from worldsim.judge.run_events import (
     ConditionsChanged,
     Flapped,
@@ -40,7 +40,7 @@ from worldsim.judge.run_events import (
     SlotChanged,
 )
 from worldsim.judge.tick import Tick
-from worldsim.scenario.tables import Scenario
+from worldsim.scenario.tables import CONVERGED_S, Scenario
 
 LOOK_EVERY_S = 1.0
 MAX_ROLE_CHANGES = 3
@@ -146,7 +146,7 @@ class Invariants:
         seen = (
             *(rows.tobytes() for rows in (tick.place, tick.alive, tick.mission)),
             self._components.label.tobytes() if self._components is not None else b"",
-            b"" if tick.alive.all() else self._bodies.standing(tick).tobytes(),
+            b"" if tick.alive.all() else self._bodies.hovering(tick).tobytes(),
         )
         if seen == self._seen and len(members) == 1:
             return
@@ -166,7 +166,7 @@ class Invariants:
         for place, count in held.items():
             if place not in common:
                 own[place.queue] += count
-        blocked = self._bodies.blocked(tick, phase, rows)
+        blocked = self._bodies.occupied_places(tick, phase, rows)
         shares = phase.formation.divide(len(rows), blocked)
         return heads, sum(abs(own[queue] - share) > 1 for queue, share in enumerate(shares))
 

@@ -1,33 +1,34 @@
-"""Distances and angles, from rows of truth. Definitions are those of the README."""
+"""Distances and packet conservation from rows of truth, as docs/scenario.md defines them."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from worldsim.judge.tick import Packets, Singles
+from worldsim.judge.tick import Float32s, Packets
 from worldsim.truth.obstacles import Obstacles
+from worldsim.truth.vehicle import Floats
 
-LEAST_M2 = 1e-300
-"""Stands for the square of no motion at all, by which nothing can be divided [m^2]."""
-Floats = NDArray[np.float64]
+MIN_SQUARE_M2 = 1e-300
+"""The divisor used for the square of a path without length [m^2]."""
+FATES = ("delivered", "dropped_", "in_flight")
+"""Prefixes of the counters that together hold every addressed packet."""
 
 
 class Separation:
     """Each vehicle's least distance to any other while both move from tick to tick."""
 
     def __init__(self) -> None:
-        self._between: Floats | None = None
+        self._relative_before: Floats | None = None
 
-    def swept(self, position: Singles) -> Floats:
-        """Return the distances (N,) [m] since the tick before, of which there is none at first.
+    def swept(self, position: Float32s) -> Floats:
+        """Return the distances (N,) [m] since the previous tick; at the first tick, those now.
 
-        position: (N, 3) [m]; motion between ticks is taken as straight. NaN rows, and a vehicle
-        that is alone, give NaN.
+        position: (N, 3) [m; world frame]. Motion between ticks is taken as straight. NaN rows, and
+        a vehicle that is alone, give NaN.
         """
-        ends = _between_rows(position)
-        starts = self._between if self._between is not None else ends
-        self._between = ends
+        ends = _relative_positions(position)
+        starts = self._relative_before if self._relative_before is not None else ends
+        self._relative_before = ends
         back = starts - ends
-        along = np.maximum(_dot(back, back), LEAST_M2)
+        along = np.maximum(_dot(back, back), MIN_SQUARE_M2)
         when = np.minimum(np.maximum(_dot(starts, back) / along, 0.0), 1.0)
         nearest = starts - when * back
         square = _dot(nearest, nearest)
@@ -39,10 +40,10 @@ class Separation:
 def swept_obstacle_distance(
     before: Floats, after: Floats, obstacles: Obstacles, times_s: tuple[float, float]
 ) -> Floats:
-    """Return each vehicle's least distance, centre to surface, from tick to tick [m].
+    """Return each vehicle's least distance (N,) [m], centre to surface, between two ticks.
 
-    before, after: (N, 3) [m; world frame] at ``times_s``; vehicles and obstacles are taken to move
-    straight between. Negative within an obstacle; NaN for no vehicle.
+    before, after: (N, 3) [m; world frame] at ``times_s``. Vehicles and obstacles are taken to move
+    straight in between. Negative inside an obstacle; NaN where there is no vehicle.
     """
     starts = before[:, None] - obstacles.centres(times_s[0])
     ends = after[:, None] - obstacles.centres(times_s[1])
@@ -51,14 +52,13 @@ def swept_obstacle_distance(
 
 
 def conserved(packets: Packets) -> bool:
-    """Whether every packet addressed was delivered, or dropped, or is in flight (I8)."""
-    whereabouts = ("delivered", "dropped_", "in_flight")
-    known = sum(count for name, count in packets.items() if name.startswith(whereabouts))
+    """Return whether every addressed packet was delivered or dropped, or is in flight (I8)."""
+    known = sum(count for name, count in packets.items() if name.startswith(FATES))
     return known == packets["addressed"]
 
 
-def _between_rows(position: Singles) -> Floats:
-    """Return x, y, z of row j as seen from row i, (3, N, N) [m]."""
+def _relative_positions(position: Float32s) -> Floats:
+    """Return x, y, z of vehicle j relative to vehicle i, (3, N, N) [m; world axes]."""
     axes: Floats = position.T.astype(np.float64)
     return axes[:, None, :] - axes[:, :, None]
 

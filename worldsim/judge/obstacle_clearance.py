@@ -1,4 +1,4 @@
-"""How near vehicles come to obstacles: centre to surface, swept from tick to tick."""
+"""Distances from vehicles to obstacles: centre to surface, swept from tick to tick."""
 
 from math import inf
 
@@ -11,22 +11,26 @@ from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
 
 
-class Clearance:
-    """Watches a whole run; ``least_m`` is None as long as nothing could be measured."""
+class ObstacleClearance:
+    """Measures the obstacle distances of a run; false where the scenario has no obstacles."""
 
     def __init__(self, scenario: Scenario) -> None:
+        self._obstacles = Obstacles(scenario.obstacle)
         self.bound_m = scenario.obstacle_bound_m
-        self.obstacles = Obstacles(scenario.obstacle)
         self.least_m: float | None = None
+        """The least distance so far [m]; None while nothing was measured."""
 
     def __bool__(self) -> bool:
-        return len(self.obstacles) > 0
+        return len(self._obstacles) > 0
 
     def see(self, before: Tick, tick: Tick) -> tuple[Floats, bool]:
-        """Return each vehicle's least distance (N,) [m] since the tick before, and a breach."""
+        """Return each vehicle's least distance (N,) [m] between ticks, and whether one is too near.
+
+        Too near is less than ``bound_m``.
+        """
         starts, ends = before.position.astype(np.float64), tick.position.astype(np.float64)
-        times = (before.time_s, tick.time_s)
-        distance = swept_obstacle_distance(starts, ends, self.obstacles, times)
+        times_s = (before.time_s, tick.time_s)
+        distance = swept_obstacle_distance(starts, ends, self._obstacles, times_s)
         least = float(np.fmin.reduce(distance, initial=np.inf))
         if least < inf and (self.least_m is None or least < self.least_m):
             self.least_m = least

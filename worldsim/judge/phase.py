@@ -1,13 +1,12 @@
-"""A phase: one formation in one frame, from the mission that asked for it to the next.
+"""A phase of a run: one formation and frame, from the mission that asked for it to the next one.
 
-The frame may be at rest or on its path.
-
-Of an agent's telemetry only the place that it means to hold is taken, and which mission it flies;
-where that place is, is computed here.
+The frame may rest or move on its path. Of an agent's telemetry, only the place that it claims and
+the mission that it flies are used; the position of that place is computed here.
 """
 
 from collections import Counter
 from math import degrees, isfinite, remainder, tau
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,18 +14,47 @@ from agent.messages import AT_HOME, FramePath, Place
 from agent.qstructure.formation import Formation, Slot
 from agent.qstructure.frame_path import Track
 from agent.qstructure.target_frame import Frame
-from worldsim.judge.metrics import Floats
 from worldsim.judge.tick import Tick
+from worldsim.scenario.tables import CONVERGED_M, CONVERGED_S
+from worldsim.truth.vehicle import Floats
 
-CONVERGED_M = 0.12
-CONVERGED_S = 2.0
 NO_CLAIM = (-1, -1)
+TIME_SLACK_S = 1e-9
+
+SlotsByRow = dict[int, Slot]
+
+
+class ConvergenceTimer:
+    """Finds the first CONVERGED_S seconds that agents are in place without interruption."""
+
+    def __init__(self) -> None:
+        self._since_s: float | None = None
+        self.converged_s: float | None = None
+        """The start of those seconds, in simulated time [s]; None before they are over."""
+
+    def see(self, time_s: float, in_place: bool) -> None:
+        """Take a tick; ticks come in order."""
+        if not in_place:
+            self._since_s = None
+            return
+        if self._since_s is None:
+            self._since_s = time_s
+        if self.converged_s is None and time_s - self._since_s >= CONVERGED_S - TIME_SLACK_S:
+            self.converged_s = self._since_s
+
+
+class _SlotPositions(NamedTuple):
+    """The slots' positions in the world, and what they were computed from."""
+
+    slots: SlotsByRow
+    frame: Frame | None
+    position: Floats  # (N, 3) [m; world frame], infinite without a slot
 
 
 class Phase:
-    """The time of one formation in one frame, and how the team came into it.
+    """One formation in one frame, and how the team converges into it.
 
-    mission: its key; an agent that flies an older one has no slot in this phase.
+    mission: its key; an agent that flies an older mission has no slot in this phase.
     """
 
     def __init__(
@@ -34,77 +62,91 @@ class Phase:
     ) -> None:
         self.formation = formation
         self.from_s = from_s
-        self._track = Track(path)
         self.mission = mission
-        self.converge_s: float | None = None
         self.residual_m: float | None = None
-        self._since_s: float | None = None
-        self._slots: dict[tuple[int, int, int], Slot | None] = {}
-        self._owned: dict[int, Slot] = {}
-        self._stood: tuple[dict[int, Slot], Frame | None, Floats] = ({}, None, np.empty(0))
-        self._owned_by: tuple[bytes, bytes, bytes] | None = None
+        """The largest slot error at the last tick [m]; None where an agent has no valid slot."""
+        self._track = Track(path)
+        self._timer = ConvergenceTimer()
+        self._known_slots: dict[tuple[int, int, int], Slot | None] = {}
+        self._own: SlotsByRow = {}
+        self._own_key: tuple[bytes, ...] | None = None
+        self._positions = _SlotPositions(slots={}, frame=None, position=np.empty(0))
+
+    @property
+    def converge_s(self) -> float | None:
+        """Time from the phase's start until all were in place for 2 s, less those 2 s [s]."""
+        at_s = self._timer.converged_s
+        return None if at_s is None else at_s - self.from_s
 
     def frame(self, time_s: float) -> Frame:
-        """Return where the target's frame is at a time [s]."""
+        """Return the target's frame at a time [s]."""
         return self._track.at(time_s)
 
     def slot_error(self, tick: Tick) -> Floats:
-        """Return each agent's distance to the slot it claims [m]; infinite without a valid one.
+        """Return the distances (N,) [m] of agents to the slots they claim; infinite if not valid.
 
-        Two that claim the same slot have none: neither counts as arrived.
+        A slot that two agents claim is valid for neither: none of them counts as arrived.
         """
-        off = tick.position - self._stands(tick)
-        square = off * off
+        away = tick.position - self._slot_positions(tick)
+        square = away * away
         error: Floats = np.sqrt(square[:, 0] + square[:, 1] + square[:, 2])
         return error
 
-    def _stands(self, tick: Tick) -> Floats:
-        """Return where each agent's slot is (N, 3) [m; world frame], infinitely far without one.
-
-        Remembered while slots and frame stay.
-        """
-        slots, frame = self._own_slots(tick), self.frame(tick.time_s)
-        if slots is not self._stood[0] or frame is not self._stood[1]:
-            stands = np.full(tick.position.shape, np.inf)
-            for row, slot in slots.items():
-                stands[row] = frame.to_world(slot.point)
-            self._stood = slots, frame, stands
-        return self._stood[2]
-
     def attitude_error_deg(self, tick: Tick) -> float | None:
-        """Return the largest angle by which an agent misses its slot's orientation [deg].
+        """Return the largest difference between an agent's attitude and its slot's [deg].
 
         Angles that a queue leaves free do not count; None where all are free.
         """
         frame = self.frame(tick.time_s)
-        wanted = [
-            (angle + (frame.yaw if axis == 0 else 0.0), float(tick.attitude[row, axis]))
+        angles = [
+            (wanted + (frame.yaw if axis == 0 else 0.0), float(tick.attitude[row, axis]))
             for row, slot in self._own_slots(tick).items()
-            for axis, angle in enumerate(slot.attitude)
-            if angle is not None and tick.alive[row]
+            for axis, wanted in enumerate(slot.attitude)
+            if wanted is not None and tick.alive[row]
         ]
-        missed = [abs(remainder(angle - flown, tau)) for angle, flown in wanted]
-        return degrees(max(missed)) if missed else None
+        errors = [abs(remainder(wanted - flown, tau)) for wanted, flown in angles]
+        return degrees(max(errors)) if errors else None
 
     def claims(self, tick: Tick) -> list[tuple[int, int]]:
-        """Return each agent's claim in this phase, queue and rank; (-1, -1) without one."""
-        flown = (tick.mission >= self.mission).tolist()
+        """Return each agent's claim in this phase, queue and rank; NO_CLAIM without one."""
+        flies_this = (tick.mission >= self.mission).tolist()
         return [
             (queue, rank) if flies else NO_CLAIM
-            for (queue, rank), flies in zip(tick.place.tolist(), flown, strict=True)
+            for (queue, rank), flies in zip(tick.place.tolist(), flies_this, strict=True)
         ]
 
-    def _own_slots(self, tick: Tick) -> dict[int, Slot]:
-        """Return the slot of each agent that claims a valid one alone, by row.
+    def see(self, time_s: float, error: Floats) -> bool:
+        """Take the living agents' slot errors [m] at a tick; return whether all are in place."""
+        worst = float(np.fmax.reduce(error, initial=-np.inf))
+        self.residual_m = worst if isfinite(worst) else None
+        in_place = 0.0 <= worst <= CONVERGED_M
+        self._timer.see(time_s, in_place)
+        return in_place
 
-        What was found holds until a claim changes, or an agent goes.
+    def _slot_positions(self, tick: Tick) -> Floats:
+        """Return where each agent's slot is (N, 3) [m; world frame], infinite without one.
+
+        The result is kept while slots and frame stay the same.
         """
-        claimed = tick.place.tobytes(), tick.alive.tobytes(), tick.mission.tobytes()
-        if claimed != self._owned_by:
-            self._owned_by, self._owned = claimed, self._find_slots(tick)
-        return self._owned
+        slots, frame = self._own_slots(tick), self.frame(tick.time_s)
+        if slots is not self._positions.slots or frame is not self._positions.frame:
+            position = np.full(tick.position.shape, np.inf)
+            for row, slot in slots.items():
+                position[row] = frame.to_world(slot.point)
+            self._positions = _SlotPositions(slots=slots, frame=frame, position=position)
+        return self._positions.position
 
-    def _find_slots(self, tick: Tick) -> dict[int, Slot]:
+    def _own_slots(self, tick: Tick) -> SlotsByRow:
+        """Return the slot of each agent that is the only one to claim a valid one.
+
+        The result is kept until a claim changes, or an agent goes.
+        """
+        key = tick.place.tobytes(), tick.alive.tobytes(), tick.mission.tobytes()
+        if key != self._own_key:
+            self._own_key, self._own = key, self._find_slots(tick)
+        return self._own
+
+    def _find_slots(self, tick: Tick) -> SlotsByRow:
         claims = self.claims(tick)
         holders = Counter(claim for claim, alive in zip(claims, tick.alive, strict=True) if alive)
         team = int(np.sum(tick.alive))
@@ -116,19 +158,6 @@ class Phase:
 
     def _slot(self, queue: int, rank: int, team: int) -> Slot | None:
         key = (queue, rank, team)
-        if key not in self._slots:
-            self._slots[key] = self.formation.slot(Place(queue, rank), team)
-        return self._slots[key]
-
-    def see(self, time_s: float, error: Floats) -> bool:
-        """Take the living agents' slot errors [m] at a tick; return whether all are in place."""
-        worst = float(np.fmax.reduce(error, initial=-np.inf))
-        self.residual_m = worst if isfinite(worst) else None
-        if not 0.0 <= worst <= CONVERGED_M:
-            self._since_s = None
-            return False
-        if self._since_s is None:
-            self._since_s = time_s
-        if self.converge_s is None and time_s - self._since_s >= CONVERGED_S - 1e-9:
-            self.converge_s = self._since_s - self.from_s
-        return True
+        if key not in self._known_slots:
+            self._known_slots[key] = self.formation.slot(Place(queue, rank), team)
+        return self._known_slots[key]

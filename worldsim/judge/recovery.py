@@ -10,9 +10,10 @@ import numpy as np
 
 from agent.messages import Place
 from worldsim.judge.hovering_vehicles import HoveringVehicles
-from worldsim.judge.phase import CONVERGED_S, Phase
+from worldsim.judge.phase import Phase
 from worldsim.judge.run_events import LOSS_KINDS, LossEvent, ReturnEvent
 from worldsim.judge.tick import Tick
+from worldsim.scenario.tables import CONVERGED_S
 
 
 @dataclass(slots=True)
@@ -77,7 +78,7 @@ class Recoveries:
         return True
 
     def _is_whole(self, tick: Tick, phase: Phase) -> bool:
-        rows = (tick.place, tick.alive, tick.mission, self._bodies.standing(tick))
+        rows = (tick.place, tick.alive, tick.mission, self._bodies.hovering(tick))
         seen = tuple(each.tobytes() for each in rows)
         if seen != self._seen:
             self._seen = seen

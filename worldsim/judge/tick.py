@@ -1,7 +1,7 @@
-"""What is judged and recorded once a tick: the same rows for both, so that both can agree.
+"""What is judged and recorded once a tick: the same rows for both, so that both agree.
 
-Rows are single precision, as the recording keeps them: a verdict recomputed from the recording
-meets the very numbers that the first one met. (The trace hash covers every slot in full.)
+Rows are single precision, as the recording stores them. A verdict recomputed from the recording
+therefore has the numbers of the first one. (The trace hash covers every slot in double precision.)
 """
 
 from dataclasses import dataclass, field
@@ -9,47 +9,45 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-Singles = NDArray[np.float32]
+Float32s = NDArray[np.float32]
 Packets = dict[str, int]
+"""Counters of the medium by name, as in summary.json."""
+NO_ROLE = -1
+"""The role of an agent that is not running (dead, paused or booting)."""
 
 
 @dataclass(frozen=True, slots=True)
-class Standings:
-    """How agents stand in their queues, as they say: shown, not judged. Row i = agent i.
+class HierarchyRows:
+    """Agents in the hierarchy of their queues, as they report it: shown, not judged.
 
-    tier (N,), parent (N,): -1 for none; role (N,): index of ROLES, -1 for one who takes no part.
-    record_age_s (N,): the age of the oldest record kept of a member, NaN for one who takes no part.
+    Row i is agent i.
     """
 
-    tier: NDArray[np.int16]
-    parent: NDArray[np.int32]
-    role: NDArray[np.int8]
-    record_age_s: Singles
+    tier: NDArray[np.int16]  # (N,), -1 for none
+    parent: NDArray[np.int32]  # (N,), an agent's id, -1 for none
+    role: NDArray[np.int8]  # (N,), an index of agent.messages.ROLES, or NO_ROLE
+    record_age_s: Float32s  # (N,), age [s] of the oldest team record, NaN for one not running
 
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """One tick of truth and telemetry; row i = agent i, NaN for no vehicle in the world.
+    """One tick of truth and telemetry.
 
-    position (N, 3) [m; world frame]; attitude (N, 3): yaw, pitch, roll [rad]; target (N, 3) [m;
-    world frame], the target-on-queue, NaN for none; place (N, 2): queue and rank, -1 for none;
-    force (N,): |u_i| of (28); turn_deg (N,): azimuth of the wanted velocity against the heading on
-    moving steps, else NaN; alive (N,): whether the agent's process takes part, and is not paused;
-    links (L, 2): (hearer, heard). mission (N,): the key of the mission that each flies. packets:
-    the newest counters of the medium, as in summary.json; empty before there are any. standings:
-    as they were told, None where nobody records them.
+    Row i is agent i. NaN means that the vehicle is not in the world.
     """
 
     index: int
-    time_s: float
-    position: Singles
-    attitude: Singles
-    target: Singles
-    place: NDArray[np.int16]
-    force: Singles
-    turn_deg: Singles
-    alive: NDArray[np.bool_]
-    links: NDArray[np.int32]
-    mission: NDArray[np.int64]
+    time_s: float  # simulated time [s]
+    position: Float32s  # (N, 3) [m; world frame]
+    attitude: Float32s  # (N, 3) yaw, pitch, roll [rad]
+    target: Float32s  # (N, 3) target-on-queue [m; world frame], NaN for none
+    place: NDArray[np.int16]  # (N, 2) queue and rank claimed, -1 for none
+    force: Float32s  # (N,) |u_i| of (28)
+    turn_deg: Float32s  # (N,) desired azimuth minus heading [deg], NaN for a step without motion
+    alive: NDArray[np.bool_]  # (N,) whether the process takes part, and is not paused
+    links: NDArray[np.int32]  # (L, 2) hearer and heard
+    mission: NDArray[np.int64]  # (N,) key of the mission that the agent flies
     packets: Packets = field(default_factory=dict)
-    standings: Standings | None = None
+    """The newest counters; empty before the first come."""
+    hierarchy: HierarchyRows | None = None
+    """None where ticks are not recorded."""

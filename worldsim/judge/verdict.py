@@ -14,10 +14,10 @@ from agent.guidance.cone import cone_of
 from agent.qstructure.formation import Formation
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.invariants import Invariants
-from worldsim.judge.metrics import Floats, Separation, conserved
-from worldsim.judge.obstacle_clearance import Clearance
+from worldsim.judge.metrics import Separation, conserved
+from worldsim.judge.obstacle_clearance import ObstacleClearance
 from worldsim.judge.phase import Phase
-from worldsim.judge.queue_convergence import Queues
+from worldsim.judge.queue_convergence import QueueConvergence
 from worldsim.judge.recovery import Recoveries, Recovery
 from worldsim.judge.run_events import (
     FormationGiven,
@@ -34,6 +34,7 @@ from worldsim.judge.run_events import (
 from worldsim.judge.tick import Packets, Tick
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.target_frame import path_of
+from worldsim.truth.vehicle import Floats
 
 TURN_LIMIT_SLACK_DEG = 1e-6
 
@@ -71,13 +72,13 @@ class Judge:
         self._scenario = scenario
         formation = Formation(scenario.formation, scenario.control.spacing_m)
         self.phases = [Phase(formation, 0.0, path_of(scenario.frame))]
-        self.queues = [Queues(self.phases[0])]
+        self.queues = [QueueConvergence(self.phases[0])]
         self._bodies = HoveringVehicles(scenario.control.spacing_m)
         self._recoveries = Recoveries(self._bodies)
         self._allocation = Invariants(scenario, self._bodies) if scenario.expect.converge else None
         self.ticks = 0
         self.min_separation_m: float | None = None
-        self.clearance = Clearance(scenario)
+        self.clearance = ObstacleClearance(scenario)
         self.safety_violations = 0
         self.packet_ticks = 0
         self.packet_violations = 0
@@ -119,7 +120,13 @@ class Judge:
         self._recoveries.see(tick, phase, in_place)
         if self._allocation is not None:
             self._allocation.see(tick, phase, in_place)
-        return Figures(separation, error, in_place, distance, self.queues[-1].see(tick, error))
+        return Figures(
+            separation=separation,
+            slot_error=error,
+            converged=in_place,
+            obstacle_distance=distance,
+            queue_residual=self.queues[-1].see(tick, error),
+        )
 
     @property
     def recoveries(self) -> list[Recovery]:
@@ -144,9 +151,7 @@ class Judge:
     def expectations(self) -> list[Expectation]:
         """Return what was expected of the run and what it showed."""
         expect = self._scenario.expect
-        wanted_m = expect.min_separation_m
-        if wanted_m is None:
-            wanted_m = self._scenario.control.separation_m
+        wanted_m = self._scenario.separation_bound_m
         least = self.min_separation_m
         rows = [
             Expectation(
@@ -186,7 +191,7 @@ class Judge:
     def _open_phase(self, event: MissionRunEvent) -> None:
         formation = Formation(event.tables, self._scenario.control.spacing_m)
         self.phases.append(Phase(formation, event.t_s, event.path, event.mission))
-        self.queues.append(Queues(self.phases[-1]))
+        self.queues.append(QueueConvergence(self.phases[-1]))
 
     def _reformed(self, within_s: float) -> Expectation:
         took = [recovery.reformed_s for recovery in self.recoveries]

@@ -1,1 +1,1 @@
-"""What a person sees: the recording and the pictures made of it."""
+"""The recording of a run: written with rerun, read back, verified and shown in the viewer."""

@@ -1,8 +1,8 @@
-"""What a block of ticks is sent in: columns of one entity, and what decides which rows it has."""
+"""What the recorder sends: entities, and blocks of columns with a row for some ticks."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -11,64 +11,84 @@ from pyarrow.lib import Array, ListArray, field, list_
 from pyarrow.lib import array as arrow_array
 
 
+class Entity(NamedTuple):
+    """What is logged under one entity path at one time, or as static data."""
+
+    path: str
+    archetype: rr.AsComponents
+
+
 @dataclass(frozen=True, slots=True)
 class ColumnBlock:
-    """Columns of one entity; ``rows`` are the ticks of the block that they belong to."""
+    """Columns of one entity, with a row for some ticks of a block."""
 
     entity: str
-    rows: Sequence[int]
-    columns: Any
+    rows: Sequence[int]  # indices into the block's ticks; empty for columns without a time
+    columns: Iterable[rr.ComponentColumn]
+
+    @classmethod
+    def of_batches(
+        cls, entity: str, rows: Sequence[int], columns: rr.ComponentColumnList, batch: int
+    ) -> "ColumnBlock":
+        """Return a block in which every row holds ``batch`` instances of each component."""
+        return cls(entity, rows, columns.partition([batch] * len(rows)))
 
 
-class Latest:
-    """Remembers a series' last row, and finds where what follows departs from the row before."""
+class ChangeDetector:
+    """Finds where a series differs from the row before, across the blocks of a run."""
 
     def __init__(self) -> None:
-        self._row: NDArray[Any] | None = None
+        self._last_row: NDArray[Any] | None = None
 
-    def departs(self, series: NDArray[Any]) -> NDArray[np.bool_]:
-        """Return which values of a series (T, ...) differ from the row before; the first all do."""
-        differs = np.ones(series.shape, dtype=np.bool_)
-        differs[1:] = series[1:] != series[:-1]
-        if self._row is not None:
-            differs[0] = series[0] != self._row
-        self._row = series[-1].copy()
-        return differs
+    def changed_values(self, series: NDArray[Any]) -> NDArray[np.bool_]:
+        """Return which values of a series (T, ...) differ from the row before.
 
-    def changes(self, series: NDArray[Any]) -> list[int]:
-        """Return the rows of a series (T, ...) in which any value departs."""
-        differs = self.departs(series).reshape(len(series), -1)
-        return [int(row) for row in np.flatnonzero(differs.any(axis=1))]
+        Every value of the run's first row counts as changed.
+        """
+        changed = np.ones(series.shape, dtype=np.bool_)
+        changed[1:] = series[1:] != series[:-1]
+        if self._last_row is not None:
+            changed[0] = series[0] != self._last_row
+        self._last_row = series[-1].copy()
+        return changed
+
+    def changed_rows(self, series: NDArray[Any]) -> list[int]:
+        """Return the rows of a series (T, ...) in which at least one value changed."""
+        changed = self.changed_values(series).reshape(len(series), -1)
+        return [int(row) for row in np.flatnonzero(changed.any(axis=1))]
 
 
-class Thinned:
-    """Decides at which ticks lines are drawn anew, so that they are not too many in a second."""
+class LineRateLimiter:
+    """Limits how many lines are drawn in a second of simulated time."""
 
     def __init__(self, tick_hz: float, lines_per_s: float) -> None:
         self._ticks_per_line = tick_hz / lines_per_s
-        self._next = 0
+        self._next_tick = 0
 
-    def due(self, tick: int) -> bool:
-        """Whether they are drawn at a tick."""
-        return tick >= self._next
+    def allows(self, tick: int) -> bool:
+        """Return whether lines may be drawn at a tick."""
+        return tick >= self._next_tick
 
-    def drawn(self, tick: int, lines: int) -> None:
-        """Take how many were drawn at a tick."""
-        self._next = tick + max(1, round(lines * self._ticks_per_line))
+    def count(self, tick: int, lines: int) -> None:
+        """Count the lines drawn at a tick; they delay the next tick that draws any."""
+        self._next_tick = tick + max(1, round(lines * self._ticks_per_line))
 
 
-def numbers(name: str, rows: NDArray[Any]) -> rr.ComponentColumn:
-    """Return numbers of our own kind (T, ...) as a column.
+def number_column(component: str, rows: NDArray[Any]) -> rr.ComponentColumn:
+    """Return a component of qswarm's own as a column: numbers (T, ...), one row for each tick.
 
-    Given as an Arrow array: rerun looks at anything else number by number.
+    The numbers are given as an Arrow array, because rerun converts other types one by one.
     """
     values = arrow_array(rows.ravel())
     lengths = [rows[0].size] * len(rows)
-    return rr.ComponentColumn(name, rr.AnyBatchValue(name, values), lengths=lengths)
+    return rr.ComponentColumn(component, rr.AnyBatchValue(component, values), lengths=lengths)
 
 
-def strips_of(lines: NDArray[np.float32]) -> Array:
-    """Return lines (K, 2, 3) as rerun keeps strips: given anything else, it looks at each."""
+def line_strips(lines: NDArray[np.float32]) -> Array:
+    """Return lines (K, 2, 3) [m; world frame] as rerun stores strips.
+
+    The strips are given as an Arrow array, because rerun converts other types one by one.
+    """
     points = rr.components.Position3DBatch(lines.reshape(-1, 3)).as_arrow_array()
     starts = arrow_array(np.arange(0, len(points) + 1, 2, dtype=np.int32))
     strip = list_(field("item", points.type, nullable=False))

@@ -1,6 +1,6 @@
-"""How agents stand in their queues, as sheets: tiers, parents, roles, and what they know of whom.
+"""The hierarchy of the queues as columns: labels, roles, parent lines, tiers and residuals.
 
-Roles and labels have a row where they changed; figures are taken four times a second.
+Labels and roles have a row where they changed. Figures have a row four times a second.
 """
 
 from collections.abc import Iterator, Sequence
@@ -9,146 +9,161 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from agent.comms.hierarchy import DISTRESS, SUB_VERTEX, VERTEX
+from agent.comms.hierarchy import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
 from agent.messages import ROLES
-from worldsim.judge.tick import Singles, Standings, Tick
+from worldsim.judge.tick import NO_ROLE, Float32s, HierarchyRows, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout, palette
-from worldsim.recording.columns import ColumnBlock, Latest, Thinned, strips_of
+from worldsim.recording.columns import (
+    ChangeDetector,
+    ColumnBlock,
+    LineRateLimiter,
+    line_strips,
+)
 
 SAMPLES_HZ = 4.0
 LINES_PER_S = 500
-"""More lines than these in a second are drawn less often."""
-ABSENT = "absent"
+"""More parent lines in a second are drawn at fewer ticks."""
+LABEL_SUFFIXES = {
+    NO_ROLE: "",
+    MEMBER: "",
+    SUB_VERTEX: " sub-vertex {tier}",
+    VERTEX: " vertex",
+    DISTRESS: " distress",
+}
+"""What follows an agent's name in its vehicle's label, by role."""
 
 
-class StandingSheets:
-    """Makes the sheets of one block of ticks after the other.
+class HierarchyColumns:
+    """Makes the columns of one block of ticks after the other.
 
     tick_hz: ticks in a second; agents: rows; queues: the most that any formation of the run has.
     """
 
     def __init__(self, tick_hz: float, agents: int, queues: int) -> None:
-        self._names = layout.names_of(agents)
+        self._names = layout.agent_names(agents)
         self._queues = queues
-        self._every = max(1, round(tick_hz / SAMPLES_HZ))
-        self._lines = Thinned(tick_hz, LINES_PER_S)
-        self._labels = Latest()
-        self._roles = Latest()
+        self._ticks_per_sample = max(1, round(tick_hz / SAMPLES_HZ))
+        self._line_rate = LineRateLimiter(tick_hz, LINES_PER_S)
+        self._label_changes = ChangeDetector()
+        self._role_changes = ChangeDetector()
 
-    def of(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
-        """Return the sheets of a block; blocks come in order."""
-        yield from self._labelled(ticks)
-        yield from self._residuals(ticks, figures)
-        standings = [tick.standings for tick in ticks if tick.standings is not None]
-        if len(standings) == len(ticks):
-            yield from self._hierarchy(ticks, standings)
-            yield from self._told(ticks, standings)
-            yield from self._lanes(standings)
+    def blocks(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
+        """Yield the columns of a block; blocks come in order."""
+        yield from self._vehicle_labels(ticks)
+        yield from self._queue_residuals(ticks, figures)
+        hierarchies = [tick.hierarchy for tick in ticks if tick.hierarchy is not None]
+        if len(hierarchies) == len(ticks):
+            yield from self._parent_lines(ticks, hierarchies)
+            yield from self._figures(ticks, hierarchies)
+            yield from self._roles(hierarchies)
 
-    def _labelled(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
-        """Return vehicles' names, with what sets an agent apart from a plain member.
+    def _vehicle_labels(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
+        """Yield the vehicles' labels: name, and the role where it is not member.
 
-        Where they are not shown unless one is pointed at, once a block is enough.
+        Large fleets show a label only under the mouse pointer, so one row for each block is enough.
         """
-        keys = np.stack([_standing_keys(tick) for tick in ticks])
-        rows = self._labels.changes(keys)
+        keys = np.stack([_label_keys(tick) for tick in ticks])
+        rows = self._label_changes.changed_rows(keys)
         if len(self._names) > layout.NAMED_MAX:
             rows = rows[-1:]
         if rows:
-            labels = [label for row in rows for label in self._labels_of(keys[row])]
+            labels = [label for row in rows for label in self._labels(keys[row])]
             columns = rr.Boxes3D.columns(labels=labels)
-            yield ColumnBlock(
-                layout.VEHICLES, rows, columns.partition([len(self._names)] * len(rows))
-            )
+            yield ColumnBlock.of_batches(layout.VEHICLES, rows, columns, len(self._names))
 
-    def _labels_of(self, keys: NDArray[np.int16]) -> list[str]:
-        words = {VERTEX: " vertex", SUB_VERTEX: " sub-vertex {}", DISTRESS: " distress"}
+    def _labels(self, keys: NDArray[np.int16]) -> list[str]:
         return [
-            name + words.get(role, "").format(tier)
+            name + LABEL_SUFFIXES[role].format(tier=tier)
             for name, (role, tier) in zip(self._names, keys.tolist(), strict=True)
         ]
 
-    def _hierarchy(
-        self, ticks: Sequence[Tick], standings: Sequence[Standings]
+    def _parent_lines(
+        self, ticks: Sequence[Tick], hierarchies: Sequence[HierarchyRows]
     ) -> Iterator[ColumnBlock]:
         rows, strips, colours = [], [], []
-        for row, (tick, standing) in enumerate(zip(ticks, standings, strict=True)):
-            if self._lines.due(tick.index):
-                ends, tiers = parent_lines(tick, standing)
+        for row, (tick, hierarchy) in enumerate(zip(ticks, hierarchies, strict=True)):
+            if self._line_rate.allows(tick.index):
+                ends, tiers = parent_lines(tick.position, hierarchy)
                 rows.append(row)
                 strips.append(ends)
-                colours.append(palette.of_tiers(tiers))
-                self._lines.drawn(tick.index, len(ends))
+                colours.append(palette.tier_colours(tiers))
+                self._line_rate.count(tick.index, len(ends))
         if rows:
             columns = rr.LineStrips3D.columns(
-                strips=strips_of(np.concatenate(strips)), colors=np.concatenate(colours)
+                strips=line_strips(np.concatenate(strips)), colors=np.concatenate(colours)
             )
-            yield ColumnBlock(
-                layout.HIERARCHY, rows, columns.partition([len(some) for some in strips])
-            )
+            lengths = [len(ends) for ends in strips]
+            yield ColumnBlock(layout.HIERARCHY, rows, columns.partition(lengths))
 
-    def _told(self, ticks: Sequence[Tick], standings: Sequence[Standings]) -> Iterator[ColumnBlock]:
-        rows = self._sampled(ticks)
-        agents = len(self._names)
+    def _figures(
+        self, ticks: Sequence[Tick], hierarchies: Sequence[HierarchyRows]
+    ) -> Iterator[ColumnBlock]:
+        rows = self._sampled_rows(ticks)
+        if not rows:
+            return
         for entity, series in (
-            (layout.TIER, [standings[row].tier for row in rows]),
-            (layout.RECORD_AGE, [standings[row].record_age_s for row in rows]),
-            (layout.NEIGHBOURS, [_neighbours(ticks[row]) for row in rows]),
+            (layout.TIER, [hierarchies[row].tier for row in rows]),
+            (layout.RECORD_AGE, [hierarchies[row].record_age_s for row in rows]),
+            (layout.NEIGHBOURS, [_neighbour_counts(ticks[row]) for row in rows]),
         ):
-            if rows:
-                values = np.concatenate(series).astype(np.float64)
-                columns = rr.Scalars.columns(scalars=values)
-                yield ColumnBlock(entity, rows, columns.partition([agents] * len(rows)))
+            values = np.concatenate(series).astype(np.float64)
+            columns = rr.Scalars.columns(scalars=values)
+            yield ColumnBlock.of_batches(entity, rows, columns, len(self._names))
 
-    def _residuals(
+    def _queue_residuals(
         self, ticks: Sequence[Tick], figures: Sequence[Figures]
     ) -> Iterator[ColumnBlock]:
-        rows = [row for row in self._sampled(ticks) if figures[row].queue_residual is not None]
+        rows = [row for row in self._sampled_rows(ticks) if figures[row].queue_residual is not None]
         values = np.full((len(rows), self._queues), np.nan)
         for at, row in enumerate(rows):
             residual = np.asarray(figures[row].queue_residual)[: self._queues]
             values[at, : len(residual)] = np.where(np.isfinite(residual), residual, np.nan)
         if rows and self._queues:
             columns = rr.Scalars.columns(scalars=values.ravel())
-            counts = [self._queues] * len(rows)
-            yield ColumnBlock(layout.QUEUE_RESIDUAL, rows, columns.partition(counts))
+            yield ColumnBlock.of_batches(layout.QUEUE_RESIDUAL, rows, columns, self._queues)
 
-    def _lanes(self, standings: Sequence[Standings]) -> Iterator[ColumnBlock]:
-        """Return each agent's role over time."""
-        roles = np.stack([standing.role[: layout.NAMED_MAX] for standing in standings])
-        departs = self._roles.departs(roles)
-        for agent in map(int, np.flatnonzero(departs.any(axis=0))):
-            rows = [int(row) for row in np.flatnonzero(departs[:, agent])]
-            words = [role_word(int(role)) for role in roles[rows, agent]]
-            yield ColumnBlock(layout.role_of(agent), rows, rr.StateChange.columns(state=words))
+    def _roles(self, hierarchies: Sequence[HierarchyRows]) -> Iterator[ColumnBlock]:
+        """Yield each agent's role where it changed, for the first NAMED_MAX agents."""
+        roles = np.stack([hierarchy.role[: layout.NAMED_MAX] for hierarchy in hierarchies])
+        changed = self._role_changes.changed_values(roles)
+        for agent in map(int, np.flatnonzero(changed.any(axis=0))):
+            rows = [int(row) for row in np.flatnonzero(changed[:, agent])]
+            names = [role_name(int(role)) for role in roles[rows, agent]]
+            columns = rr.StateChange.columns(state=names)
+            yield ColumnBlock(layout.role_entity(agent), rows, columns)
 
-    def _sampled(self, ticks: Sequence[Tick]) -> list[int]:
-        return [row for row, tick in enumerate(ticks) if tick.index % self._every == 0]
-
-
-def role_word(role: int) -> str:
-    """Return a role's name, also of one who takes no part."""
-    return ROLES[role] if role >= 0 else ABSENT
+    def _sampled_rows(self, ticks: Sequence[Tick]) -> list[int]:
+        return [row for row, tick in enumerate(ticks) if tick.index % self._ticks_per_sample == 0]
 
 
-def parent_lines(tick: Tick, standing: Standings) -> tuple[Singles, NDArray[np.int16]]:
-    """Return a line from each agent to its parent (K, 2, 3) [m; world frame], and its tier (K,)."""
-    parent = standing.parent
+def role_name(role: int) -> str:
+    """Return a role's name; an agent that is not running is "absent"."""
+    return palette.ABSENT if role == NO_ROLE else ROLES[role]
+
+
+def parent_lines(
+    position: Float32s, hierarchy: HierarchyRows
+) -> tuple[Float32s, NDArray[np.int16]]:
+    """Return a line from each agent to its parent (K, 2, 3) [m; world frame], and its tier (K,).
+
+    position (N, 3) [m; world frame].
+    """
+    parent = hierarchy.parent
     children = np.flatnonzero((parent >= 0) & (parent < len(parent)))
-    ends = np.stack((tick.position[children], tick.position[parent[children]]), axis=1)
-    there = ~np.isnan(ends).any(axis=(1, 2))
-    return ends[there], standing.tier[children[there]]
+    ends = np.stack((position[children], position[parent[children]]), axis=1)
+    in_world = ~np.isnan(ends).any(axis=(1, 2))
+    return ends[in_world], hierarchy.tier[children[in_world]]
 
 
-def _standing_keys(tick: Tick) -> NDArray[np.int16]:
-    """Return role and tier (N, 2), -1 where nothing is told of them."""
-    if tick.standings is None:
+def _label_keys(tick: Tick) -> NDArray[np.int16]:
+    """Return role and tier (N, 2), which a label is made of; NO_ROLE and -1 where unknown."""
+    if tick.hierarchy is None:
         return np.full((len(tick.alive), 2), -1, dtype=np.int16)
-    return np.stack((tick.standings.role.astype(np.int16), tick.standings.tier), axis=1)
+    return np.stack((tick.hierarchy.role.astype(np.int16), tick.hierarchy.tier), axis=1)
 
 
-def _neighbours(tick: Tick) -> NDArray[np.float64]:
-    """Return how many each agent hears directly; NaN for one who takes no part."""
+def _neighbour_counts(tick: Tick) -> NDArray[np.float64]:
+    """Return how many agents each agent hears directly (N,); NaN for one that is not running."""
     count = np.bincount(tick.links[:, 0], minlength=len(tick.alive))[: len(tick.alive)]
     return np.where(tick.alive, count, np.nan)

@@ -1,67 +1,97 @@
-"""Where everything stands in a recording: the contract between who writes and who reads.
+"""Entity paths, component names and file names of a recording: the contract for every reader.
 
-Row i of every batch is agent i; the number of rows never changes; NaN is no vehicle in the world.
+Row i of every batch entity is agent i. The number of rows never changes; NaN means that the
+vehicle is not in the world.
 """
+
+RECORDING_FILE = "run.rrd"
+SUMMARY_FILE = "summary.json"
+"""Names in a run's folder."""
 
 SIM_TIME = "sim_time"
 TICK = "tick"
 
-AGENTS = "/world/agents"
-VEHICLES = "/world/vehicles"
-TARGETS = "/world/targets"
-LINKS = "/world/links"
-HIERARCHY = "/world/hierarchy"
-SLOTS = "/world/formation/slots"
-ARRIVED = "/world/formation/arrived"
-QUEUES = "/world/formation/queues"
-OBSTACLES = "/world/obstacles"
-MOVING = "/world/obstacles/moving"
+WORLD = "/world"
+AGENTS = f"{WORLD}/agents"
+VEHICLES = f"{WORLD}/vehicles"
+TARGETS = f"{WORLD}/targets"
+LINKS = f"{WORLD}/links"
+HIERARCHY = f"{WORLD}/hierarchy"
+SLOTS = f"{WORLD}/formation/slots"
+ARRIVAL_SPHERES = f"{WORLD}/formation/arrived"
+QUEUES = f"{WORLD}/formation/queues"
+OBSTACLES = f"{WORLD}/obstacles"
+MOVING_OBSTACLES = f"{OBSTACLES}/moving"
 
-FORCE = "/metrics/force"
-SEPARATION = "/metrics/separation"
-TURN_DEG = "/metrics/turn_deg"
-SLOT_ERROR = "/metrics/slot_error"
-OBSTACLE_DISTANCE = "/metrics/obstacle_distance"
-TIER = "/metrics/tier"
-RECORD_AGE = "/metrics/record_age"
-NEIGHBOURS = "/metrics/neighbours"
-QUEUE_RESIDUAL = "/metrics/queue_residual"
-PACKETS = "/metrics/packets"
+METRICS = "/metrics"
+FORCE = f"{METRICS}/force"
+SEPARATION = f"{METRICS}/separation"
+TURN_DEG = f"{METRICS}/turn_deg"
+SLOT_ERROR = f"{METRICS}/slot_error"
+OBSTACLE_DISTANCE = f"{METRICS}/obstacle_distance"
+TIER = f"{METRICS}/tier"
+RECORD_AGE = f"{METRICS}/record_age"
+NEIGHBOURS = f"{METRICS}/neighbours"
+QUEUE_RESIDUAL = f"{METRICS}/queue_residual"
+PACKETS = f"{METRICS}/packets"
 
 EVENTS = "/log/events"
-EVENT = "event"
-
-STATE = "/state/agents"
-PLACE, ALIVE, ATTITUDE, MISSION = "place", "alive", "attitude", "mission"
-MISSIONS = "/state/missions"
-HEARD = "/state/links"
-HEARS = "hears"
-
 ROLES = "/roles"
-NAMED_MAX = 50
-"""Of more agents, no names are shown beside the vehicles, and no lanes of roles kept."""
-
 SCENARIO = "/run/scenario"
 
+AGENT_STATE = "/state/agents"
+MISSION_STATE = "/state/missions"
+LINK_STATE = "/state/links"
 
-def names_of(agents: int) -> list[str]:
-    """Return agents' names."""
-    return [f"a{agent}" for agent in range(agents)]
+POSITIONS = "Points3D:positions"
+SCALARS = "Scalars:scalars"
+"""Components of rerun's own archetypes that a reader needs."""
+PLACE = "place"
+ALIVE = "alive"
+ATTITUDE = "attitude"
+MISSION = "mission"
+HEARS = "hears"
+EVENT = "event"
+"""Components of qswarm's own: read back, but not shown."""
+
+NAMED_MAX = 50
+"""With more agents, vehicles have no visible labels and roles are not recorded."""
 
 
-def role_of(agent: int) -> str:
-    """Return where an agent's role is told, change by change."""
-    return f"{ROLES}/a{agent}"
+def agent_name(agent: int) -> str:
+    """Return the name of an agent as the viewer shows it."""
+    return f"a{agent}"
 
 
-def limit_of(metric: str) -> str:
-    """Return where a metric's reference line stands."""
+def agent_names(agents: int) -> list[str]:
+    """Return the names of agents 0 to ``agents`` - 1."""
+    return [agent_name(agent) for agent in range(agents)]
+
+
+def agent_metrics(obstacles: bool) -> tuple[str, ...]:
+    """Return the metrics with one series for each agent; obstacles: whether there are any."""
+    measured = (FORCE, SEPARATION, TURN_DEG, SLOT_ERROR)
+    distance = (OBSTACLE_DISTANCE,) if obstacles else ()
+    reported = (TIER, RECORD_AGE, NEIGHBOURS)
+    return (*measured, *distance, *reported)
+
+
+def role_entity(agent: int) -> str:
+    """Return the entity that holds an agent's role over time."""
+    return f"{ROLES}/{agent_name(agent)}"
+
+
+def limit_entity(metric: str) -> str:
+    """Return the entity that holds a metric's reference lines."""
     return f"{metric}/limit"
 
 
-PER_AGENT = (FORCE, SEPARATION, TURN_DEG, SLOT_ERROR)
-"""Metrics with one series for each agent."""
-TOLD = (TIER, RECORD_AGE, NEIGHBOURS)
-"""The same, of what agents tell of themselves."""
-NEAR_OBSTACLES = (*PER_AGENT, OBSTACLE_DISTANCE)
-"""The same, where there are obstacles."""
+def packet_entity(counter: str) -> str:
+    """Return the entity that holds one of the medium's packet counters."""
+    return f"{PACKETS}/{counter}"
+
+
+def packet_counter(entity: str) -> str | None:
+    """Return the name of the packet counter that an entity holds; None for other entities."""
+    prefix = f"{PACKETS}/"
+    return entity.removeprefix(prefix) if entity.startswith(prefix) else None

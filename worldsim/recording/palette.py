@@ -1,7 +1,12 @@
-"""Colours: one for each queue and each tier, so that a viewer sees what belongs together."""
+"""Colours of the viewer, as 0xRRGGBBAA: one for each queue, tier and role."""
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from agent.comms.hierarchy import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
+from agent.messages import ROLES
 
 Colours = NDArray[np.uint32]
 
@@ -18,40 +23,50 @@ QUEUES = np.array(
     ],
     dtype=np.uint32,
 )
-TIERS = np.array([0xFFD54FFF, 0x7BE0ADFF, 0x4FC3F7FF, 0x7E8CFFFF, 0xC77DFFFF], dtype=np.uint32)
-"""From tier 1 on; deeper ones have the last."""
-SHARED = np.uint32(0xFFD54FFF)
+_GOLD, _BLUE, _RED = 0xFFD54FFF, 0x4FC3F7FF, 0xFF3B30FF
+TIERS = np.array([_GOLD, 0x7BE0ADFF, _BLUE, 0x7E8CFFFF, 0xC77DFFFF], dtype=np.uint32)
+"""Tier 1 first; all deeper tiers have the last colour."""
+SHARED_VERTEX = np.uint32(_GOLD)
 UNPLACED = np.uint32(0xC8CDD6FF)
-DISTRESS = np.uint32(0xFF3B30FF)
-DEAD = np.uint32(0x5A5F69FF)
-ROLES = {
-    "vertex": 0xFFD54FFF,
-    "sub-vertex": 0x4FC3F7FF,
-    "member": 0x3A5A78FF,
-    "distress": 0xFF3B30FF,
-    "absent": 0x2A2F38FF,
-}
+IN_DISTRESS = np.uint32(_RED)
+NOT_RUNNING = np.uint32(0x5A5F69FF)
 LINK = np.uint32(0x333D4DFF)
 LIMIT = np.uint32(0xFF5252FF)
 OBSTACLE = np.uint32(0x6F6256FF)
 
+ABSENT = "absent"
+"""The role shown of an agent that is not running (dead, paused or booting)."""
+ROLE_COLOURS = {
+    ROLES[VERTEX]: _GOLD,
+    ROLES[SUB_VERTEX]: _BLUE,
+    ROLES[MEMBER]: 0x3A5A78FF,
+    ROLES[DISTRESS]: _RED,
+    ABSENT: 0x2A2F38FF,
+}
 
-def of_places(place: NDArray[np.int16], shared: NDArray[np.int16]) -> Colours:
-    """Return the colours (N,) of agents that mean to hold places (N, 2): queue and rank.
 
-    shared: (K, 2), the places that queues have in common, which have a colour of their own.
+def queue_colours(queues: NDArray[np.integer[Any]]) -> Colours:
+    """Return the colours (Q,) of queues, given by their indices; they repeat after the last."""
+    colours: Colours = QUEUES[queues % len(QUEUES)]
+    return colours
+
+
+def place_colours(place: NDArray[np.int16], shared: NDArray[np.int16]) -> Colours:
+    """Return the colours (N,) of agents that claim places (N, 2): queue and rank.
+
+    shared: (K, 2), the places that belong to several queues; they have a colour of their own.
     """
     queue = place[:, 0]
-    colours = np.where(queue >= 0, QUEUES[queue % len(QUEUES)], UNPLACED)
+    colours = np.where(queue >= 0, queue_colours(queue), UNPLACED)
     at_shared = np.any(np.all(place[:, None, :] == shared[None, :, :], axis=2), axis=1)
-    return np.where(at_shared, SHARED, colours).astype(np.uint32)
+    return np.where(at_shared, SHARED_VERTEX, colours).astype(np.uint32)
 
 
-def of_tiers(tier: NDArray[np.int16]) -> Colours:
-    """Return the colours (K,) of agents of tiers 1 and more."""
+def tier_colours(tier: NDArray[np.int16]) -> Colours:
+    """Return the colours (K,) of agents in tiers of 1 and more."""
     return TIERS[np.clip(tier - 1, 0, len(TIERS) - 1)]
 
 
-def faint(colours: Colours, alpha: int) -> Colours:
+def with_opacity(colours: Colours, alpha: int) -> Colours:
     """Return colours with another opacity, 0 to 255."""
     return (colours & np.uint32(0xFFFFFF00)) | np.uint32(alpha)

@@ -1,7 +1,7 @@
-"""A recording read back: the very ticks that were judged, from the file alone.
+"""A recording read back: the ticks that were judged, from the file alone.
 
-A recording that was cut off (its process was killed) is read as far as it goes: to the last tick
-of which every row is there.
+A truncated recording (its process was killed) is read up to the last tick of which every row is
+there.
 """
 
 import json
@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 from warnings import catch_warnings, simplefilter
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 from pyarrow.lib import FixedSizeListArray
@@ -28,30 +29,48 @@ from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 Column = dict[int, NDArray[Any]]
 """One component of one entity: a flat row for each tick that has one."""
 
+EVERY_TICK = (
+    (layout.AGENTS, layout.POSITIONS),
+    (layout.TARGETS, layout.POSITIONS),
+    (layout.FORCE, layout.SCALARS),
+    (layout.TURN_DEG, layout.SCALARS),
+    (layout.AGENT_STATE, layout.PLACE),
+    (layout.AGENT_STATE, layout.ALIVE),
+    (layout.AGENT_STATE, layout.ATTITUDE),
+)
+"""Columns with a row for every tick; ``_ticks`` takes them in this order."""
+COMPONENTS = {component for _, component in EVERY_TICK} | {layout.HEARS, layout.MISSION}
+
 
 class RecordingError(Exception):
-    """A recording that is not there, or from which no run can be read; the text says why."""
+    """A missing recording, or a file without a readable run; the text names it and says why."""
 
 
 @dataclass(frozen=True, slots=True)
 class Readback:
-    """What a recording holds: the scenario as it was resolved, ticks and events in order."""
+    """What a recording holds."""
 
     scenario: Scenario
+    """Resolved, as it was flown."""
     ticks: list[Tick]
+    """In order; without ``hierarchy``, which is not judged."""
     events: list[RunEvent]
+    """As in events.jsonl, in order of recording."""
 
 
 def read_run(path: Path) -> Readback:
-    """Return the run that a recording holds, or raise RecordingError."""
+    """Return the run that a recording holds. Raises RecordingError."""
     if not path.is_file():
         raise RecordingError(f"{path}: no such recording")
-    columns = _Columns(_chunks(path))
+    try:
+        columns = _RecordedColumns(_chunks(path))
+    except msgspec.ValidationError as error:
+        raise RecordingError(f"{path}: holds an unknown event: {error}") from error
     scenario = _scenario(columns, path)
-    return Readback(scenario, _ticks(columns, scenario), columns.events)
+    return Readback(scenario=scenario, ticks=_ticks(columns, scenario), events=columns.events)
 
 
-class _Columns:
+class _RecordedColumns:
     """The columns of a recording, by entity and component."""
 
     def __init__(self, chunks: Iterable[Chunk]) -> None:
@@ -59,57 +78,40 @@ class _Columns:
         self.events: list[RunEvent] = []
         self.scenario_text: str | None = None
         for chunk in chunks:
-            self._take(chunk)
+            self._read(chunk)
 
-    def of(self, entity: str, component: str) -> Column:
+    def column(self, entity: str, component: str) -> Column:
         """Return one column; empty when the recording does not have it."""
         return self._columns.get((entity, component), {})
 
-    def counters(self) -> dict[str, Column]:
-        """Return the medium's counters, by cause."""
-        under = f"{layout.PACKETS}/"
-        return {
-            entity.removeprefix(under): column
-            for (entity, _), column in self._columns.items()
-            if entity.startswith(under)
-        }
+    def packet_counters(self) -> dict[str, Column]:
+        """Return the columns of the medium's counters, by name."""
+        named = {layout.packet_counter(entity): each for (entity, _), each in self._columns.items()}
+        return {name: column for name, column in named.items() if name is not None}
 
-    def _take(self, chunk: Chunk) -> None:
+    def _read(self, chunk: Chunk) -> None:
         batch = chunk.to_record_batch()
         if chunk.entity_path == layout.SCENARIO:
             self.scenario_text = batch.column("TextDocument:text")[0].as_py()[0]
         elif chunk.is_static:
             return
         elif chunk.entity_path == layout.EVENTS:
-            told = batch.column(layout.EVENT).to_pylist()
-            self.events.extend(event_of(json.loads(row[0])) for row in told)
+            encoded = batch.column(layout.EVENT).to_pylist()
+            self.events.extend(event_of(json.loads(row[0])) for row in encoded)
         else:
-            self._take_rows(chunk.entity_path, batch)
+            self._read_rows(chunk.entity_path, batch)
 
-    def _take_rows(self, entity: str, batch: Any) -> None:
+    def _read_rows(self, entity: str, batch: Any) -> None:
         if layout.TICK not in batch.schema.names:
             return
         ticks = batch.column(layout.TICK).to_pylist()
         for component in batch.schema.names:
-            if component in _READ:
+            if component in COMPONENTS:
                 column = self._columns.setdefault((entity, component), {})
-                column.update(zip(ticks, _rows(batch.column(component)), strict=True))
+                column.update(zip(ticks, _flat_rows(batch.column(component)), strict=True))
 
 
-_POSITIONS = "Points3D:positions"
-_SCALARS = "Scalars:scalars"
-_READ = {
-    _POSITIONS,
-    _SCALARS,
-    layout.PLACE,
-    layout.ALIVE,
-    layout.ATTITUDE,
-    layout.HEARS,
-    layout.MISSION,
-}
-
-
-def _rows(lists: Any) -> list[NDArray[Any]]:
+def _flat_rows(lists: Any) -> list[NDArray[Any]]:
     """Return a column of lists of numbers, or of vectors, as one flat array for each row."""
     offsets, values, width = lists.offsets.to_numpy(), lists.values, 1
     if isinstance(values, FixedSizeListArray):
@@ -121,29 +123,30 @@ def _rows(lists: Any) -> list[NDArray[Any]]:
 def _chunks(path: Path) -> list[Chunk]:
     try:
         with readable(path) as file, catch_warnings():
-            # A file that was cut off has no footer; that is said to be an old format.
+            # Rerun warns of an old format where a truncated file has no footer.
             simplefilter("ignore", RerunWarning)
             return list(RrdReader(file).stream())
     except (RuntimeError, ValueError, OSError) as error:
         raise RecordingError(f"{path}: cannot be read: {error}") from error
 
 
-def _scenario(columns: _Columns, path: Path) -> Scenario:
+def _scenario(columns: _RecordedColumns, path: Path) -> Scenario:
     text = columns.scenario_text
     if text is None:
-        raise RecordingError(f"{path}: holds no scenario: not a recording of a run")
+        raise RecordingError(f"{path}: not a recording of a run: it holds no scenario")
     return parse(text.removeprefix("```toml\n").removesuffix("```\n"), path)
 
 
-def _ticks(columns: _Columns, scenario: Scenario) -> list[Tick]:
+def _ticks(columns: _RecordedColumns, scenario: Scenario) -> list[Tick]:
     """Return the ticks of which every row is there."""
     agents = scenario.rows
-    always = [columns.of(*name) for name in _EVERY_TICK]
+    always = [columns.column(*name) for name in EVERY_TICK]
     position, target, force, turn, place, alive, attitude = always
-    whole = sorted(set(position).intersection(*always))
-    heard = _latest(columns.of(layout.HEARD, layout.HEARS), whole, _no_bits(agents))
-    flown = _latest(columns.of(layout.MISSIONS, layout.MISSION), whole, np.zeros(agents))
-    packets = _packets(columns.counters(), whole)
+    complete = sorted(set(position).intersection(*always))
+    hears = _latest(columns.column(layout.LINK_STATE, layout.HEARS), complete, _no_links(agents))
+    missions = columns.column(layout.MISSION_STATE, layout.MISSION)
+    mission = _latest(missions, complete, np.zeros(agents))
+    packets = _packets(columns.packet_counters(), complete)
     return [
         Tick(
             index=index,
@@ -155,47 +158,36 @@ def _ticks(columns: _Columns, scenario: Scenario) -> list[Tick]:
             force=force[index].astype(np.float32),
             turn_deg=turn[index].astype(np.float32),
             alive=alive[index].astype(np.bool_),
-            links=_links(heard[row], agents),
-            mission=flown[row].astype(np.int64),
+            links=_links(hears[row], agents),
+            mission=mission[row].astype(np.int64),
             packets=packets[row],
         )
-        for row, index in enumerate(whole)
+        for row, index in enumerate(complete)
     ]
 
 
-_EVERY_TICK = (
-    (layout.AGENTS, _POSITIONS),
-    (layout.TARGETS, _POSITIONS),
-    (layout.FORCE, _SCALARS),
-    (layout.TURN_DEG, _SCALARS),
-    (layout.STATE, layout.PLACE),
-    (layout.STATE, layout.ALIVE),
-    (layout.STATE, layout.ATTITUDE),
-)
-
-
 def _latest(column: Column, ticks: Sequence[int], first: NDArray[Any]) -> list[NDArray[Any]]:
-    """Return for each tick the row that held then; ``first`` before there was any."""
+    """Return for each tick the latest row at or before it; ``first`` where there is none."""
     changes = sorted(column)
     before = np.searchsorted(np.array(changes, dtype=np.int64), ticks, side="right")
     return [column[changes[count - 1]] if count else first for count in before.tolist()]
 
 
 def _packets(counters: dict[str, Column], ticks: Sequence[int]) -> list[Packets]:
-    """Return the newest counters at each tick; none before the first were told."""
-    none = np.zeros(0)
-    told = {cause: _latest(column, ticks, none) for cause, column in sorted(counters.items())}
+    """Return the latest counters at each tick; a counter is missing before its first row."""
+    unknown = np.zeros(0)
+    latest = {name: _latest(column, ticks, unknown) for name, column in sorted(counters.items())}
     return [
-        {cause: int(values[row][0]) for cause, values in told.items() if len(values[row])}
+        {name: int(values[row][0]) for name, values in latest.items() if len(values[row])}
         for row in range(len(ticks))
     ]
 
 
 def _links(bits: NDArray[np.uint8], agents: int) -> NDArray[np.int32]:
-    """Return (hearer, heard) of the matrix that the recorder packed into bits."""
+    """Return the pairs (hearer, heard) of the matrix that the recorder packed into bits."""
     hears = np.unpackbits(bits, count=agents * agents).reshape(agents, agents)
     return np.argwhere(hears).astype(np.int32)
 
 
-def _no_bits(agents: int) -> NDArray[np.uint8]:
-    return np.zeros((agents * agents + 7) // 8, dtype=np.uint8)
+def _no_links(agents: int) -> NDArray[np.uint8]:
+    return np.packbits(np.zeros(agents * agents, dtype=np.bool_))

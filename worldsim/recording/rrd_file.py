@@ -1,54 +1,57 @@
-"""The frames of a recording file: how far a file that was cut off can be read.
+"""The message frames of a recording file: which part of a truncated file can be read.
 
-After 12 bytes of header every message is a frame: its kind and its length, each 8 bytes, and its
-payload; the last one, and 32 bytes after it, are an index. Rerun refuses a file whose last frame
-is not whole; a killed process leaves such a file.
+A file has 12 bytes of header, and then frames: kind and length, 8 bytes each, and a payload. The
+last frame, with 32 bytes of footer after it, is an index. Rerun refuses a file whose last frame is
+incomplete, which is what a killed process leaves.
 """
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from shutil import copyfileobj
-from struct import Struct as Layout
+from struct import Struct
 from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
 HEADER_B = 12
 FOOTER_B = 32
-_FRAME = Layout("<QQ")
-_END = 0
-_STEP_B = 1024 * 1024
+COPY_STEP_B = 1024 * 1024
+_FRAME_HEAD = Struct("<QQ")
+_INDEX_KIND = 0
 
 
 @contextmanager
 def readable(path: Path) -> Iterator[Path]:
-    """Give a file that rerun can read: the recording, or a copy without the frame cut in two."""
+    """Yield a file that rerun can read: the recording, or a copy without its incomplete frame.
+
+    The copy is deleted afterwards.
+    """
     size = path.stat().st_size
     with path.open("rb") as file:
-        whole = whole_b(file, size)
-        if whole == size:
+        complete = complete_b(file, size)
+        if complete == size:
             yield path
             return
         with TemporaryDirectory() as folder:
             copy = Path(folder) / path.name
             file.seek(0)
             with copy.open("wb") as out:
-                copyfileobj(file, out, _STEP_B)
-                out.truncate(whole)
+                copyfileobj(file, out, COPY_STEP_B)
+                out.truncate(complete)
             yield copy
 
 
-def whole_b(file: BinaryIO, size: int) -> int:
-    """Return how many bytes of a recording of ``size`` [bytes] hold whole frames."""
+def complete_b(file: BinaryIO, size: int) -> int:
+    """Return the length [bytes] of the part with complete frames, of a file of ``size`` [bytes]."""
     at = HEADER_B
     while at < size:
         file.seek(at)
-        head = file.read(_FRAME.size)
-        if len(head) < _FRAME.size:
+        head = file.read(_FRAME_HEAD.size)
+        if len(head) < _FRAME_HEAD.size:
             return at
-        kind, length = _FRAME.unpack(head)
-        end = at + _FRAME.size + length
-        if kind == _END:
+        kind, length = _FRAME_HEAD.unpack(head)
+        end = at + _FRAME_HEAD.size + length
+        if kind == _INDEX_KIND:
             return size if end + FOOTER_B == size else at
         if end > size:
             return at

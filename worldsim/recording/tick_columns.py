@@ -1,7 +1,7 @@
-"""A second of ticks as sheets of columns: what of a run goes under which entity, at which ticks.
+"""A block of ticks as columns: poses, metrics, state, colours, links and packet counters.
 
-What changes at every tick has a row for every tick; what seldom changes (colours, who hears whom,
-counters) has a row where it changed, and a viewer shows the latest.
+Values that change at every tick have a row for every tick. Values that change rarely (colours,
+missions, links, counters) have a row where they changed; a viewer shows the latest.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,18 +11,18 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from agent.comms.hierarchy import DISTRESS
-from worldsim.judge.tick import Singles, Tick
+from worldsim.judge.tick import Float32s, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout, palette
-from worldsim.recording.columns import ColumnBlock, Latest, numbers
-from worldsim.recording.link_columns import HearingSheets
+from worldsim.recording.columns import ChangeDetector, ColumnBlock, number_column
+from worldsim.recording.link_columns import LinkColumns
 
 
 class TickColumns:
-    """Makes the sheets of one block of ticks after the other.
+    """Makes the columns of one block of ticks after the other.
 
-    shared: (K, 2), the places that queues have in common. tick_hz: ticks in a second. limits: for
-    each metric its reference lines.
+    shared: (K, 2), the places that belong to several queues. tick_hz: ticks in a second. limits:
+    the reference lines of each metric, in its unit.
     """
 
     def __init__(
@@ -30,97 +30,104 @@ class TickColumns:
     ) -> None:
         self._shared = shared
         self._limits = limits
-        self._colours = Latest()
-        self._hearing = HearingSheets(tick_hz)
-        self._flown = Latest()
-        self._counters: dict[str, Latest] = {}
-        near = layout.OBSTACLE_DISTANCE in limits
-        self._per_agent = (*(layout.NEAR_OBSTACLES if near else layout.PER_AGENT), *layout.TOLD)
+        self._links = LinkColumns(tick_hz)
+        self._colour_changes = ChangeDetector()
+        self._mission_changes = ChangeDetector()
+        self._counter_changes: dict[str, ChangeDetector] = {}
+        self._agent_metrics = layout.agent_metrics(obstacles=layout.OBSTACLE_DISTANCE in limits)
 
-    def of(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
-        """Return the sheets of a block; blocks come in order."""
+    def blocks(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
+        """Yield the columns of a block; blocks come in order."""
         yield from _poses(ticks)
         yield from _metrics(ticks, figures)
         yield _state(ticks)
         yield from self._missions(ticks)
-        yield from self._coloured(ticks)
-        yield from self._hearing.of(ticks)
+        yield from self._coloured_entities(ticks)
+        yield from self._links.blocks(ticks)
         yield from self._packets(ticks)
-        yield from self._references(len(ticks) - 1)
+        yield from self._reference_lines(len(ticks) - 1)
 
-    def _coloured(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
-        series = self._colours_of(ticks)
-        rows = self._colours.changes(series)
-        yield _trail(ticks, series.ravel())
+    def _coloured_entities(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
+        series = self._colours(ticks)
+        agents = series.shape[1]
+        rows = self._colour_changes.changed_rows(series)
+        yield _trails(ticks, series.ravel())
         if not rows:
             return
-        counts = [series.shape[1]] * len(rows)
         changed = series[rows].ravel()
         for entity, archetype in ((layout.VEHICLES, rr.Boxes3D), (layout.TARGETS, rr.Points3D)):
-            yield ColumnBlock(entity, rows, archetype.columns(colors=changed).partition(counts))
-        lasting = rr.SeriesLines.columns(colors=series[rows[-1]]).partition(counts[:1])
-        for entity in self._per_agent:
-            yield ColumnBlock(entity, (), lasting)
+            yield ColumnBlock.of_batches(entity, rows, archetype.columns(colors=changed), agents)
+        latest = rr.SeriesLines.columns(colors=series[rows[-1]]).partition([agents])
+        for entity in self._agent_metrics:
+            yield ColumnBlock(entity, (), latest)
 
-    def _colours_of(self, ticks: Sequence[Tick]) -> palette.Colours:
-        """Return colours (T, N): those of agents' queues, but for the distressed and the dead."""
-        colours = palette.of_places(np.concatenate([tick.place for tick in ticks]), self._shared)
+    def _colours(self, ticks: Sequence[Tick]) -> palette.Colours:
+        """Return agents' colours (T, N): of their queues, or of distress or a stopped process."""
+        colours = palette.place_colours(
+            np.concatenate([tick.place for tick in ticks]), self._shared
+        )
         colours = colours.reshape(len(ticks), -1)
         for row, tick in enumerate(ticks):
-            if tick.standings is not None:
-                colours[row, tick.standings.role == DISTRESS] = palette.DISTRESS
-            colours[row, ~tick.alive] = palette.DEAD
+            if tick.hierarchy is not None:
+                colours[row, tick.hierarchy.role == DISTRESS] = palette.IN_DISTRESS
+            colours[row, ~tick.alive] = palette.NOT_RUNNING
         return colours
 
     def _missions(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         series = np.stack([tick.mission for tick in ticks])
-        rows = self._flown.changes(series)
+        rows = self._mission_changes.changed_rows(series)
         if rows:
-            yield ColumnBlock(layout.MISSIONS, rows, [numbers(layout.MISSION, series[rows])])
+            columns = [number_column(layout.MISSION, series[rows])]
+            yield ColumnBlock(layout.MISSION_STATE, rows, columns)
 
     def _packets(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
-        for cause in dict.fromkeys(cause for tick in ticks for cause in tick.packets):
-            # What was not told yet is no zero: I8 is not looked at before the first counters.
-            told = [row for row, tick in enumerate(ticks) if cause in tick.packets]
-            counts = np.array([ticks[row].packets[cause] for row in told], dtype=np.float64)
-            changes = self._counters.setdefault(cause, Latest()).changes(counts)
-            if changes:
-                rows = [told[at] for at in changes]
-                columns = rr.Scalars.columns(scalars=counts[changes])
-                yield ColumnBlock(f"{layout.PACKETS}/{cause}", rows, columns)
+        for counter in dict.fromkeys(counter for tick in ticks for counter in tick.packets):
+            # A missing counter is not zero: I8 is not evaluated before the first counters come.
+            known = [row for row, tick in enumerate(ticks) if counter in tick.packets]
+            counts = np.array([ticks[row].packets[counter] for row in known], dtype=np.float64)
+            detector = self._counter_changes.setdefault(counter, ChangeDetector())
+            changed = detector.changed_rows(counts)
+            if changed:
+                rows = [known[at] for at in changed]
+                columns = rr.Scalars.columns(scalars=counts[changed])
+                yield ColumnBlock(layout.packet_entity(counter), rows, columns)
 
-    def _references(self, last: int) -> Iterator[ColumnBlock]:
-        """Return the reference lines, drawn on as far as the block goes."""
+    def _reference_lines(self, last: int) -> Iterator[ColumnBlock]:
+        """Yield the reference lines from the first to the last row of a block."""
         rows = sorted({0, last})
         for metric, values in self._limits.items():
             columns = rr.Scalars.columns(scalars=values * len(rows))
-            yield ColumnBlock(
-                layout.limit_of(metric), rows, columns.partition([len(values)] * len(rows))
-            )
+            entity = layout.limit_entity(metric)
+            yield ColumnBlock.of_batches(entity, rows, columns, len(values))
 
 
-def _trail(ticks: Sequence[Tick], colours: palette.Colours) -> ColumnBlock:
-    """Return positions with their colours: of a range of time, a viewer shows each as it was."""
+def _trails(ticks: Sequence[Tick], colours: palette.Colours) -> ColumnBlock:
+    """Return positions, each with its colour: a trail shows the colour of each past position."""
     position = np.concatenate([tick.position for tick in ticks])
     columns = rr.Points3D.columns(positions=position, colors=colours)
-    counts = [len(ticks[0].alive)] * len(ticks)
-    return ColumnBlock(layout.AGENTS, range(len(ticks)), columns.partition(counts))
+    return ColumnBlock.of_batches(
+        layout.AGENTS, range(len(ticks)), columns, batch=len(ticks[0].alive)
+    )
 
 
 def _poses(ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
-    rows, counts = range(len(ticks)), [len(ticks[0].alive)] * len(ticks)
+    rows, agents = range(len(ticks)), len(ticks[0].alive)
     position = np.concatenate([tick.position for tick in ticks])
     attitude = _quaternions(np.concatenate([tick.attitude for tick in ticks]))
     target = np.concatenate([tick.target for tick in ticks])
     boxes = rr.Boxes3D.columns(centers=position, quaternions=attitude)
-    yield ColumnBlock(layout.VEHICLES, rows, boxes.partition(counts))
-    yield ColumnBlock(layout.TARGETS, rows, rr.Points3D.columns(positions=target).partition(counts))
+    yield ColumnBlock.of_batches(layout.VEHICLES, rows, boxes, agents)
+    targets = rr.Points3D.columns(positions=target)
+    yield ColumnBlock.of_batches(layout.TARGETS, rows, targets, agents)
 
 
-def _quaternions(attitude: Singles) -> Singles:
-    """Return xyzw of yaw, pitch (nose up) and roll (right side down), turned in that order."""
+def _quaternions(attitude: Float32s) -> Float32s:
+    """Return xyzw (K, 4) of yaw, pitch (nose up) and roll (right side down), in that order.
+
+    attitude (K, 3) [rad].
+    """
     (sy, sp, sr), (cy, cp, cr) = np.sin(0.5 * attitude.T), np.cos(0.5 * attitude.T)
-    sp = -sp  # z is up and x ahead, so the nose rises by a negative turn about y, the left
+    sp = -sp  # x is ahead, y left and z up: a negative turn about y raises the nose
     return np.stack(
         [
             cy * cp * sr - sy * sp * cr,
@@ -129,31 +136,28 @@ def _quaternions(attitude: Singles) -> Singles:
             cy * cp * cr + sy * sp * sr,
         ],
         axis=1,
-    ) + np.float32(0.0)  # no negative zeros: a level fleet's are all alike, and packed as one
+    ) + np.float32(0.0)  # no negative zeros: equal rows of a level fleet compress well
 
 
 def _metrics(ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
-    counts = [len(ticks[0].alive)] * len(ticks)
-    near = [seen.obstacle_distance for seen in figures if seen.obstacle_distance is not None]
-    for entity, series in (
-        (layout.FORCE, [tick.force for tick in ticks]),
-        (layout.TURN_DEG, [tick.turn_deg for tick in ticks]),
-        (layout.SEPARATION, [seen.separation for seen in figures]),
-        (layout.SLOT_ERROR, [seen.slot_error for seen in figures]),
-        *([(layout.OBSTACLE_DISTANCE, near)] if near else ()),
+    slot_error = np.concatenate([each.slot_error for each in figures])
+    distance = [each.obstacle_distance for each in figures if each.obstacle_distance is not None]
+    for entity, values in (
+        (layout.FORCE, np.concatenate([tick.force for tick in ticks])),
+        (layout.TURN_DEG, np.concatenate([tick.turn_deg for tick in ticks])),
+        (layout.SEPARATION, np.concatenate([each.separation for each in figures])),
+        (layout.SLOT_ERROR, np.where(np.isfinite(slot_error), slot_error, np.nan)),
+        *([(layout.OBSTACLE_DISTANCE, np.concatenate(distance))] if distance else ()),
     ):
-        values = np.concatenate(series)
-        if entity == layout.SLOT_ERROR:
-            values = np.where(np.isfinite(values), values, np.nan)
-        columns = rr.Scalars.columns(scalars=values).partition(counts)
-        yield ColumnBlock(entity, range(len(ticks)), columns)
+        columns = rr.Scalars.columns(scalars=values)
+        yield ColumnBlock.of_batches(entity, range(len(ticks)), columns, len(ticks[0].alive))
 
 
 def _state(ticks: Sequence[Tick]) -> ColumnBlock:
-    """Return what the judge or a reader needs and no view shows."""
+    """Return what a judge needs to repeat the verdict and no view shows."""
     columns = [
-        numbers(layout.PLACE, np.stack([tick.place for tick in ticks])),
-        numbers(layout.ALIVE, np.stack([tick.alive for tick in ticks]).astype(np.uint8)),
-        numbers(layout.ATTITUDE, np.stack([tick.attitude for tick in ticks])),
+        number_column(layout.PLACE, np.stack([tick.place for tick in ticks])),
+        number_column(layout.ALIVE, np.stack([tick.alive for tick in ticks]).astype(np.uint8)),
+        number_column(layout.ATTITUDE, np.stack([tick.attitude for tick in ticks])),
     ]
-    return ColumnBlock(layout.STATE, range(len(ticks)), columns)
+    return ColumnBlock(layout.AGENT_STATE, range(len(ticks)), columns)

@@ -1,8 +1,7 @@
-"""The verdict once more, from the recording alone, held against what the run itself said.
+"""The verdict recomputed from a recording alone, and compared with the run's summary.
 
-A fresh judge sees the recorded ticks. The rows are the very ones that the first judge saw, so its
-figures are equal, not close: any difference means that summary and recording do not belong
-together.
+A new judge sees the recorded ticks. They are the rows that the run's judge saw, so its figures are
+equal, not merely close: any difference means that summary and recording do not belong together.
 """
 
 import json
@@ -11,26 +10,26 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from worldsim.judge.phase import Phase
 from worldsim.judge.recovery import Recovery
-from worldsim.judge.run_events import RunEvent
+from worldsim.judge.run_events import PlannedEvent, RunEvent
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Expectation, Judge
+from worldsim.recording.layout import RECORDING_FILE, SUMMARY_FILE
 from worldsim.recording.readback import Readback, RecordingError, read_run
 
-RECORDING = "run.rrd"
-SUMMARY = "summary.json"
-SAME_TIME_S = 1e-6
-"""Events tell their time to the microsecond."""
-HELD, NOT_HELD, NOTHING_TO_JUDGE = 0, 1, 2
+EVENT_TIME_SLACK_S = 1e-6
+"""Event times are rounded to the microsecond."""
+HELD, NOT_HELD, UNREADABLE = 0, 1, 2
 
 Figure = float | None
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A figure that the summary tells otherwise than the recording does."""
+    """A figure of which summary and recording give different values."""
 
-    key: str
+    key: str  # the path in summary.json, joined by dots
     summary: Any
     recording: Any
 
@@ -48,18 +47,17 @@ class PhaseFigures:
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """What a recording shows.
-
-    ticks, until_s: how much of the run it holds. summary: whether there was one to compare with;
-    differences: where it disagrees. problem: why nothing could be judged, else None.
-    """
+    """What a recording shows, and where the run's summary differs."""
 
     run: Path
     problem: str | None = None
+    """Why nothing could be judged, in one line; None where the recording was judged."""
     scenario: str | None = None
     ticks: int = 0
     until_s: float = 0.0
+    """Time of the last recorded tick [s]."""
     duration_s: float = 0.0
+    """Duration of the run as the scenario asks for it [s]."""
     expectations: tuple[Expectation, ...] = ()
     min_separation_m: Figure = None
     min_obstacle_distance_m: Figure = None
@@ -68,6 +66,7 @@ class Verification:
     recoveries: tuple[Recovery, ...] = ()
     invariants: dict[str, dict[str, int]] = field(default_factory=dict)
     summary: bool = False
+    """Whether there is a summary to compare with."""
     differences: tuple[Difference, ...] = ()
 
     @property
@@ -77,36 +76,36 @@ class Verification:
 
     @property
     def held(self) -> bool:
-        """Whether the run shows what it must, and no figure differs from the summary's."""
-        return self.shown and not self.differences
+        """Whether the recorded run passes, and no figure differs from the summary's."""
+        return self.passes and not self.differences
 
     @property
-    def shown(self) -> bool:
+    def passes(self) -> bool:
         """Whether every expectation held and no invariant was violated, at one tick or more."""
         violations = sum(counts["violations"] for counts in self.invariants.values())
         return self.ticks > 0 and not violations and all(row.held for row in self.expectations)
 
     @property
     def exit_status(self) -> int:
-        """0: held; 1: not; 2: no such run, or no recording in it that can be read."""
+        """0: held; 1: not held; 2: no such run, or no recording in it that can be read."""
         if self.problem is not None:
-            return NOTHING_TO_JUDGE
+            return UNREADABLE
         return HELD if self.held else NOT_HELD
 
 
 def verify(run: Path) -> Verification:
     """Judge a run's recording again; ``run`` is its folder, or the recording itself."""
-    recording = run / RECORDING if run.is_dir() else run
+    recording = run / RECORDING_FILE if run.is_dir() else run
     try:
         judged = _judged(run, recording)
-        return _compared(judged, recording.with_name(SUMMARY))
+        return _compared(judged, recording.with_name(SUMMARY_FILE))
     except RecordingError as error:
         return Verification(run, problem=str(error))
 
 
 def _judged(run: Path, recording: Path) -> Verification:
     readback = read_run(recording)
-    judge = _seen(readback)
+    judge = _judge_of(readback)
     return Verification(
         run=run,
         scenario=readback.scenario.name,
@@ -117,65 +116,67 @@ def _judged(run: Path, recording: Path) -> Verification:
         min_separation_m=judge.min_separation_m,
         min_obstacle_distance_m=judge.min_obstacle_distance_m,
         turns_over_limit_fraction=judge.turns_over_limit_fraction,
-        phases=tuple(
-            PhaseFigures(
-                phase.formation.name,
-                phase.from_s,
-                phase.converge_s is not None,
-                phase.converge_s,
-                phase.residual_m,
-            )
-            for phase in judge.phases
-        ),
+        phases=tuple(_phase_figures(phase) for phase in judge.phases),
         recoveries=tuple(judge.recoveries),
         invariants=judge.invariants(),
     )
 
 
-def _seen(readback: Readback) -> Judge:
-    """Return a judge that saw the ticks, and heard before each of what had happened by then."""
-    judge, heard = Judge(readback.scenario), 0
+def _phase_figures(phase: Phase) -> PhaseFigures:
+    return PhaseFigures(
+        formation=phase.formation.name,
+        from_s=phase.from_s,
+        converged=phase.converge_s is not None,
+        converge_s=phase.converge_s,
+        residual_m=phase.residual_m,
+    )
+
+
+def _judge_of(readback: Readback) -> Judge:
+    """Return a judge that took the recorded ticks and events, in the run's order."""
+    judge, noted = Judge(readback.scenario), 0
     events = sorted(readback.events, key=lambda event: event.t_s)
     for tick in readback.ticks:
-        while heard < len(events) and _before(events[heard], tick):
-            judge.note(events[heard])
-            heard += 1
+        while noted < len(events) and _comes_before(events[noted], tick):
+            judge.note(events[noted])
+            noted += 1
         judge.see(tick)
     return judge
 
 
-def _before(event: RunEvent, tick: Tick) -> bool:
-    """Whether the run's judge was told of an event before it saw a tick.
+def _comes_before(event: RunEvent, tick: Tick) -> bool:
+    """Return whether the run's judge took an event before a tick.
 
-    At one time, what was meant comes first; a process that died of itself is noticed after it.
+    At equal times a planned event comes before the tick, and an unplanned exit is noticed after it.
     """
-    slack_s = -SAME_TIME_S if getattr(event, "planned", True) is False else SAME_TIME_S
+    unplanned = isinstance(event, PlannedEvent) and not event.planned
+    slack_s = -EVENT_TIME_SLACK_S if unplanned else EVENT_TIME_SLACK_S
     return event.t_s <= tick.time_s + slack_s
 
 
-def _compared(judged: Verification, summary: Path) -> Verification:
-    if not summary.is_file():
+def _compared(judged: Verification, file: Path) -> Verification:
+    if not file.is_file():
         return judged
     try:
-        told = json.loads(summary.read_text())
+        summary = json.loads(file.read_text())
     except ValueError as error:
-        raise RecordingError(f"{summary}: cannot be read: {error}") from error
-    return replace(judged, summary=True, differences=tuple(_differences(told, judged)))
+        raise RecordingError(f"{file}: cannot be read: {error}") from error
+    return replace(judged, summary=True, differences=tuple(_differences(summary, judged)))
 
 
-def _differences(told: Any, judged: Verification) -> Iterator[Difference]:
-    """Return what the summary tells otherwise; a figure that it lacks is told otherwise too."""
-    for key, shown in _figures(judged).items():
-        said = _at(told, key)
-        if said != shown:
-            yield Difference(key, said, shown)
-    if _at(told, "outcome") == "pass" and not judged.shown:
-        yield Difference("outcome", "pass", "fail")
+def _differences(summary: Any, judged: Verification) -> Iterator[Difference]:
+    """Yield the figures that differ; a figure that the summary lacks differs too."""
+    for key, recorded in _figures_by_path(judged).items():
+        summarised = _value_at(summary, key)
+        if summarised != recorded:
+            yield Difference(key=key, summary=summarised, recording=recorded)
+    if _value_at(summary, "outcome") == "pass" and not judged.passes:
+        yield Difference(key="outcome", summary="pass", recording="fail")
 
 
-def _figures(judged: Verification) -> dict[str, Any]:
-    """Return what must be equal, by its path in summary.json."""
-    figures: dict[str, Any] = {
+def _figures_by_path(judged: Verification) -> dict[str, object]:
+    """Return the figures that must be equal, by their path in summary.json."""
+    figures: dict[str, object] = {
         "min_separation_m": judged.min_separation_m,
         "min_obstacle_distance_m": judged.min_obstacle_distance_m,
         "turns_over_limit_fraction": judged.turns_over_limit_fraction,
@@ -194,11 +195,12 @@ def _figures(judged: Verification) -> dict[str, Any]:
     return figures
 
 
-def _at(told: Any, path: str) -> Any:
-    """Return what stands at a path of keys and places in a list; None when nothing does."""
+def _value_at(summary: Any, path: str) -> Any:
+    """Return the value at a path of keys and list indices; None where there is none."""
+    value = summary
     for key in path.split("."):
         try:
-            told = told[int(key)] if isinstance(told, list) else told[key]
+            value = value[int(key)] if isinstance(value, list) else value[key]
         except (KeyError, IndexError, TypeError, ValueError):
             return None
-    return told
+    return value

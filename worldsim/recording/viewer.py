@@ -1,7 +1,7 @@
-"""The rerun viewer on recordings: its own program, bound to this machine, telling nobody.
+"""The rerun viewer on recordings: its own program, bound to loopback, without usage reports.
 
-The viewer collects usage data unless its configuration says not to, and no option of it says so.
-It is therefore given a configuration of its own for as long as it runs; the user's stays as it is.
+The viewer collects usage data unless its configuration forbids it, and it has no option to forbid
+it. It is therefore run with a temporary configuration; the user's configuration is not changed.
 """
 
 import os
@@ -14,53 +14,55 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from urllib.parse import quote
 
+from worldsim.recording.layout import RECORDING_FILE
+
 LOOPBACK = "127.0.0.1"
-RECORDING = "run.rrd"
-DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
+DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
 class ViewerError(Exception):
-    """Recordings that cannot be viewed; one line that says why."""
+    """Recordings that cannot be viewed; the text is one line that says why."""
 
 
 def recordings(runs: list[Path]) -> list[Path]:
-    """Return the recordings of runs: run folders, folders of runs, or recordings themselves.
+    """Return the recordings of run folders, of folders of runs, or of files given directly.
 
-    Raises ViewerError where one has none.
+    Raises ViewerError where there is none.
     """
-    return [recording for run in runs for recording in _of(run)]
+    return [recording for run in runs for recording in _recordings_in(run)]
 
 
 def view(found: list[Path], web: bool) -> int:
-    """Show recordings together, and wait until the viewer is left; return its exit status.
+    """Show recordings together until the viewer is closed; return its exit status.
 
-    web: serve them to a browser on this machine; else a window. Raises ViewerError where there is
-    no viewer, or no display for its window.
+    web: serve them to a browser on this machine, instead of a window. Raises ViewerError where
+    there is no viewer, or no display for its window.
     """
-    program = _program()
-    if not web and sys.platform == "linux" and not any(map(os.environ.get, DISPLAYS)):
+    program = _viewer_program()
+    if not web and sys.platform == "linux" and not any(map(os.environ.get, DISPLAY_VARIABLES)):
         raise ViewerError("no display for a window here; --web shows it in a browser")
     with TemporaryDirectory(prefix="qswarm-viewer-") as configuration:
         quiet = {"RUST_LOG": "warn", **os.environ}
         environment = {**quiet, "XDG_CONFIG_HOME": configuration}
-        _ask_for_silence(program, environment)
-        command = [program, *(_web() if web else _window()), *map(str, found)]
-        return _attended(command, environment)
+        _disable_usage_reports(program, environment)
+        command = [program, *(_web_options() if web else _window_options()), *map(str, found)]
+        return _run_until_closed(command, environment)
 
 
-def _of(run: Path) -> list[Path]:
+def _recordings_in(run: Path) -> list[Path]:
     if run.is_file():
         return [run]
     if not run.exists():
         raise ViewerError(f"{run}: no such run")
-    found = [run / RECORDING] if (run / RECORDING).is_file() else sorted(run.glob(f"*/{RECORDING}"))
+    own = run / RECORDING_FILE
+    found = [own] if own.is_file() else sorted(run.glob(f"*/{RECORDING_FILE}"))
     if not found:
-        raise ViewerError(f"{run}: no recording in it: it was flown with --no-recording, or not")
+        raise ViewerError(f"{run}: no recording in it: not a run, or a run with --no-recording")
     return found
 
 
-def _program() -> str:
-    """Return the viewer itself: the script of that name is a parent that leaves it orphaned."""
+def _viewer_program() -> str:
+    """Return the viewer's binary: the script of the same name would leave it orphaned."""
     spec = find_spec("rerun_cli")
     program = Path(spec.origin).with_name("rerun") if spec is not None and spec.origin else None
     if program is None or not program.is_file():
@@ -68,19 +70,20 @@ def _program() -> str:
     return str(program)
 
 
-def _ask_for_silence(program: str, environment: dict[str, str]) -> None:
-    asked = subprocess.run(
+def _disable_usage_reports(program: str, environment: dict[str, str]) -> None:
+    done = subprocess.run(
         [program, "analytics", "disable"], env=environment, capture_output=True, check=False
     )
-    if asked.returncode != 0:
-        raise ViewerError("the rerun viewer would not leave off collecting usage data")
+    if done.returncode != 0:
+        raise ViewerError("usage reports of the rerun viewer cannot be disabled; not started")
 
 
-def _window() -> list[str]:
+def _window_options() -> list[str]:
     return ["--bind", LOOPBACK, "--port", "auto"]
 
 
-def _web() -> list[str]:
+def _web_options() -> list[str]:
+    """Return the options that serve a browser, and print the address to open."""
     data, page = _free_ports(2)
     source = quote(f"rerun+http://{LOOPBACK}:{data}/proxy", safe="")
     print(f"open http://{LOOPBACK}:{page}/?url={source} ; Ctrl-C ends it", flush=True)
@@ -88,8 +91,8 @@ def _web() -> list[str]:
     return ["--serve-web", "--bind", LOOPBACK, *ports]
 
 
-def _attended(command: list[str], environment: dict[str, str]) -> int:
-    """Run the viewer to its end; Ctrl-C and SIGTERM are ways to leave it like any other."""
+def _run_until_closed(command: list[str], environment: dict[str, str]) -> int:
+    """Run the viewer until it ends; Ctrl-C and SIGTERM end it with status 0."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         return subprocess.run(command, env=environment, check=False).returncode

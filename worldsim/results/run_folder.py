@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from worldsim.recording.layout import RECORDING_FILE, SUMMARY_FILE
 from worldsim.scenario.file import dump
 from worldsim.scenario.tables import Scenario
 
@@ -33,9 +34,9 @@ class RunDirectory:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.recording = path / "run.rrd"
+        self.recording = path / RECORDING_FILE
         self.logs = path / "logs"
-        self.summary = path / "summary.json"
+        self.summary = path / SUMMARY_FILE
         self._events = path / "events.jsonl"
         self._events_lost = False
 

@@ -149,7 +149,7 @@ def _phases(judge: Judge) -> list[dict[str, Any]]:
             "converged": phase.converge_s is not None,
             "converge_s": phase.converge_s,
             "residual_m": phase.residual_m,
-            "queues_converge_s": dict(zip(queues.names, queues.formed_s, strict=True)),
+            "queues_converge_s": dict(zip(queues.names, queues.converge_s, strict=True)),
         }
         for phase, queues in zip(judge.phases, judge.queues, strict=True)
     ]

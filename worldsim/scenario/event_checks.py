@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 from agent.codec import encode_formation
-from agent.guidance.potential import TARGET_FLOOR_M
 from agent.messages import MAX_ORDER_B
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from netem.link_keys import Conditions
 from worldsim.scenario.events import ACTIONS, UNDONE, EventTable
 from worldsim.scenario.faults import Join
+from worldsim.scenario.problem import Problem
 from worldsim.scenario.radio_checks import radio_findings
-from worldsim.scenario.rules import Finding, tilts_where_asked
+from worldsim.scenario.rules import tilt_problem
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.tables import MAX_AGENTS, Scenario
-from worldsim.scenario.target_frame import FrameTable, broken_key, changed
+from worldsim.scenario.target_frame import FrameTable, changed_frame, frame_problem
 from worldsim.scenario.timeline import Step, steps
 from worldsim.scenario.toml import ScenarioError
 
@@ -72,44 +72,44 @@ class Present(NamedTuple):
     room: int
 
 
-def broken_now(scenario: Scenario, event: EventTable, present: Present) -> Finding | None:
+def broken_now(scenario: Scenario, event: EventTable, present: Present) -> Problem | None:
     """Return what is wrong with an event that happens now, or None."""
     broken = _one_action(event)
     if broken is not None:
         return broken
     if event.joiners > present.room:
-        return Finding("join", f"{event.joiners}; fleet.spare leaves room for {present.room}")
+        return Problem("join", f"{event.joiners}; fleet.spare leaves room for {present.room}")
     course = _Course(scenario, present)
     try:
         return next(course.findings(Step(event.at_s, 0, event, ends=False)), None)
     except FormationError as error:
-        return Finding(f"formation.{error.key}", error.detail)
+        return Problem(f"formation.{error.key}", error.detail)
 
 
-def _error(file: Path, index: int, broken: Finding) -> ScenarioError:
+def _error(file: Path, index: int, broken: Problem) -> ScenarioError:
     key = f"event[{index}].{broken.key}" if broken.key else f"event[{index}]"
     return ScenarioError(file, key, broken.detail)
 
 
-def _one_action(event: EventTable) -> Finding | None:
+def _one_action(event: EventTable) -> Problem | None:
     if not event.keys:
-        return Finding("", f"no action; one of {', '.join(ACTIONS)}")
+        return Problem("", f"no action; one of {', '.join(ACTIONS)}")
     first, *others = event.keys
     if others:
-        return Finding(others[0], f"not beside {first}; one action an event")
+        return Problem(others[0], f"not beside {first}; one action an event")
     if event.heal is False:
-        return Finding("heal", "true; a partition that holds needs no event")
+        return Problem("heal", "true; a partition that holds needs no event")
     if event.netem == Conditions():
-        return Finding("netem", "no key to set")
+        return Problem("netem", "no key to set")
     if event.for_s is not None and first not in UNDONE:
-        return Finding("for_s", f"{first} is not undone; for_s goes with {', '.join(UNDONE)}")
+        return Problem("for_s", f"{first} is not undone; for_s goes with {', '.join(UNDONE)}")
     return None
 
 
-def _in_time(scenario: Scenario, event: EventTable) -> Finding | None:
+def _in_time(scenario: Scenario, event: EventTable) -> Problem | None:
     if event.at_s < scenario.duration_s:
         return None
-    return Finding("at_s", f"{event.at_s:g}; before the end, duration_s = {scenario.duration_s:g}")
+    return Problem("at_s", f"{event.at_s:g}; before the end, duration_s = {scenario.duration_s:g}")
 
 
 class _Course:
@@ -129,7 +129,7 @@ class _Course:
         self._fewer = 0
         self._partitions = {UNKNOWN_NUMBER} if now.partitioned else set()
 
-    def findings(self, step: Step) -> Iterator[Finding]:
+    def findings(self, step: Step) -> Iterator[Problem]:
         """Return what is wrong with a step. Raises FormationError."""
         event = step.event
         if step.ends:
@@ -151,7 +151,7 @@ class _Course:
         elif event.selectors:
             self._change_team(event, back=step.ends or event.kind in COME_BACK)
         elif event.frame is not None:
-            self._frame = changed(self._frame, event.frame, event.at_s)
+            self._frame = changed_frame(self._frame, event.frame, event.at_s)
         elif event.formation is not None:
             self._spec, self._formation = event.formation, self._made(event.formation)
         self._living.update(range(self._known, self._known + event.joiners))
@@ -182,13 +182,13 @@ class _Course:
         places = self._formation.layout(self._team).places
         return sum(index in self._formation.queues_of(place) for place in places)
 
-    def _selectors(self, event: EventTable) -> Iterator[Finding]:
+    def _selectors(self, event: EventTable) -> Iterator[Problem]:
         sensor = event.sensor
         where = "sensor.agents" if sensor is not None else event.kind
         for index, selector in enumerate(sensor.agents if sensor is not None else event.selectors):
             detail = self._selector(selector, event.kind)
             if detail is not None:
-                yield Finding(f"{where}[{index}]", detail)
+                yield Problem(f"{where}[{index}]", detail)
 
     def _selector(self, selector: int | str, kind: str) -> str | None:
         """Say what is wrong with a selector."""
@@ -205,67 +205,67 @@ class _Course:
             return f"no {word} {name!r} in {self._spec.name!r}; there are {', '.join(names[word])}"
         return None
 
-    def _radio(self, event: EventTable) -> Iterator[Finding]:
+    def _radio(self, event: EventTable) -> Iterator[Problem]:
         if event.heal and not self._partitions:
-            yield Finding("heal", "no partition to heal at that time")
+            yield Problem("heal", "no partition to heal at that time")
         yield from radio_findings(event, self._scenario.rows)
 
-    def _join(self, event: EventTable) -> Iterator[Finding]:
+    def _join(self, event: EventTable) -> Iterator[Problem]:
         if not event.joiners:
             return
         start = event.join.start if isinstance(event.join, Join) else None
         least_m = self._scenario.control.separation_m
         if start is None and isinstance(self._scenario.fleet.start, ListStart):
-            yield Finding("join.start", "is missing; fleet.start lists no places for more agents")
+            yield Problem("join.start", "is missing; fleet.start lists no places for more agents")
         if isinstance(start, ListStart):
             yield from _listed(start, event.joiners)
         if isinstance(start, BoxStart) and start.spacing_m < least_m:
             detail = f"{start.spacing_m:g}; at least control.separation_m = {least_m:g}"
-            yield Finding("join.start.spacing_m", detail)
+            yield Problem("join.start.spacing_m", detail)
         try:
-            self._formation.check(self._team + event.joiners, least_m + TARGET_FLOOR_M)
+            self._formation.check(self._team + event.joiners, self._scenario.min_slot_distance_m)
         except FormationError as error:
-            yield Finding("join", f"{self._formation.name!r} has no room for them: {error.detail}")
+            yield Problem("join", f"{self._formation.name!r} has no room for them: {error.detail}")
 
-    def _frame_change(self, event: EventTable) -> Iterator[Finding]:
+    def _frame_change(self, event: EventTable) -> Iterator[Problem]:
         change = event.frame
         if change is None:
             return
         if not change.given:
-            yield Finding("frame", "empty; yaw_deg, waypoints_m or both")
+            yield Problem("frame", "empty; yaw_deg, waypoints_m or both")
         for key in ("speed_mps", "start_s", "pauses_s"):
             if key in change.given and change.waypoints_m is None:
-                yield Finding(f"frame.{key}", "not without waypoints_m: a new path, from there on")
+                yield Problem(f"frame.{key}", "not without waypoints_m: a new path, from there on")
         if change.start_s is not None and change.start_s < event.at_s:
             detail = f"{change.start_s:g}; the event's at_s = {event.at_s:g} or later"
-            yield Finding("frame.start_s", detail)
-        broken = broken_key(changed(self._frame, change, event.at_s))
+            yield Problem("frame.start_s", detail)
+        broken = frame_problem(changed_frame(self._frame, change, event.at_s))
         if broken is not None:
-            yield Finding(f"frame.{broken[0]}", broken[1])
+            yield Problem(f"frame.{broken[0]}", broken[1])
         size_b = len(encode_formation(self._spec))
         if size_b > MAX_ORDER_B:
-            yield Finding("frame", f"the formation has {size_b} B; a mission at most {MAX_ORDER_B}")
+            yield Problem("frame", f"the formation has {size_b} B; a mission at most {MAX_ORDER_B}")
 
-    def _new_formation(self, spec: FormationSpec) -> Iterator[Finding]:
+    def _new_formation(self, spec: FormationSpec) -> Iterator[Problem]:
         team, vertices = self._team, len(spec.vertices)
         if team < vertices:
-            yield Finding("formation", f"{team} agents by then, for {vertices} vertices")
+            yield Problem("formation", f"{team} agents by then, for {vertices} vertices")
             return
         formation = self._made(spec)
-        formation.check(team, self._scenario.control.separation_m + TARGET_FLOOR_M)
+        formation.check(team, self._scenario.min_slot_distance_m)
         size_b = len(encode_formation(spec))
         if size_b > MAX_ORDER_B:
-            yield Finding("formation", f"{size_b} B as a mission; at most {MAX_ORDER_B} B")
-        tilted = tilts_where_asked(self._scenario, formation, team)
+            yield Problem("formation", f"{size_b} B as a mission; at most {MAX_ORDER_B} B")
+        tilted = tilt_problem(self._scenario, formation, team)
         if tilted is not None:
-            yield Finding("formation", f"{tilted.key}: {tilted.detail}")
+            yield Problem("formation", f"{tilted.key}: {tilted.detail}")
 
     def _made(self, spec: FormationSpec) -> Formation:
         return Formation(spec, self._scenario.control.spacing_m)
 
 
-def _listed(start: ListStart, joiners: int) -> Iterator[Finding]:
+def _listed(start: ListStart, joiners: int) -> Iterator[Problem]:
     given = (("positions_m", start.positions_m), ("yaws_deg", start.yaws_deg))
     for name, values in given:
         if values is not None and len(values) != joiners:
-            yield Finding(f"join.start.{name}", f"{len(values)} for {joiners} that join")
+            yield Problem(f"join.start.{name}", f"{len(values)} for {joiners} that join")

@@ -12,12 +12,11 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from agent.guidance.potential import TARGET_FLOOR_M
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from worldsim.scenario.decoding import decode
 from worldsim.scenario.event_checks import Whose, check_course
-from worldsim.scenario.obstacle_tables import resolved
-from worldsim.scenario.rules import check, tilts_where_asked
+from worldsim.scenario.obstacle_tables import resolve_field
+from worldsim.scenario.rules import check_rules, tilt_problem
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import Data, ScenarioError, override, read, tables
 
@@ -43,7 +42,7 @@ def parse(
         whose = _place_formation(data, Path(name))
         later = _place_events(data, Path(name))
         scenario = _with_field(decode(data, Scenario, name), name)
-        check(scenario, name)
+        check_rules(scenario, name)
         _check_formation(scenario, Path(name), *whose)
         check_course(scenario, Path(name), later)
     except ScenarioError as error:
@@ -108,7 +107,7 @@ def _with_field(scenario: Scenario, file: str | Path) -> Scenario:
     field = scenario.obstacle_field
     if field is None:
         return scenario
-    found, broken = resolved(field, scenario.fleet.start, scenario.seed)
+    found, broken = resolve_field(field, scenario.fleet.start, scenario.seed)
     if broken is not None:
         key, detail = broken
         raise ScenarioError(file, f"obstacle_field.{key}", detail)
@@ -120,10 +119,10 @@ def _check_formation(scenario: Scenario, file: Path, whose: Path, prefix: str) -
     control = scenario.control
     try:
         formation = Formation(scenario.formation, control.spacing_m)
-        formation.check(scenario.fleet.agents, control.separation_m + TARGET_FLOOR_M)
+        formation.check(scenario.fleet.agents, scenario.min_slot_distance_m)
     except FormationError as error:
         raise ScenarioError(whose, prefix + error.key, error.detail) from error
-    tilted = tilts_where_asked(scenario, formation, scenario.fleet.agents)
+    tilted = tilt_problem(scenario, formation, scenario.fleet.agents)
     if tilted is not None:
         raise ScenarioError(file, *tilted)
 

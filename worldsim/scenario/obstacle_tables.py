@@ -1,71 +1,71 @@
-"""Obstacles of a scenario: given one by one, or drawn in a box by the scenario's seed.
+"""Obstacles of a scenario: listed one by one, or drawn in a box from the scenario's seed.
 
-A sphere, box or cylinder stands at ``centre_m``, or moves along ``waypoints_m``, its centre on
-their line. A drawn field is resolved into the list: a resolved scenario holds every obstacle that
-was flown.
+A sphere, box or cylinder rests at ``centre_m``, or its centre moves along ``waypoints_m``. A drawn
+field becomes part of the list, so that a resolved scenario holds every obstacle that was flown.
 """
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import ceil, dist, hypot
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple, assert_never
 
 import numpy as np
 from msgspec import Meta
 
 from agent.config import Positive, Table
-from agent.messages import Vector
-from worldsim.scenario.start import BoxStart, Degrees, Extent, ListStart, Triple
+from agent.messages import Position, Vector
+from worldsim.scenario.problem import Problem
+from worldsim.scenario.start import BoxStart, Degrees, Extent, ListStart
 
 MAX_OBSTACLES = 1000
-TRIES = 2000
-"""For one obstacle of a field; a box that refuses so many draws has no room."""
+MAX_TRIES = 2000
+"""Draws for one obstacle of a field; when all fail, the box has no room for it."""
 FIELD_KEY = 0xF1E1D
+"""Separates the draws of a field from other draws with the same seed."""
 
-Waypoints = Annotated[tuple[Triple, ...], Meta(min_length=2, max_length=64)]
+Waypoints = Annotated[tuple[Position, ...], Meta(min_length=2, max_length=64)]
 Range = tuple[Positive, Positive]
-Problem = tuple[str, str]
-"""A key, and in words what is wrong with it."""
+"""The least value, then the largest."""
 
 
 class Movable(Table, frozen=True):
-    """What stands at ``centre_m``, or from ``from_s`` on moves along ``waypoints_m``.
+    """An obstacle that rests at ``centre_m``, or moves along ``waypoints_m`` from ``from_s`` on.
 
-    at_end: at the last waypoint it turns "back", and so on to and fro, or it stops.
+    at_end: at the last waypoint it turns "back" and goes to and fro, or it stops ("stop").
     """
 
-    centre_m: Triple | None = None
-    waypoints_m: Waypoints | None = None
+    centre_m: Position | None = None  # world frame
+    waypoints_m: Waypoints | None = None  # world frame
     speed_mps: Annotated[float, Meta(gt=0, le=50)] | None = None
     at_end: Literal["back", "stop"] = "back"
     from_s: Annotated[float, Meta(ge=0, le=86_400)] = 0.0
 
 
 class Sphere(Movable, frozen=True, tag="sphere", tag_field="shape", kw_only=True):
-    """A ball."""
+    """A sphere."""
 
     radius_m: Positive
 
 
 class Box(Movable, frozen=True, tag="box", tag_field="shape", kw_only=True):
-    """A box of that length, width and height, turned about the vertical."""
+    """A box of a length, width and height, turned about the vertical."""
 
     size_m: tuple[Positive, Positive, Positive]
-    yaw_deg: Degrees = 0.0
+    yaw_deg: Degrees = 0.0  # from +x towards +y
 
 
 class Cylinder(Movable, frozen=True, tag="cylinder", tag_field="shape", kw_only=True):
-    """An upright cylinder; its centre is half way up."""
+    """An upright cylinder; its centre is at half its height."""
 
     radius_m: Positive
     height_m: Positive
 
 
 class Wall(Table, frozen=True, tag="wall", tag_field="shape"):
-    """An upright wall; ``from_m`` and ``to_m`` are the ends of the middle of its foot."""
+    """An upright wall; ``from_m`` and ``to_m`` are the ends of the centre line of its foot."""
 
-    from_m: Triple
-    to_m: Triple
+    from_m: Position  # world frame
+    to_m: Position  # world frame
     height_m: Positive
     thickness_m: Positive = 0.1
 
@@ -75,14 +75,15 @@ Obstacles = Annotated[tuple[Obstacle, ...], Meta(max_length=MAX_OBSTACLES)]
 
 
 class ObstacleField(Table, frozen=True):
-    """Random obstacles in a box, drawn by the seed: ``count``, or so many per cubic metre.
+    """Random obstacles in a box, drawn from the seed: ``count``, or a number per cubic metre.
 
-    shape: spheres within the box, or cylinders as high as it. corridor_m: least distance between
-    two surfaces; clear_of_start_m: from a surface to where vehicles start.
+    shape: spheres inside the box, or cylinders of its height. radius_m: the least and the largest.
+    corridor_m: the least distance between two surfaces. clear_of_start_m: the least distance from a
+    surface to the vehicles' start.
     """
 
-    centre_m: Triple
-    size_m: tuple[Extent, Extent, Extent]
+    centre_m: Position  # world frame
+    size_m: tuple[Extent, Extent, Extent]  # along x, y, z
     count: Annotated[int, Meta(ge=1, le=MAX_OBSTACLES)] | None = None
     density_per_m3: Positive | None = None
     shape: Literal["sphere", "cylinder"] = "sphere"
@@ -91,140 +92,182 @@ class ObstacleField(Table, frozen=True):
     clear_of_start_m: Extent = 1.0
 
     @property
-    def wanted(self) -> int:
-        """How many obstacles there shall be."""
+    def total(self) -> int:
+        """The number of obstacles that the field asks for."""
         if self.count is not None:
             return self.count
         length, width, height = self.size_m
         return ceil((self.density_per_m3 or 0.0) * length * width * height - 1e-9)
 
 
-def drawn(field: ObstacleField, start: BoxStart | ListStart, seed: int) -> Iterator[Obstacle]:
-    """Yield a field's obstacles; fewer than wanted where the box has no room for more."""
+class _Placement(NamedTuple):
+    """A drawn obstacle: its centre [m; world frame] and radius [m]."""
+
+    centre: Vector
+    radius: float
+
+
+def resolve_field(
+    field: ObstacleField, start: BoxStart | ListStart, seed: int
+) -> tuple[tuple[Obstacle, ...], Problem | None]:
+    """Return a field's obstacles, and what is wrong with the field if anything is."""
+    problem = field_problem(field)
+    if problem is not None:
+        return (), problem
+    found = tuple(draw_obstacles(field, start, seed))
+    return found, _room_problem(field, len(found)) if len(found) < field.total else None
+
+
+def draw_obstacles(
+    field: ObstacleField, start: BoxStart | ListStart, seed: int
+) -> Iterator[Obstacle]:
+    """Yield a field's obstacles; fewer than it asks for where the box has no room for more."""
     generator = np.random.Generator(np.random.Philox(key=[seed, FIELD_KEY]))
-    placed: list[tuple[Vector, float]] = []
-    for _ in range(field.wanted):
-        found = _placed(field, start, placed, generator)
+    placed: list[_Placement] = []
+    for _ in range(field.total):
+        found = _draw(field, start, placed, generator)
         if found is None:
             return
         placed.append(found)
-        yield _shaped(field, *found)
+        yield _shaped(field, found)
 
 
 def field_problem(field: ObstacleField) -> Problem | None:
-    """Return what is wrong with a field as it is written."""
+    """Return what is wrong with a field before anything is drawn."""
     if (field.count is None) == (field.density_per_m3 is None):
-        return "count", "count or density_per_m3; one of the two"
-    if field.wanted > MAX_OBSTACLES:
-        return "density_per_m3", f"{field.wanted} obstacles; at most {MAX_OBSTACLES}"
-    least, most = field.radius_m
-    if least > most:
-        return "radius_m", f"[{least:g}, {most:g}]; the least first, then the largest"
+        return Problem("count", "give count or density_per_m3; one of the two")
+    if field.total > MAX_OBSTACLES:
+        return Problem("density_per_m3", f"{field.total} obstacles; at most {MAX_OBSTACLES}")
+    least, largest = field.radius_m
+    if least > largest:
+        detail = f"[{least:g}, {largest:g}]; the least first, then the largest"
+        return Problem("radius_m", detail)
     return None
-
-
-def no_room(field: ObstacleField, found: int) -> Problem:
-    """Return that a field's box is too small for what it shall hold."""
-    size = " x ".join(f"{edge:g}" for edge in field.size_m)
-    return (
-        "count" if field.count is not None else "density_per_m3",
-        f"room for {found} of {field.wanted} obstacles {field.corridor_m:g} m apart in a box of"
-        f" {size} m, {field.clear_of_start_m:g} m from the start; fewer, or a smaller corridor_m",
-    )
 
 
 def obstacle_problem(obstacle: Obstacle) -> Problem | None:
-    """Return what is wrong with an obstacle as it is written."""
-    if isinstance(obstacle, Wall):
-        return _wall_problem(obstacle)
+    """Return what is wrong with an obstacle's table."""
+    match obstacle:
+        case Wall():
+            return _wall_problem(obstacle)
+        case Sphere() | Box() | Cylinder():
+            return _movable_problem(obstacle)
+        case _:
+            assert_never(obstacle)
+
+
+def _movable_problem(obstacle: Movable) -> Problem | None:
     if (obstacle.centre_m is None) == (obstacle.waypoints_m is None):
-        return "centre_m", "centre_m where it stands, or waypoints_m along which it moves; one"
+        detail = "centre_m to rest there, or waypoints_m to move along them; one of the two"
+        return Problem("centre_m", detail)
     if (obstacle.waypoints_m is None) != (obstacle.speed_mps is None):
-        return "speed_mps", "goes with waypoints_m"
-    if obstacle.waypoints_m is not None and length(obstacle.waypoints_m) == 0.0:
-        return "waypoints_m", "all at one place; leave them out for what stands"
+        return Problem("speed_mps", "goes with waypoints_m; both or neither")
+    if obstacle.waypoints_m is not None and _path_length_m(obstacle.waypoints_m) == 0.0:
+        return Problem("waypoints_m", "all at one place; use centre_m for an obstacle at rest")
     return None
-
-
-def length(waypoints: Sequence[Vector]) -> float:
-    """Return the length of a line through waypoints [m]."""
-    return sum(dist(here, there) for here, there in pairwise(waypoints))
 
 
 def _wall_problem(wall: Wall) -> Problem | None:
     if wall.from_m[2] != wall.to_m[2]:
-        return "to_m", f"height {wall.to_m[2]:g}; that of from_m, {wall.from_m[2]:g}"
+        detail = f"height {wall.to_m[2]:g}; it must equal that of from_m, {wall.from_m[2]:g}"
+        return Problem("to_m", detail)
     if wall.from_m == wall.to_m:
-        return "to_m", "where from_m is; a wall has a length"
+        return Problem("to_m", "equals from_m; a wall has a length above 0")
     return None
 
 
-def _placed(
+def _room_problem(field: ObstacleField, found: int) -> Problem:
+    size = " x ".join(f"{edge:g}" for edge in field.size_m)
+    return Problem(
+        "count" if field.count is not None else "density_per_m3",
+        f"room for {found} of {field.total} obstacles {field.corridor_m:g} m apart in a box of"
+        f" {size} m, {field.clear_of_start_m:g} m from the start; use fewer, or a smaller"
+        " corridor_m",
+    )
+
+
+def _path_length_m(waypoints: Sequence[Vector]) -> float:
+    return sum(dist(here, there) for here, there in pairwise(waypoints))
+
+
+def _draw(
     field: ObstacleField,
     start: BoxStart | ListStart,
-    placed: list[tuple[Vector, float]],
+    placed: Sequence[_Placement],
     generator: np.random.Generator,
-) -> tuple[Vector, float] | None:
-    """Return a centre [m; world frame] and a radius [m] with room round it, or None."""
-    least, most = field.radius_m
-    for _ in range(TRIES):
-        across, up, over, share = generator.random(4).tolist()
-        radius = least + (most - least) * share
-        centre = _within(field, (across - 0.5, up - 0.5, over - 0.5))
-        if _clear(field, start, placed, centre, radius):
-            return centre, radius
+) -> _Placement | None:
+    """Return an obstacle with room around it; None where no draw finds any."""
+    least, largest = field.radius_m
+    for _ in range(MAX_TRIES):
+        *share, radius_share = generator.random(4).tolist()
+        centre = _centre_at(field, (share[0], share[1], share[2]))
+        placement = _Placement(centre, radius=least + (largest - least) * radius_share)
+        if _has_room(field, start, placed, placement):
+            return placement
     return None
 
 
-def _within(field: ObstacleField, share: Vector) -> Vector:
+def _centre_at(field: ObstacleField, share: Vector) -> Vector:
+    """Return the centre at shares, 0 to 1, of the box's edges; cylinders are as high as the box."""
     (x, y, z), (length_m, width_m, height_m) = field.centre_m, field.size_m
-    level = field.shape == "cylinder"
-    return (
-        x + length_m * share[0],
-        y + width_m * share[1],
-        z if level else z + height_m * share[2],
-    )
+    ahead, left, up = (each - 0.5 for each in share)
+    match field.shape:
+        case "sphere":
+            return (x + length_m * ahead, y + width_m * left, z + height_m * up)
+        case "cylinder":
+            return (x + length_m * ahead, y + width_m * left, z)
+        case _:
+            assert_never(field.shape)
 
 
-def _clear(
+def _has_room(
     field: ObstacleField,
     start: BoxStart | ListStart,
-    placed: list[tuple[Vector, float]],
-    centre: Vector,
-    radius: float,
+    placed: Sequence[_Placement],
+    placement: _Placement,
 ) -> bool:
-    others = all(dist(centre, c) - radius - r >= field.corridor_m for c, r in placed)
-    return others and _from_start(field, start, centre) - radius >= field.clear_of_start_m
+    centre, radius = placement
+    gaps_m = (dist(centre, other.centre) - radius - other.radius for other in placed)
+    if not all(gap_m >= field.corridor_m for gap_m in gaps_m):
+        return False
+    return _distance_from_start(field, start, centre) - radius >= field.clear_of_start_m
 
 
-def _from_start(field: ObstacleField, start: BoxStart | ListStart, centre: Vector) -> float:
-    """Return how far an obstacle's axis or centre is from where vehicles start [m]."""
-    flat = field.shape == "cylinder"
-    if isinstance(start, ListStart):
-        return min(_apart(centre, position, flat) for position in start.positions_m)
-    nearest = tuple(
-        min(max(c, middle - 0.5 * size), middle + 0.5 * size)
-        for c, middle, size in zip(centre, start.centre_m, start.size_m, strict=True)
-    )
-    return _apart(centre, (nearest[0], nearest[1], nearest[2]), flat)
+def _distance_from_start(
+    field: ObstacleField, start: BoxStart | ListStart, centre: Vector
+) -> float:
+    """Return the distance from an obstacle's centre or axis to the vehicles' start [m]."""
+    match start:
+        case ListStart():
+            return min(_distance(field, centre, position) for position in start.positions_m)
+        case BoxStart():
+            x, y, z = (
+                min(max(c, middle - 0.5 * size), middle + 0.5 * size)
+                for c, middle, size in zip(centre, start.centre_m, start.size_m, strict=True)
+            )
+            return _distance(field, centre, (x, y, z))
+        case _:
+            assert_never(start)
 
 
-def _apart(one: Vector, other: Vector, flat: bool) -> float:
-    return hypot(one[0] - other[0], one[1] - other[1]) if flat else dist(one, other)
+def _distance(field: ObstacleField, centre: Vector, point: Vector) -> float:
+    """Return the distance from a point to an obstacle's centre, or to a cylinder's axis [m]."""
+    match field.shape:
+        case "sphere":
+            return dist(centre, point)
+        case "cylinder":
+            return hypot(centre[0] - point[0], centre[1] - point[1])
+        case _:
+            assert_never(field.shape)
 
 
-def _shaped(field: ObstacleField, centre: Vector, radius: float) -> Obstacle:
-    if field.shape == "sphere":
-        return Sphere(centre_m=centre, radius_m=radius)
-    return Cylinder(centre_m=centre, radius_m=radius, height_m=field.size_m[2])
-
-
-def resolved(
-    field: ObstacleField, start: BoxStart | ListStart, seed: int
-) -> tuple[tuple[Obstacle, ...], Problem | None]:
-    """Return a field's obstacles, and what is wrong with it if anything is."""
-    broken = field_problem(field)
-    if broken is not None:
-        return (), broken
-    found = tuple(drawn(field, start, seed))
-    return found, no_room(field, len(found)) if len(found) < field.wanted else None
+def _shaped(field: ObstacleField, placement: _Placement) -> Obstacle:
+    match field.shape:
+        case "sphere":
+            return Sphere(centre_m=placement.centre, radius_m=placement.radius)
+        case "cylinder":
+            return Cylinder(
+                centre_m=placement.centre, radius_m=placement.radius, height_m=field.size_m[2]
+            )
+        case _:
+            assert_never(field.shape)

@@ -1,27 +1,27 @@
-"""Where vehicles start: drawn in a box, or given one by one."""
+"""The start of a fleet: drawn in a box, or listed vehicle by vehicle."""
 
 from typing import Annotated
 
 from msgspec import Meta
 
 from agent.config import Table
-from agent.messages import Metres
+from agent.messages import Position
 
-Triple = tuple[Metres, Metres, Metres]
 Extent = Annotated[float, Meta(ge=0, le=1e5)]
+"""A length [m] that may be zero."""
 Degrees = Annotated[float, Meta(ge=-360, le=360)]
 
 
 class BoxStart(Table, frozen=True, tag="box", tag_field="kind"):
-    """Random starts in a box, at least ``spacing_m`` apart, with random headings."""
+    """Random positions in a box, at least ``spacing_m`` apart, with random headings."""
 
-    centre_m: Triple = (0.0, 0.0, 0.0)
-    size_m: tuple[Extent, Extent, Extent] = (5.0, 5.0, 3.0)
+    centre_m: Position = (0.0, 0.0, 0.0)  # world frame
+    size_m: tuple[Extent, Extent, Extent] = (5.0, 5.0, 3.0)  # along x, y, z
     spacing_m: Extent = 0.6
 
 
 class ListStart(Table, frozen=True, tag="list", tag_field="kind"):
-    """Starts given one by one; headings left out are 0."""
+    """A position, and if given a heading, for each agent; without headings all are 0."""
 
-    positions_m: tuple[Triple, ...]
-    yaws_deg: tuple[Degrees, ...] | None = None
+    positions_m: tuple[Position, ...]  # world frame
+    yaws_deg: tuple[Degrees, ...] | None = None  # from +x towards +y

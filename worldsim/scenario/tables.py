@@ -1,7 +1,8 @@
 """The tables of a scenario file: their keys, units, bounds and defaults.
 
-These structures are the format; every number's unit is in its key. What a file leaves out gets the
-value written here. What must hold between keys is said in ``rules``.
+These structures are the format. The unit of every number is in its key, and positions are in the
+world frame. The docstrings explain the keys to users: they become the comments of ``qswarm new``
+and the descriptions of the JSON Schema. The conditions between keys are in ``rules``.
 """
 
 from typing import Annotated, Any, get_type_hints
@@ -20,6 +21,7 @@ from agent.config import (
     Table,
     Vehicle,
 )
+from agent.guidance.potential import TARGET_FLOOR_M
 from agent.messages import AgentId
 from agent.qstructure.formation import FormationSpec
 from netem.link_keys import Conditions
@@ -31,7 +33,12 @@ from worldsim.scenario.target_frame import FrameTable, path_of
 
 SLOTS_PER_TICK = 4
 MAX_AGENTS = 1000
-"""d_c2 where the range allows it; the paper's value."""
+MIN_CAST_RATIO = 2.0
+"""The least ratio of d_c2 to d_c1."""
+CONVERGED_M = 0.12
+"""An agent within this distance of its slot [m] is in place."""
+CONVERGED_S = 2.0
+"""A team in place for this time [s] has converged."""
 
 RunName = Annotated[
     str,
@@ -44,10 +51,10 @@ RunName = Annotated[
 
 
 class Fleet(Table, frozen=True):
-    """How many agents, how fast they think, and where they start.
+    """The number of agents, their control rate and their start.
 
-    boot_s: simulated time from a restart or a join to the agent's first step. spare: how many may
-    join besides the timeline's, told by ``qswarm fault RUN join``.
+    boot_s: simulated time from a restart or join to the agent's first step. spare: how many agents
+    may join by ``qswarm fault RUN join``, besides those that join by events.
     """
 
     agents: Annotated[int, Meta(ge=1, le=MAX_AGENTS)]
@@ -58,7 +65,7 @@ class Fleet(Table, frozen=True):
 
 
 def _optional(table: type[Table]) -> list[tuple[str, Any, None]]:
-    """Return the fields of a table, each to be left out."""
+    """Return the fields of a table with None as their default."""
     hints = get_type_hints(table, include_extras=True)
     return [(name, hints[name] | None, None) for name in table.__struct_fields__]
 
@@ -68,23 +75,25 @@ VehicleChange = msgspec.defstruct(
     _optional(Vehicle),
     bases=(Table,),
     frozen=True,
-    namespace={"__doc__": "Keys of [vehicle] that differ for some agents."},
+    namespace={"__doc__": "Keys of [vehicle] with other values for some agents."},
 )
 
 
 class AgentTable(Table, frozen=True):
-    """What differs for some agents: ``ids``, and the keys of ``vehicle`` that they have instead."""
+    """Some agents that differ: their ``ids``, and the keys of ``vehicle`` with their own values."""
 
     ids: Annotated[tuple[AgentId, ...], Meta(min_length=1, max_length=MAX_AGENTS)]
-    vehicle: VehicleChange  # type: ignore[valid-type]
+    vehicle: VehicleChange  # type: ignore[valid-type]  # made by defstruct from Vehicle
 
 
 class Expectations(Table, frozen=True):
-    """What a run must show; ``converge_within_s`` counts from each formation's start.
+    """What a run must show to pass.
 
-    min_obstacle_distance_m: from a vehicle's centre to a surface; left out: control.clearance_m.
-    reform_within_s: from each change of the team until all stand in a whole formation again.
-    converge: false where no formation is to be formed, as with a controller that knows none.
+    converge_within_s: from each formation's start. reform_within_s: from each change of the team
+    until it has re-formed the whole formation. converge: false where no formation is to be formed,
+    as with a controller that knows none. min_separation_m: between centres; left out:
+    control.separation_m. min_obstacle_distance_m: from a vehicle's centre to a surface; left out:
+    control.clearance_m.
     """
 
     converge_within_s: Positive | None = None
@@ -95,7 +104,7 @@ class Expectations(Table, frozen=True):
 
 
 class Scenario(Table, frozen=True, omit_defaults=False):
-    """A whole scenario, resolved: every default filled in, the formation in place."""
+    """A resolved scenario: every default filled in, and the formation in place."""
 
     fleet: Fleet
     formation: FormationSpec
@@ -122,53 +131,71 @@ class Scenario(Table, frozen=True, omit_defaults=False):
 
     @property
     def slots(self) -> int:
-        """How many slots the run lasts."""
+        """Slots of the whole run."""
         return round(self.duration_s * self.slot_hz)
 
     @property
-    def obstacle_bound_m(self) -> float:
-        """How near a vehicle's centre may come to a surface [m]."""
-        wanted = self.expect.min_obstacle_distance_m
-        return self.control.clearance_m if wanted is None else wanted
-
-    @property
     def rows(self) -> int:
-        """How many agents there may be in all: those at the start, and all that join."""
+        """The number of agents in all: those at the start, and all that may join."""
         joiners = sum(event.joiners for event in self.event)
         return self.fleet.agents + joiners + self.fleet.spare
 
-    def vehicle_of(self, agent: int) -> Vehicle:
-        """Return one agent's vehicle: [vehicle], with what [[agent]] says differs."""
-        vehicle = self.vehicle
-        for table in self.agent:
-            if agent in table.ids:
-                told = msgspec.structs.asdict(table.vehicle)
-                changes = {key: value for key, value in told.items() if value is not None}
-                vehicle = msgspec.structs.replace(vehicle, **changes)
-        return vehicle
+    @property
+    def separation_bound_m(self) -> float:
+        """The least separation of two vehicles' centres that a run must keep [m]."""
+        expected_m = self.expect.min_separation_m
+        return self.control.separation_m if expected_m is None else expected_m
+
+    @property
+    def obstacle_bound_m(self) -> float:
+        """The least distance from a vehicle's centre to a surface that a run must keep [m]."""
+        expected_m = self.expect.min_obstacle_distance_m
+        return self.control.clearance_m if expected_m is None else expected_m
+
+    @property
+    def min_slot_distance_m(self) -> float:
+        """The least distance between slots that leaves the potential an equilibrium [m], E1."""
+        return self.control.separation_m + TARGET_FLOOR_M
+
+    @property
+    def local_range_m(self) -> float | None:
+        """The radio range of the local channel [m]; None without a limit."""
+        own_m = self.netem.local.range_m
+        return self.netem.range_m if own_m is None else own_m
+
+    @property
+    def lemma_7_bound_m(self) -> float | None:
+        """The largest d_c2 that keeps neighbours in range [m], Lemma 7; None without a limit."""
+        range_m = self.local_range_m
+        return None if range_m is None else 0.25 * (range_m - self.control.spacing_m)
 
     @property
     def vehicles(self) -> list[Vehicle]:
         """Every agent's vehicle, by id."""
         return [self.vehicle_of(agent) for agent in range(self.rows)]
 
-    def _control(self) -> Control:
-        """Return [control] with the bobber's reach that the radio's range allows (Lemma 7, E20)."""
-        if self.control.cast_far_m is not None:
-            return self.control
-        reach = DEFAULT_CAST_FAR_M
-        range_m = self.netem.local.range_m or self.netem.range_m
-        if range_m is not None:
-            reach = min(reach, 0.25 * (range_m - self.control.spacing_m))
-        reach = max(reach, 2.0 * self.control.cast_near_m)
-        return msgspec.structs.replace(self.control, cast_far_m=reach)
+    def vehicle_of(self, agent: int) -> Vehicle:
+        """Return one agent's vehicle: [vehicle], changed by each [[agent]] table with its id."""
+        vehicle = self.vehicle
+        for table in self.agent:
+            if agent in table.ids:
+                keys = msgspec.structs.asdict(table.vehicle)
+                changes = {key: value for key, value in keys.items() if value is not None}
+                vehicle = msgspec.structs.replace(vehicle, **changes)
+        return vehicle
 
     def medium_setup(self) -> MediumSetup:
-        """Return what the medium is told."""
-        return MediumSetup(self.seed, self.rows, SLOTS_PER_TICK, self.slot_hz, self.netem)
+        """Return the setup of the medium."""
+        return MediumSetup(
+            seed=self.seed,
+            agents=self.rows,
+            slots_per_tick=SLOTS_PER_TICK,
+            slot_hz=self.slot_hz,
+            conditions=self.netem,
+        )
 
     def agent_setup(self, agent: int, incarnation: int, command_ticks: int) -> AgentSetup:
-        """Return what one agent is told; ``command_ticks`` is the clock's (one, or two)."""
+        """Return the setup of one agent; ``command_ticks``: for how many a command is valid."""
         return AgentSetup(
             id=agent,
             incarnation=incarnation,
@@ -177,9 +204,18 @@ class Scenario(Table, frozen=True, omit_defaults=False):
             command_ticks=command_ticks,
             vehicle=self.vehicle_of(agent),
             fleet_max_speed_mps=max(vehicle.max_speed_mps for vehicle in self.vehicles),
-            control=self._control(),
+            control=self._resolved_control(),
             comms=self.comms,
             sensor=self.sensor,
             formation=self.formation,
             frame=path_of(self.frame),
         )
+
+    def _resolved_control(self) -> Control:
+        """Return [control] with a cast_far_m that the radio's range allows (Lemma 7, E20)."""
+        if self.control.cast_far_m is not None:
+            return self.control
+        bound_m = self.lemma_7_bound_m
+        far_m = DEFAULT_CAST_FAR_M if bound_m is None else min(DEFAULT_CAST_FAR_M, bound_m)
+        far_m = max(far_m, MIN_CAST_RATIO * self.control.cast_near_m)
+        return msgspec.structs.replace(self.control, cast_far_m=far_m)

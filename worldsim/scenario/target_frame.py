@@ -1,27 +1,29 @@
-"""The target's frame in a scenario: where it goes, as tables, and as the path that agents get."""
+"""The target's frame in a scenario: its path as tables, and as the message that agents get."""
 
 from math import dist, radians
-from typing import Annotated, Literal
+from typing import Annotated, Literal, assert_never
 
 import msgspec
 from msgspec import Meta
 
 from agent.config import Positive, Table
-from agent.messages import FramePath
-from worldsim.scenario.start import Degrees, Triple
+from agent.messages import FramePath, Position
+from worldsim.scenario.problem import Problem
+from worldsim.scenario.start import Degrees
 
-LEAST_LEG_M = 1e-3
+MIN_LEG_M = 1e-3
 Time = Annotated[float, Meta(ge=0, le=86_400)]
-Waypoints = Annotated[tuple[Triple, ...], Meta(min_length=1, max_length=16)]
+Waypoints = Annotated[tuple[Position, ...], Meta(min_length=1, max_length=16)]
 Pauses = Annotated[tuple[Time, ...], Meta(max_length=16)]
 
 
 class FrameTable(Table, frozen=True):
-    """The target's frame, in which the vertices stand; left out, it rests at the origin.
+    """The target's frame, in which the vertices stand. Without this table it rests at the origin.
 
-    waypoints_m: one point, where its origin stands, or the points that it flies along at
-    ``speed_mps`` from ``start_s`` on; pauses_s: how long it waits at each. yaw: "fixed" at
-    ``yaw_deg``, or along the "path", to which yaw_deg is added; it turns on the spot at waypoints.
+    waypoints_m: one point, where the frame rests, or the points along which it flies at
+    ``speed_mps`` from ``start_s`` on [world frame]. pauses_s: how long it waits at each waypoint.
+    yaw: "fixed" at ``yaw_deg``, or along the "path" plus yaw_deg. With "path" it turns on the spot
+    at each waypoint, at ``turn_dps``.
     """
 
     waypoints_m: Waypoints = ((0.0, 0.0, 0.0),)
@@ -33,10 +35,13 @@ class FrameTable(Table, frozen=True):
     turn_dps: Positive = 10.0
 
 
-class FrameChange(Table, frozen=True):
-    """What a mission changes of the frame; what is left out stays as it was.
+REST = FrameTable()
 
-    With waypoints_m the path begins anew, at the event's time unless ``start_s`` says a later one.
+
+class FrameChange(Table, frozen=True):
+    """The keys of [frame] that a mission changes; all others keep their values.
+
+    With waypoints_m a new path begins: at the event's time, or at a later ``start_s``.
     """
 
     waypoints_m: Waypoints | None = None
@@ -50,54 +55,64 @@ class FrameChange(Table, frozen=True):
     @property
     def given(self) -> dict[str, object]:
         """The keys that are given, with their values."""
-        told = msgspec.structs.asdict(self)
-        return {key: value for key, value in told.items() if value is not None}
+        keys = msgspec.structs.asdict(self)
+        return {key: value for key, value in keys.items() if value is not None}
 
 
-def changed(frame: FrameTable, change: FrameChange, at_s: float) -> FrameTable:
-    """Return a frame's table as an event at ``at_s`` [s] changes it."""
-    begun: dict[str, object] = {}
+def changed_frame(frame: FrameTable, change: FrameChange, at_s: float) -> FrameTable:
+    """Return a frame's table after the change of an event at ``at_s`` [s]."""
+    new_path: dict[str, object] = {}
     if change.waypoints_m is not None:
-        begun = {"speed_mps": None, "start_s": at_s, "pauses_s": ()}
+        new_path = {"speed_mps": None, "start_s": at_s, "pauses_s": ()}
     if change.waypoints_m is not None and len(change.waypoints_m) == 1:
-        begun |= {"start_s": 0.0, "yaw": "fixed"}
-    return msgspec.structs.replace(frame, **{**begun, **change.given})
+        new_path |= {"start_s": REST.start_s, "yaw": REST.yaw}
+    return msgspec.structs.replace(frame, **{**new_path, **change.given})
 
 
 def path_of(frame: FrameTable) -> FramePath:
-    """Return the path that a frame's table means."""
+    """Return the path of a frame's table as agents get it."""
     return FramePath(
-        frame.waypoints_m,
-        frame.speed_mps or 1.0,
-        frame.start_s,
-        radians(frame.yaw_deg),
-        radians(frame.turn_dps) if frame.yaw == "path" else 0.0,
-        frame.pauses_s,
+        waypoints=frame.waypoints_m,
+        speed=frame.speed_mps or 1.0,
+        start_s=frame.start_s,
+        yaw=radians(frame.yaw_deg),
+        turn_rate=_turn_rate(frame),
+        waits_s=frame.pauses_s,
     )
 
 
-def broken_key(frame: FrameTable) -> tuple[str, str] | None:
-    """Return the key of a frame's table that does not go with the others, and why; else None."""
+def frame_problem(frame: FrameTable) -> Problem | None:
+    """Return the first key of a frame's table that contradicts the others; None if none does."""
     points = len(frame.waypoints_m)
     if points == 1:
-        return _at_rest(frame)
+        return _rest_problem(frame)
     if frame.speed_mps is None:
-        return "speed_mps", f"is missing; how fast the frame flies along its {points} waypoints"
+        detail = f"is missing; the frame's speed along its {points} waypoints"
+        return Problem("speed_mps", detail)
     if frame.pauses_s and len(frame.pauses_s) != points:
-        return "pauses_s", f"{len(frame.pauses_s)} for {points} waypoints; one for each"
+        return Problem("pauses_s", f"{len(frame.pauses_s)} for {points} waypoints; one for each")
     for index in range(1, points):
-        if dist(frame.waypoints_m[index - 1], frame.waypoints_m[index]) < LEAST_LEG_M:
-            return (
-                f"waypoints_m[{index}]",
-                "the point before once more; pauses_s makes it wait",
-            )
+        if dist(frame.waypoints_m[index - 1], frame.waypoints_m[index]) < MIN_LEG_M:
+            detail = "the same point as before; use pauses_s to wait there"
+            return Problem(f"waypoints_m[{index}]", detail)
     return None
 
 
-def _at_rest(frame: FrameTable) -> tuple[str, str] | None:
-    """Say what one waypoint has no use for."""
-    rest = FrameTable()
+def _rest_problem(frame: FrameTable) -> Problem | None:
+    """Return the first key that has no meaning with one waypoint."""
     for key in ("speed_mps", "start_s", "pauses_s", "yaw"):
-        if getattr(frame, key) != getattr(rest, key):
-            return key, "needs a path of two waypoints or more; at one waypoint the frame stands"
+        if getattr(frame, key) != getattr(REST, key):
+            detail = "needs two waypoints or more; with one waypoint the frame rests"
+            return Problem(key, detail)
     return None
+
+
+def _turn_rate(frame: FrameTable) -> float:
+    """Return how fast the yaw turns at waypoints [rad/s]; 0 where it stays fixed."""
+    match frame.yaw:
+        case "path":
+            return radians(frame.turn_dps)
+        case "fixed":
+            return 0.0
+        case _:
+            assert_never(frame.yaw)
