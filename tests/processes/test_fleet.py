@@ -125,9 +125,11 @@ def test_a_killed_agent_is_reported_at_once_and_the_run_ends_with_a_verdict(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(5.0), run, "--no-recording")
-    fleet.says("in place")
+    fleet.wait_for_output("in place")
     os.kill(pids(run)["agent-2"], signal.SIGKILL)
-    fleet.says(f"agent-2 (pid {pids(run)['agent-2']}) was killed by signal 9 at about", 1.0)
+    fleet.wait_for_output(
+        f"agent-2 (pid {pids(run)['agent-2']}) was killed by signal 9 at about", 1.0
+    )
     assert " s (not scheduled); its vehicle stops and hovers\n" in fleet.text
 
     assert fleet.status(20.0) in (0, 1)
@@ -141,7 +143,7 @@ def test_ctrl_c_ends_everything_and_leaves_summary_and_recording(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(60.0), run)
-    fleet.says("in place")
+    fleet.wait_for_output("in place")
     fleet.kill_group(signal.SIGINT)
 
     assert fleet.status(8.0) == 130, fleet.text
@@ -158,7 +160,7 @@ def test_a_repeated_ctrl_c_does_not_cut_the_end_short(
     start: Start, scenario: Write, run: Path, number: signal.Signals
 ) -> None:
     fleet = launched(start, scenario(60.0), run, "--no-recording")
-    fleet.says("in place")
+    fleet.wait_for_output("in place")
     while fleet.process.poll() is None:
         fleet.kill_group(number)
         threading.Event().wait(0.02)
@@ -185,7 +187,7 @@ def test_an_interrupt_before_take_off_is_reported_without_a_verdict(
 ) -> None:
     program = [sys.executable, "-c", AN_AGENT_NEVER_COMES]
     fleet = start(*program, "run", scenario(60.0), "--out", str(run))
-    fleet.says("still waiting for agent-3")
+    fleet.wait_for_output("still waiting for agent-3")
     fleet.kill_group(signal.SIGINT)
     assert fleet.status(8.0) == 130, fleet.text
     assert fleet.text.endswith(f"interrupted before take-off; logs in {run}/logs\n")
@@ -221,7 +223,7 @@ def test_kill_9_of_the_launcher_leaves_no_process_and_a_summary(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(60.0), run, "--no-recording")
-    fleet.says("in place")
+    fleet.wait_for_output("in place")
     started = pids(run)
     assert len(started) == 7
     fleet.process.kill()
@@ -233,7 +235,7 @@ def test_the_death_of_netem_ends_the_run_with_a_message(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(60.0), run, "--no-recording")
-    fleet.says("in place")
+    fleet.wait_for_output("in place")
     os.kill(pids(run)["netem"], signal.SIGKILL)
     assert fleet.status(10.0) == 3
     assert re.search(
