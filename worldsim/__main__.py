@@ -7,8 +7,8 @@ from pathlib import Path
 
 from netem.wire.keys import Keys
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, admit
-from worldsim.fleet.launcher_link import ByHand
-from worldsim.fleet.process import Terms, run
+from worldsim.fleet.launcher_link import ManualLink
+from worldsim.fleet.process import RunOptions, run
 from worldsim.fleet.process_table import ProcessTable
 from worldsim.results.run_folder import RunDirectory
 from worldsim.scenario.file import load
@@ -64,8 +64,8 @@ def main(arguments: list[str] | None = None) -> int:
         options.connect,
         scenario,
         lambda: _directory(options, scenario),
-        Terms(options.run or scenario.name, options.speed, not options.no_recording),
-        lambda startup: ByHand(startup.gone),
+        RunOptions(options.run or scenario.name, options.speed, not options.no_recording),
+        lambda startup: ManualLink(startup.vanished),
     )
 
 

@@ -41,7 +41,7 @@ BAD = [
     (("sim", "small.toml", "--seeds", "0:2", "--out", "."), "exists"),
     (("netem", "check", "small.toml", "--plot", "radio.txt"), "'radio.txt'; it ends in .png"),
     (("verify", "none"), "none: no such"),
-    (("ps", "none"), "none: no fleet.json"),
+    (("ps", "none"), "none: not a process run (no fleet.json)"),
 ]
 
 

@@ -23,8 +23,8 @@ from tests.commands.conftest import Command
         (("mission", "run"), "a formation file or --frame, one of them"),
         (("mission", "run", "there.toml", "--frame", "yaw_deg=1"), "one of them"),
         (("mission", "run", "missing.toml"), "missing.toml: no such file"),
-        (("netem", "run", "show"), "run: no fleet.json in it: no run of processes"),
-        (("fault", "run", "kill", "2"), "run: no fleet.json in it: no run of processes"),
+        (("netem", "run", "show"), "run: not a process run (no fleet.json)"),
+        (("fault", "run", "kill", "2"), "run: not a process run (no fleet.json)"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(
@@ -42,4 +42,4 @@ def test_a_fleet_that_has_landed_is_told(small: Path, qswarm: Command) -> None:
     fleet = {"run": "small", "endpoint": "tcp/127.0.0.1:9", "processes": [row]}
     Path("run/fleet.json").write_text(json.dumps(fleet))
     told = qswarm("fault", "run", "kill", "2")
-    assert (told.status, told.err) == (2, "run: its fleet flies no more\n")
+    assert (told.status, told.err) == (2, "run: the run has ended\n")

@@ -56,7 +56,7 @@ def test_a_browser_is_served_on_loopback_until_it_is_ended(
     configuration = flown.parent / "configuration"
     monkeypatch.setenv("XDG_CONFIG_HOME", str(configuration))
     started = Started([*QSWARM, "view", "two", "--web"], flown.parent / "said", flown.parent)
-    started.says("Ctrl-C ends it")
+    started.wait_for_output("Ctrl-C ends it")
     address = re.search(r"http://127\.0\.0\.1:\d+/", started.text)
     assert address is not None
     eventually(lambda: answers(address[0]), 20.0, lambda: started.text)

@@ -1,4 +1,4 @@
-"""Forked children: they end as they are told to, and what a full log cannot hold is heard."""
+"""Forked child processes: their handlers of signals, and output that a full log cannot hold."""
 
 import subprocess
 import sys
@@ -7,18 +7,18 @@ DEADLINE_S = 20.0
 FULL_LOG = """
 import os, signal
 from pathlib import Path
-from worldsim.fleet.fork import Exit, fork
+from worldsim.fleet.fork import ProcessExit, fork
 
 def main():
-    print("what the log cannot hold")
+    print("lost but for stderr")
     return 7
 
 child = fork(Path("/dev/full"), signal.SIGKILL, main)
-print(Exit.of(os.waitpid(child, 0)[1]))
+print(ProcessExit.of(os.waitpid(child, 0)[1]))
 """
 ENDED_AT_ONCE = """
 import os, signal
-from worldsim.fleet.fork import Exit, fork
+from worldsim.fleet.fork import ProcessExit, fork
 
 def interrupt(*_):
     raise KeyboardInterrupt
@@ -32,7 +32,7 @@ def forked_and_ended(fork=os.fork):
 signal.signal(signal.SIGTERM, interrupt)
 os.fork = forked_and_ended
 child = fork(None, signal.SIGKILL, lambda: 0)
-print(Exit.of(os.waitpid(child, 0)[1]))
+print(ProcessExit.of(os.waitpid(child, 0)[1]))
 os.kill(os.getpid(), signal.SIGTERM)
 """
 
@@ -48,13 +48,13 @@ def ran(program: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_a_child_that_is_ended_at_once_does_not_run_its_parents_handler() -> None:
+def test_a_child_that_is_ended_at_once_does_not_run_the_parents_handler() -> None:
     ended = ran(ENDED_AT_ONCE)
     assert ended.stdout == "was killed by signal 15\n"
     assert ended.stderr.count("Traceback") == 1  # the parent's own
 
 
-def test_a_log_on_a_full_disk_is_heard_on_stderr_and_stops_nobody() -> None:
+def test_output_that_a_full_log_cannot_hold_goes_to_stderr() -> None:
     ended = ran(FULL_LOG)
     assert ended.stdout == "ended with status 7\n"
-    assert ended.stderr == "what the log cannot hold\n"
+    assert ended.stderr == "lost but for stderr\n"

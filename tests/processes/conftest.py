@@ -1,4 +1,4 @@
-"""Fleets of real processes, gone when a test ends."""
+"""Fleets of real processes, killed at the end of each test."""
 
 import signal
 import socket

@@ -1,7 +1,9 @@
-"""A rogue with one agent's password, who floods all that this agent may say: python -m, RUN AGENT.
+"""Floods all topics that one agent may write to, with that agent's password.
 
-Junk, copies of messages of old, messages of other processes of the agent and of times to come;
-forged: of the present slot besides, as whoever takes an agent over can say them.
+    python -m tests.processes.flooding RUN AGENT SECONDS [forged]
+
+It sends junk, old messages, and messages of other incarnations and of future slots; with ``forged``
+also messages of the current slot, as an attacker who has taken the agent over can.
 """
 
 import sys
@@ -21,19 +23,19 @@ from netem.wire.frame import Frame, Outgoing, Transmission, pack
 from netem.wire.keys import Keys
 from netem.wire.latency import LatencyHistogram
 from netem.wire.session import open_client
-from worldsim.fleet.process_table import fleet_of
+from worldsim.fleet.process_table import read_fleet
 from worldsim.results.run_folder import USERS
 
 RATE_HZ = 10_000
 BURST_S = 0.005
 KINDS = 400
-STILL = (0.0, 0.0, 0.0)
-SILENT = Telemetry(STILL, 0.0, None, None, (), (), 0, -1, -1, 0)
+ZERO = (0.0, 0.0, 0.0)
+TELEMETRY = Telemetry(ZERO, 0.0, None, None, (), (), 0, -1, -1, 0)
 
 
 def command(slot: int, incarnation: int = 0) -> bytes:
-    away = (0.3, 0.3, 0.3)
-    return encode(Command(slot, incarnation, slot + 8, away, 0.0, (0.0, 0.0), SILENT))
+    velocity = (0.3, 0.3, 0.3)
+    return encode(Command(slot, incarnation, slot + 8, velocity, 0.0, (0.0, 0.0), TELEMETRY))
 
 
 def transmission(slot: int, incarnation: int = 0) -> bytes:
@@ -41,34 +43,34 @@ def transmission(slot: int, incarnation: int = 0) -> bytes:
 
 
 def arrivals(slot: int, incarnation: int = 0) -> bytes:
-    tally = LatencyHistogram(0.0125)
-    tally.add((Frame(1, 0, 0, 0, b""),) * (slot % 50), (slot,) * (slot % 50), slot % 7)
-    return pack(tally.report(incarnation))
+    histogram = LatencyHistogram(0.0125)
+    histogram.add((Frame(1, 0, 0, 0, b""),) * (slot % 50), (slot,) * (slot % 50), slot % 7)
+    return pack(histogram.report(incarnation))
 
 
-SAYS = {"tx": transmission, "command": command, "arrivals": arrivals}
+MAKERS = {"tx": transmission, "command": command, "arrivals": arrivals}
 
 
 def flood(run: Path, agent: int, seconds: float, forged: bool) -> dict[str, int]:
-    """Flood, and return how many messages were put on each topic."""
-    fleet, login = fleet_of(run), login_of(run / USERS, f"agent-{agent}")
+    """Flood for some seconds; return how many messages were put on each topic."""
+    fleet, login = read_fleet(run), login_of(run / USERS, f"agent-{agent}")
     with open_client(fleet.endpoint, login=login) as session:
         bus, random = Bus(session, Keys(fleet.run)), Random(1)
-        puts = [(bus.publisher(topic, agent), cycle(_mixed(topic, random))) for topic in SAYS]
-        seen = bus.subscriber("observation", agent)
+        puts = [(bus.publisher(topic, agent), cycle(_mixed(topic, random))) for topic in MAKERS]
+        observations = bus.subscriber("observation", agent)
         begun, sent, pause = time.monotonic(), 0, threading.Event()
         while (now_s := time.monotonic() - begun) < seconds:
             for put, messages in puts:
                 _burst(put, messages, int(now_s * RATE_HZ) - sent)
             sent = int(now_s * RATE_HZ)
             if forged:
-                _forge(bus, agent, seen.drain(1))
+                _forge(bus, agent, observations.drain(1))
             pause.wait(BURST_S)
-    return dict.fromkeys(SAYS, sent)
+    return dict.fromkeys(MAKERS, sent)
 
 
 def _mixed(topic: str, random: Random) -> list[bytes]:
-    make = SAYS[topic]
+    make = MAKERS[topic]
     kinds = [
         lambda: random.randbytes(random.randrange(200)),
         lambda: make(random.randrange(100)),
@@ -86,13 +88,13 @@ def _burst(put: Put, messages: "cycle[bytes]", count: int) -> None:
 def _forge(bus: Bus, agent: int, observed: list[bytes]) -> None:
     for data in observed:
         slot = decode_observation(data).slot
-        for topic, make in SAYS.items():
+        for topic, make in MAKERS.items():
             bus.publisher(topic, agent)(make(slot))
 
 
 def main() -> None:
     run, agent, seconds, *forged = sys.argv[1:]
-    print("floods", flush=True)
+    print("flooding", flush=True)
     print(flood(Path(run), int(agent), float(seconds), forged == ["forged"]), flush=True)
 
 

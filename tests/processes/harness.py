@@ -1,4 +1,4 @@
-"""Processes as tests see them: started in a session of their own, watched, waited for."""
+"""Processes under test: each started in a session of its own, with its output in a file."""
 
 import json
 import os
@@ -40,7 +40,7 @@ QSWARM = [sys.executable, "-c", "from worldsim.commands.app import main; main()"
 
 
 class Started:
-    """A process that writes to a file, and what became of it."""
+    """A process whose output goes to a file."""
 
     def __init__(self, arguments: list[str], output: Path, folder: Path) -> None:
         self._output = output
@@ -63,7 +63,7 @@ class Started:
     def status(self, within_s: float) -> int:
         return self.process.wait(within_s)
 
-    def says(self, text: str, within_s: float = 15.0) -> None:
+    def wait_for_output(self, text: str, within_s: float = 15.0) -> None:
         eventually(lambda: text in self.text, within_s, lambda: f"{text!r} in {self.text!r}")
 
     def kill_group(self, number: signal.Signals) -> None:

@@ -1,4 +1,4 @@
-"""Who may hear and say what: a router with a guard, and outsiders who try."""
+"""Access control at the router: what each user may read and write, and what is denied."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,17 +19,17 @@ KEYS = Keys("mine")
 
 
 @pytest.fixture
-def guard(tmp_path: Path) -> AccessControl:
+def access(tmp_path: Path) -> AccessControl:
     write_users(tmp_path / "users", USERS)
     return AccessControl(tmp_path / "users", "mine", 2)
 
 
 @pytest.fixture
-def session_of(guard: AccessControl, endpoint: str) -> Iterator[Callable[[str], zenoh.Session]]:
-    opened = [open_router(endpoint, access=guard)]
+def session_of(access: AccessControl, endpoint: str) -> Iterator[Callable[[str], zenoh.Session]]:
+    opened = [open_router(endpoint, access=access)]
 
     def of(user: str) -> zenoh.Session:
-        opened.append(open_client(endpoint, login=guard.login(user)))
+        opened.append(open_client(endpoint, login=access.login(user)))
         return opened[-1]
 
     yield of
@@ -37,24 +37,24 @@ def session_of(guard: AccessControl, endpoint: str) -> Iterator[Callable[[str], 
         session.close()
 
 
-def test_the_file_of_passwords_is_its_owners_alone(guard: AccessControl) -> None:
-    assert guard.users.stat().st_mode & 0o777 == 0o600
-    assert len({guard.login(user).password for user in USERS}) == len(USERS)
+def test_the_file_of_passwords_is_readable_by_its_owner_only(access: AccessControl) -> None:
+    assert access.users.stat().st_mode & 0o777 == 0o600
+    assert len({access.login(user).password for user in USERS}) == len(USERS)
     with pytest.raises(AccessError, match="no password of agent-7"):
-        login_of(guard.users, "agent-7")
+        login_of(access.users, "agent-7")
     with pytest.raises(AccessError, match="cannot be read"):
-        login_of(guard.users.with_name("none"), "world")
+        login_of(access.users.with_name("none"), "world")
 
 
-def test_without_a_password_nobody_comes_in(
-    session_of: Callable[[str], zenoh.Session], guard: AccessControl, endpoint: str
+def test_without_the_right_password_no_session_opens(
+    session_of: Callable[[str], zenoh.Session], access: AccessControl, endpoint: str
 ) -> None:
-    for login in (None, guard.login("agent-0")._replace(password="guess")):
+    for login in (None, access.login("agent-0")._replace(password="guess")):
         with pytest.raises(SessionError, match="no router answers"):
             open_client(endpoint, 0.5, login=login)
 
 
-def test_an_agent_hears_its_own_radio_and_nothing_else(
+def test_an_agent_reads_its_own_radio_and_nothing_else(
     session_of: Callable[[str], zenoh.Session],
 ) -> None:
     world, spy = Bus(session_of("world"), KEYS), session_of("agent-0")
@@ -68,16 +68,16 @@ def test_an_agent_hears_its_own_radio_and_nothing_else(
     for put in puts:
         put(b"secret")
     puts[0](b"last")
-    heard: list[bytes] = []
-    eventually(lambda: heard.extend(own.drain(64)) or b"last" in heard, 5.0)
-    # What the own radio has is all that anybody wider hears, too.
+    received: list[bytes] = []
+    eventually(lambda: received.extend(own.drain(64)) or b"last" in received, 5.0)
+    # A wider subscription receives no more than the agent's own radio.
     assert others[0].drain(64) == []
     assert {bytes(each) for ring in others[1:] for each in ring.drain(64)} <= {
         b"probe",
         b"secret",
         b"last",
     }
-    assert sum(each == b"secret" for each in heard) == 1
+    assert sum(each == b"secret" for each in received) == 1
 
 
 def puts_reach(ring: Subscriber, put: Callable[[bytes], None]) -> bool:
@@ -85,13 +85,13 @@ def puts_reach(ring: Subscriber, put: Callable[[bytes], None]) -> bool:
     return bool(ring.drain(64))
 
 
-def test_an_agent_says_nothing_in_anybody_elses_name(
+def test_an_agent_cannot_write_to_keys_of_other_processes(
     session_of: Callable[[str], zenoh.Session],
 ) -> None:
     listener, agent = session_of("world"), Bus(session_of("agent-0"), KEYS)
     own = Subscriber(listener, KEYS.of("command", 0), 64)
     topics = [(topic, 1) for topic in ("command", "tx", "arrivals", "rx", "observation")]
-    # Nor does it tell itself what only the world and the radio do.
+    # Nor to its own keys that only the world and netem write to.
     topics += [("rx", 0), ("observation", 0), ("over", None), ("truth", None), ("verdicts", None)]
     forbidden = [Subscriber(listener, KEYS.of(*each), 64) for each in topics]
     puts = [agent.publisher(*each) for each in topics]
@@ -104,35 +104,35 @@ def test_an_agent_says_nothing_in_anybody_elses_name(
 
 
 @pytest.mark.parametrize("topic", MAX_AGENT_PUT_B)
-def test_what_is_too_long_goes_no_further_than_the_router(
+def test_the_router_drops_messages_that_are_too_long(
     session_of: Callable[[str], zenoh.Session], topic: str
 ) -> None:
-    heard = Subscriber(session_of("world"), KEYS.of(topic, 0), 64)
+    received = Subscriber(session_of("world"), KEYS.of(topic, 0), 64)
     put = Bus(session_of("agent-0"), KEYS).publisher(topic, 0)
-    eventually(lambda: puts_reach(heard, put), 5.0)
+    eventually(lambda: puts_reach(received, put), 5.0)
     longest = bytes(MAX_AGENT_PUT_B[topic])
     put(longest + b"x")
     put(longest)
-    said: list[bytes] = []
-    eventually(lambda: said.extend(heard.drain(64)) or longest in said, 5.0)
-    assert longest + b"x" not in said
+    passed: list[bytes] = []
+    eventually(lambda: passed.extend(received.drain(64)) or longest in passed, 5.0)
+    assert longest + b"x" not in passed
 
 
 @pytest.mark.parametrize("topic", MAX_AGENT_PUT_B)
-def test_what_an_agent_says_is_heard_and_not_by_itself(
+def test_an_agent_does_not_receive_its_own_messages(
     session_of: Callable[[str], zenoh.Session], topic: str
 ) -> None:
     agent = session_of("agent-0")
-    heard, echo = (
+    received, echo = (
         Subscriber(session_of("world"), KEYS.of(topic, 0), 64),
         Subscriber(agent, "qswarm/**", 64),
     )
     put = Bus(session_of("agent-0"), KEYS).publisher(topic, 0)
-    eventually(lambda: puts_reach(heard, put), 5.0)
+    eventually(lambda: puts_reach(received, put), 5.0)
     assert echo.drain(64) == []
 
 
-def test_an_operator_asks_and_does_no_more(session_of: Callable[[str], zenoh.Session]) -> None:
+def test_an_operator_may_only_ask(session_of: Callable[[str], zenoh.Session]) -> None:
     world, operator = session_of("world"), session_of("operator")
     questions = Bus(world, KEYS).queryable("control")
     over = Subscriber(world, KEYS.of("over"), 4)
@@ -152,12 +152,12 @@ def test_an_operator_asks_and_does_no_more(session_of: Callable[[str], zenoh.Ses
     assert over.drain(4) == []
 
 
-def test_a_fleets_passwords_last_as_long_as_it_does(
+def test_the_passwords_are_deleted_at_the_end_of_the_run(
     start: Callable[..., Started], scenario: Callable[[float], str], tmp_path: Path
 ) -> None:
     run = tmp_path / "run"
     fleet = start(*QSWARM, "run", scenario(3.0), "--no-recording", "--out", str(run))
-    fleet.says("in place")
+    fleet.wait_for_output("in place")
     assert (run / "users").exists()
     assert fleet.status(15.0) in (0, 1, 3)
     assert not (run / "users").exists()

@@ -1,7 +1,8 @@
-"""A launched fleet, whole and hurt: what it says, what it leaves, and that it leaves nobody."""
+"""A launched fleet, intact and with failures: its output, its files, and no process left behind."""
 
 import json
 import os
+import re
 import signal
 import sys
 import threading
@@ -29,18 +30,31 @@ def ctrl_c(*_):
 launcher.write_users = ctrl_c
 main()
 """
-SOMEBODY_NEVER_COMES = """
+AN_AGENT_NEVER_COMES = """
 from worldsim.commands.app import main
-from worldsim.fleet import launcher, process
+from worldsim.fleet import fleet_monitor, process
 
-def wait(startup, speed, unwanted, launcher_link):
-    launcher_link.missing(["agent-3"])
-    while not unwanted():
+def wait(startup, speed, should_stop, launcher_link):
+    launcher_link.report_missing(["agent-3"])
+    while not should_stop():
         launcher_link.wait(0.02)
     return False
 
-launcher.PATIENCE_S = 0.1
+fleet_monitor.REPORT_MISSING_EVERY_S = 0.1
 process.assemble = wait
+main()
+"""
+GARBAGE = """
+from worldsim.commands.app import main
+from worldsim.fleet import ipc, launcher_link
+
+class Landing(ipc.Message, frozen=True):
+    argument: object
+
+def send_garbage(link, argument):
+    link._launcher.send(Landing(str(argument)))
+
+launcher_link.LaunchedLink.{report} = send_garbage
 main()
 """
 FULL_FROM_THE_START = """
@@ -69,7 +83,7 @@ def summary_of(run: Path) -> dict[str, Any]:
     return summary
 
 
-def nobody_left(of: dict[str, int]) -> None:
+def none_left(of: dict[str, int]) -> None:
     eventually(lambda: not any(running(pid) for pid in of.values()), 5.0, lambda: str(of))
 
 
@@ -80,9 +94,7 @@ def running(pid: int) -> bool:
         return False
 
 
-def test_a_fleet_flies_passes_and_leaves_everything_in_its_folder(
-    start: Start, scenario: Write, run: Path
-) -> None:
+def test_a_run_passes_and_leaves_all_of_its_files(start: Start, scenario: Write, run: Path) -> None:
     fleet = launched(start, scenario(6.0), run, "--speed", "2")
     assert fleet.status(40.0) == 0, fleet.text
 
@@ -106,17 +118,19 @@ def test_a_fleet_flies_passes_and_leaves_everything_in_its_folder(
     assert delivery["bound_ms"] == 62.5
     assert "after due" in fleet.text
     assert [row.alive for row in processes(run)] == [False] * 7
-    nobody_left(pids(run))
+    none_left(pids(run))
 
 
-def test_a_killed_agent_is_said_at_once_and_the_run_ends_with_a_verdict(
+def test_a_killed_agent_is_reported_at_once_and_the_run_ends_with_a_verdict(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(5.0), run, "--no-recording")
-    fleet.says("in place")
+    fleet.wait_for_output("in place")
     os.kill(pids(run)["agent-2"], signal.SIGKILL)
-    fleet.says("agent-2 (pid", within_s=1.0)
-    assert "was killed by signal 9" in fleet.text
+    fleet.wait_for_output(
+        f"agent-2 (pid {pids(run)['agent-2']}) was killed by signal 9 at about", 1.0
+    )
+    assert " s (not scheduled); its vehicle stops and hovers\n" in fleet.text
 
     assert fleet.status(20.0) in (0, 1)
     kills = [event for event in events_of(run) if event["kind"] == "kill"]
@@ -129,7 +143,7 @@ def test_ctrl_c_ends_everything_and_leaves_summary_and_recording(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(60.0), run)
-    fleet.says("in place")
+    fleet.wait_for_output("in place")
     fleet.kill_group(signal.SIGINT)
 
     assert fleet.status(8.0) == 130, fleet.text
@@ -138,15 +152,15 @@ def test_ctrl_c_ends_everything_and_leaves_summary_and_recording(
     assert "interrupted" in summary["reason"]
     assert 0.0 < summary["duration_s"] < 60.0
     assert recorded_ticks(run / "run.rrd") > 0
-    nobody_left(pids(run))
+    none_left(pids(run))
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
-def test_who_asks_for_the_end_again_and_again_gets_it_whole(
+def test_a_repeated_ctrl_c_does_not_cut_the_end_short(
     start: Start, scenario: Write, run: Path, number: signal.Signals
 ) -> None:
     fleet = launched(start, scenario(60.0), run, "--no-recording")
-    fleet.says("in place")
+    fleet.wait_for_output("in place")
     while fleet.process.poll() is None:
         fleet.kill_group(number)
         threading.Event().wait(0.02)
@@ -155,10 +169,10 @@ def test_who_asks_for_the_end_again_and_again_gets_it_whole(
     assert "inconclusive (interrupted after " in fleet.text
     assert summary_of(run)["reason"] in fleet.text
     assert not (run / "users").exists()
-    nobody_left(pids(run))
+    none_left(pids(run))
 
 
-def test_an_interrupt_before_there_is_a_world_leaves_scenario_and_logs(
+def test_an_interrupt_before_the_world_is_started_leaves_scenario_and_logs(
     start: Start, scenario: Write, run: Path
 ) -> None:
     program = [sys.executable, "-c", EARLY_CTRL_C]
@@ -168,22 +182,22 @@ def test_an_interrupt_before_there_is_a_world_leaves_scenario_and_logs(
     assert sorted(file.name for file in run.iterdir()) == ["logs", "scenario.toml"]
 
 
-def test_an_interrupt_before_take_off_says_so_and_judges_nothing(
+def test_an_interrupt_before_take_off_is_reported_without_a_verdict(
     start: Start, scenario: Write, run: Path
 ) -> None:
-    program = [sys.executable, "-c", SOMEBODY_NEVER_COMES]
+    program = [sys.executable, "-c", AN_AGENT_NEVER_COMES]
     fleet = start(*program, "run", scenario(60.0), "--out", str(run))
-    fleet.says("still waiting for agent-3")
+    fleet.wait_for_output("still waiting for agent-3")
     fleet.kill_group(signal.SIGINT)
     assert fleet.status(8.0) == 130, fleet.text
     assert fleet.text.endswith(f"interrupted before take-off; logs in {run}/logs\n")
     assert "HELD" not in fleet.text
-    assert "to look at it" not in fleet.text
+    assert "to view the recording" not in fleet.text
     assert sorted(file.name for file in run.glob("*.*")) == ["fleet.json", "scenario.toml"]
     assert "world: interrupted before take-off" in (run / "logs/world.log").read_text()
 
 
-def test_a_disk_too_full_for_a_start_is_one_line_and_status_2(
+def test_a_disk_too_full_to_start_is_one_line_and_status_2(
     start: Start, scenario: Write, run: Path
 ) -> None:
     full = EARLY_CTRL_C.replace("KeyboardInterrupt", "OSError(28, 'No space left on device')")
@@ -194,7 +208,7 @@ def test_a_disk_too_full_for_a_start_is_one_line_and_status_2(
     assert sorted(file.name for file in run.iterdir()) == ["logs", "scenario.toml"]
 
 
-def test_a_disk_that_fills_up_while_agents_start_ends_the_run_and_leaves_no_password(
+def test_a_disk_that_fills_up_during_the_start_ends_the_run_and_leaves_no_passwords(
     start: Start, scenario: Write, run: Path
 ) -> None:
     program = [sys.executable, "-c", FULL_FROM_THE_START]
@@ -209,28 +223,51 @@ def test_kill_9_of_the_launcher_leaves_no_process_and_a_summary(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(60.0), run, "--no-recording")
-    fleet.says("in place")
-    everybody = pids(run)
-    assert len(everybody) == 7
+    fleet.wait_for_output("in place")
+    started = pids(run)
+    assert len(started) == 7
     fleet.process.kill()
-    nobody_left(everybody)
+    none_left(started)
     assert summary_of(run)["outcome"] == "inconclusive"
 
 
-def test_when_the_medium_dies_the_run_ends_and_says_so(
+def test_the_death_of_netem_ends_the_run_with_a_message(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(60.0), run, "--no-recording")
-    fleet.says("in place")
+    fleet.wait_for_output("in place")
     os.kill(pids(run)["netem"], signal.SIGKILL)
     assert fleet.status(10.0) == 3
-    assert "netem was killed by signal 9" in fleet.text
+    assert re.search(
+        r"^netem was killed by signal 9 at about \d+\.\d s; the run ends$", fleet.text, re.M
+    )
     assert summary_of(run)["outcome"] == "inconclusive"
     assert summary_of(run)["reason"].startswith("netem was killed by signal 9 after ")
-    nobody_left(pids(run))
+    none_left(pids(run))
 
 
-def test_an_agent_that_does_not_come_up_is_said_with_its_last_words(
+@pytest.mark.parametrize(
+    ("report", "status", "begins"),
+    [("report_missing", 2, "the fleet did not start: "), ("report_progress", 3, "")],
+)
+def test_garbage_from_the_world_ends_the_run_with_its_sender_and_leaves_no_process(
+    start: Start, scenario: Write, run: Path, report: str, status: int, begins: str
+) -> None:
+    program = [sys.executable, "-c", GARBAGE.format(report=report)]
+    options = ("--no-recording", "--out", str(run))
+    fleet = start(*program, "run", scenario(60.0), *options)
+    assert fleet.status(15.0) == status, fleet.text
+    error = "world sent a message that cannot be decoded: Invalid value 'Landing'"
+    assert f"\n{begins}{error}" in fleet.text
+    assert "Traceback" not in fleet.text
+    assert not (run / "users").exists()
+    assert (run / "summary.json").exists() == (status == 3)
+    if status == 3:
+        assert summary_of(run)["reason"].startswith(error)
+        none_left(pids(run))
+
+
+def test_an_agent_that_does_not_start_is_named_with_the_end_of_its_log(
     start: Start, scenario: Write, run: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "broken.py").write_text(
@@ -241,10 +278,10 @@ def test_an_agent_that_does_not_come_up_is_said_with_its_last_words(
     controller = 'control.controller="broken:Broken"'
     fleet = launched(start, scenario(6.0), run, "--no-recording", "--set", controller)
     assert fleet.status(20.0) == 2, fleet.text
-    assert "did not start" in fleet.text
+    assert re.search(r"^agent-\d did not start: it ended with status 1; ", fleet.text, re.M)
     assert "no battery" in fleet.text
     assert sorted(each.name for each in run.iterdir()) == ["fleet.json", "logs", "scenario.toml"]
-    nobody_left(pids(run))
+    none_left(pids(run))
 
 
 def recorded_ticks(recording: Path) -> int:

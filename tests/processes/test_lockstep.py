@@ -1,4 +1,4 @@
-"""Lockstep: real processes that take turns fly what virtual time flies; a loss ends the run."""
+"""Lockstep: real processes give the run of virtual time; an unexpected exit ends the run."""
 
 import json
 import os
@@ -27,7 +27,7 @@ corrupt_percent = 1
 rate_kbit = 128
 gemodel = { p_percent = 5, r_percent = 25, loss_bad_percent = 90 }
 """
-TROUBLES = """
+EVENTS = """
 [[event]]
 at_s = 1.0
 pause = [3]
@@ -62,13 +62,13 @@ def rough(scenario: Write) -> Write:
     def write(duration_s: float) -> str:
         path = Path(scenario(duration_s))
         clean = path.read_text().replace("agents = 4", "agents = 4\nboot_s = 0.5")
-        path.write_text(clean.replace("delay_ms = 10", "delay_ms = 10" + ROUGH) + TROUBLES)
+        path.write_text(clean.replace("delay_ms = 10", "delay_ms = 10" + ROUGH) + EVENTS)
         return str(path)
 
     return write
 
 
-def in_turns(start: Start, scenario: str, run: Path, *options: str) -> Started:
+def lockstep(start: Start, scenario: str, run: Path, *options: str) -> Started:
     return start(*QSWARM, "run", scenario, "--lockstep", "--out", str(run), *options)
 
 
@@ -77,10 +77,10 @@ def summary_of(run: Path) -> dict[str, Any]:
     return summary
 
 
-def test_a_clean_run_is_that_of_virtual_time_and_passes(
+def test_a_clean_run_equals_virtual_time_and_passes(
     start: Start, scenario: Write, run: Path
 ) -> None:
-    fleet = in_turns(start, scenario(6.0), run)
+    fleet = lockstep(start, scenario(6.0), run)
     assert fleet.status(40.0) == 0, fleet.text
     summary, flight = summary_of(run), fly(load(Path(scenario(6.0))))
     assert (summary["mode"], summary["outcome"]) == ("lockstep", "pass")
@@ -95,16 +95,16 @@ def test_a_clean_run_is_that_of_virtual_time_and_passes(
 
 
 @pytest.mark.parametrize("shards", [1, 3])
-def test_whatever_befalls_a_fleet_befalls_it_as_in_virtual_time(
+def test_a_run_with_faults_equals_virtual_time(
     start: Start, rough: Write, run: Path, shards: int
 ) -> None:
-    fleet = in_turns(start, rough(6.0), run, "--no-recording", "--shards", str(shards))
+    fleet = lockstep(start, rough(6.0), run, "--no-recording", "--shards", str(shards))
     assert fleet.status(60.0) in (0, 1), fleet.text
     summary, flight = summary_of(run), fly(load(Path(rough(6.0))))
     assert summary["duration_s"] == 6.0, summary["reason"]
     assert summary["trace_sha256"] == flight.loop.trace.sha256
-    told = {name: summary["packets"][name] for name in flight.medium_counters.packets()}
-    assert told == flight.medium_counters.packets()
+    packets = flight.medium_counters.packets()
+    assert {name: summary["packets"][name] for name in packets} == packets
     assert {each.partition("-")[2] for each in pids(run) if each.startswith("netem-")} == {
         str(shard) for shard in range(1, shards)
     }
@@ -112,23 +112,23 @@ def test_whatever_befalls_a_fleet_befalls_it_as_in_virtual_time(
     assert kinds == [event.kind for event in flight.loop.events]
 
 
-def test_an_agent_that_dies_ends_the_run_with_a_line(
+def test_an_agent_that_dies_ends_the_run_with_a_message(
     start: Start, scenario: Write, run: Path
 ) -> None:
-    fleet = in_turns(start, scenario(3000.0), run, "--no-recording")
-    fleet.says("in place")
+    fleet = lockstep(start, scenario(3000.0), run, "--no-recording")
+    fleet.wait_for_output("in place")
     os.kill(pids(run)["agent-2"], signal.SIGKILL)
     assert fleet.status(15.0) == 1
     assert "agent-2 was killed by signal 9, " in summary_of(run)["reason"]
-    assert "the run ends here" in fleet.text
+    assert " s (not scheduled); the run ends\n" in fleet.text
     assert "fail (agent-2 was killed by signal 9" in fleet.text
 
 
-def test_a_medium_that_dies_ends_the_run_with_a_line(
+def test_a_medium_that_dies_ends_the_run_with_a_message(
     start: Start, scenario: Write, run: Path
 ) -> None:
-    fleet = in_turns(start, scenario(3000.0), run, "--no-recording", "--shards", "2")
-    fleet.says("in place")
+    fleet = lockstep(start, scenario(3000.0), run, "--no-recording", "--shards", "2")
+    fleet.wait_for_output("in place")
     os.kill(pids(run)["netem-1"], signal.SIGKILL)
     assert fleet.status(15.0) == 1
     assert summary_of(run)["reason"] == "netem-1 was killed by signal 9"
@@ -137,36 +137,36 @@ def test_a_medium_that_dies_ends_the_run_with_a_line(
 @pytest.mark.parametrize(
     ("stopped", "awaited"), [("agent-2", "agent-2's command of slot"), ("netem", "")]
 )
-def test_whom_a_run_in_turns_waits_for_is_told_once(
+def test_a_stalled_run_reports_once_what_it_waits_for(
     start: Start, scenario: Write, run: Path, stopped: str, awaited: str
 ) -> None:
-    fleet = in_turns(start, scenario(3000.0), run, "--no-recording")
-    fleet.says("in place")
+    fleet = lockstep(start, scenario(3000.0), run, "--no-recording")
+    fleet.wait_for_output("in place")
     pid = pids(run)[stopped]
     os.kill(pid, signal.SIGSTOP)
-    fleet.says(f"standing still, waiting for {awaited}", within_s=10.0)
-    fleet.says(f"; stopped: {stopped}\n")
+    fleet.wait_for_output(f"stalled: waiting for {awaited}", within_s=10.0)
+    fleet.wait_for_output(f"; stopped: {stopped}\n")
     os.kill(pid, signal.SIGCONT)
-    flown = fleet.text.count(" of 3000 s")
-    eventually(lambda: fleet.text.count(" of 3000 s") > flown, 10.0)
+    reports = fleet.text.count(" of 3000 s")
+    eventually(lambda: fleet.text.count(" of 3000 s") > reports, 10.0)
     fleet.kill_group(signal.SIGINT)
     assert fleet.status(10.0) == 130, fleet.text
-    assert fleet.text.count("standing still") == 1
+    assert fleet.text.count("stalled: ") == 1
 
 
-def test_ctrl_c_ends_a_run_in_turns_as_any_other(start: Start, scenario: Write, run: Path) -> None:
-    fleet = in_turns(start, scenario(3000.0), run, "--no-recording")
-    fleet.says("in place")
+def test_ctrl_c_ends_a_lockstep_run(start: Start, scenario: Write, run: Path) -> None:
+    fleet = lockstep(start, scenario(3000.0), run, "--no-recording")
+    fleet.wait_for_output("in place")
     fleet.kill_group(signal.SIGINT)
     assert fleet.status(10.0) == 130, fleet.text
     assert summary_of(run)["outcome"] == "inconclusive"
 
 
-def test_what_does_not_go_together_is_one_line(start: Start, scenario: Write, run: Path) -> None:
-    hasty = in_turns(start, scenario(6.0), run, "--speed", "2")
-    assert hasty.status(10.0) == 2
-    assert "--speed: not beside --lockstep" in hasty.text
-    loose = start(*QSWARM, "run", scenario(6.0), "--shards", "2", "--out", str(run))
-    assert loose.status(10.0) == 2
-    assert "--shards: needs --lockstep" in loose.text
+def test_contradicting_options_are_one_line(start: Start, scenario: Write, run: Path) -> None:
+    fast = lockstep(start, scenario(6.0), run, "--speed", "2")
+    assert fast.status(10.0) == 2
+    assert "--speed: not beside --lockstep" in fast.text
+    sharded = start(*QSWARM, "run", scenario(6.0), "--shards", "2", "--out", str(run))
+    assert sharded.status(10.0) == 2
+    assert "--shards: needs --lockstep" in sharded.text
     assert not run.exists()

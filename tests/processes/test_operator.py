@@ -1,4 +1,4 @@
-"""An operator at a running fleet: missions, faults and the radio by command."""
+"""An operator's commands to a running fleet: missions, faults and changes of the radio."""
 
 import json
 from collections.abc import Callable
@@ -19,43 +19,43 @@ queue = [{ name = "Q1", vertices = ["V1"], shape = { kind = "ray", direction = [
 """
 
 
-def test_a_flying_fleet_does_what_it_is_told_and_refuses_what_cannot_be(
+def test_a_running_fleet_carries_out_commands_and_refuses_impossible_ones(
     start: Start, scenario: Callable[[float], str], tmp_path: Path
 ) -> None:
     run = tmp_path / "run"
     (tmp_path / "column.toml").write_text(COLUMN)
     options = ("--out", str(run), "--no-recording", "--speed", "2")
     fleet = start(*QSWARM, "run", scenario(40.0), *options)
-    fleet.says("in place 4/4")
+    fleet.wait_for_output("in place 4/4")
 
-    def told(*words: str) -> tuple[int, str]:
-        command, *rest = words
-        operator = start(*QSWARM, command, str(run), *rest)
+    def command(*words: str) -> tuple[int, str]:
+        verb, *rest = words
+        operator = start(*QSWARM, verb, str(run), *rest)
         return operator.status(15.0), operator.text
 
-    assert told("fault", "kill", "7") == (
+    assert command("fault", "kill", "7") == (
         2,
         f"{run}: refused: kill[0]: no agent 7; 0 to 3 by then\n",
     )
-    assert told("netem", "set", "loss_percent=101")[0] == 2
-    assert told("netem", "set", "loss_percent=20", "--for", "2")[0] == 0
-    status, said = told("mission", "column.toml", "--to", "2")
-    assert (status, "formation agent 2: formation column" in said) == (0, True)
-    assert told("fault", "kill", "3", "--for", "1")[0] == 0
-    assert told("netem", "jam", "centre_m=[9,9,9]", "radius_m=0.5", "--for", "8")[0] == 0
-    shown = told("netem", "show")[1]
+    assert command("netem", "set", "loss_percent=101")[0] == 2
+    assert command("netem", "set", "loss_percent=20", "--for", "2")[0] == 0
+    status, output = command("mission", "column.toml", "--to", "2")
+    assert (status, "formation agent 2: formation column" in output) == (0, True)
+    assert command("fault", "kill", "3", "--for", "1")[0] == 0
+    assert command("netem", "jam", "centre_m=[9,9,9]", "radius_m=0.5", "--for", "8")[0] == 0
+    shown = command("netem", "show")[1]
     assert "range_m = 6" in shown
     assert "not parted, 1 jam" in shown
     assert "radius_m = 0.5" in shown
     paused = pids(run)["agent-1"]
-    assert told("fault", "pause", "1")[0] == 0
+    assert command("fault", "pause", "1")[0] == 0
     eventually(lambda: state(paused) == "T", 5.0, lambda: state(paused))
-    assert told("fault", "resume", "all")[0] == 0
+    assert command("fault", "resume", "all")[0] == 0
     eventually(lambda: state(paused) in "RS", 5.0, lambda: state(paused))
 
     def converged() -> bool:
-        back = any(event["kind"] == "restart" for event in events_of(run))
-        return back and fleet.text.rstrip().splitlines()[-1].count("in place 4/4") == 1
+        restarted = any(event["kind"] == "restart" for event in events_of(run))
+        return restarted and fleet.text.rstrip().splitlines()[-1].count("in place 4/4") == 1
 
     eventually(converged, 25.0, lambda: fleet.text)
     assert fleet.status(50.0) in (0, 1), fleet.text
@@ -66,12 +66,12 @@ def test_a_flying_fleet_does_what_it_is_told_and_refuses_what_cannot_be(
     assert by_operator == ["netem", "formation", "kill", "jam", "pause", "resume"]
 
 
-def test_of_a_fleet_by_hand_the_radio_is_changed_and_no_process(
+def test_in_a_fleet_started_by_hand_only_the_radio_can_be_changed(
     start: Start, scenario: Callable[[float], str], tmp_path: Path
 ) -> None:
     run = tmp_path / "run"
     fleet = start("bash", str(REPOSITORY / "deploy/by-hand.sh"), scenario(15.0), str(run))
-    fleet.says("in place 4/4")
+    fleet.wait_for_output("in place 4/4")
     refused = start(*QSWARM, "fault", str(run), "kill", "2")
     assert refused.status(15.0) == 2
     assert refused.text == f"{run}: refused: kill: this fleet has no launcher; do it by hand\n"

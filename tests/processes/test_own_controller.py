@@ -1,4 +1,4 @@
-"""Other controllers than the Q-structure, in fleets of real processes."""
+"""Controllers other than the Q-structure, in fleets of real processes."""
 
 import json
 from collections.abc import Callable
@@ -13,11 +13,11 @@ pytestmark = pytest.mark.processes
 Start = Callable[..., Started]
 
 FLOCKING = str(Path(__file__).parents[2] / "deploy" / "scenarios" / "flocking-9.toml")
-FALLS = """
+FAILS = """
 from agent.guidance.flocking import Flocking
 
 
-class Falls(Flocking):
+class Fails(Flocking):
     def __init__(self, setup):
         super().__init__(setup)
         self._id = setup.id
@@ -29,13 +29,13 @@ class Falls(Flocking):
 """
 
 
-def flown(start: Start, run: Path, *options: str) -> Started:
+def launched(start: Start, run: Path, *options: str) -> Started:
     return start(*QSWARM, "run", FLOCKING, "--no-recording", "--out", str(run), *options)
 
 
-def test_a_flock_of_processes_keeps_apart(start: Start, tmp_path: Path) -> None:
+def test_a_flock_of_processes_keeps_its_separation(start: Start, tmp_path: Path) -> None:
     run = tmp_path / "run"
-    fleet = flown(start, run, "--duration", "6", "--speed", "2")
+    fleet = launched(start, run, "--duration", "6", "--speed", "2")
     assert fleet.status(40.0) == 0, fleet.text
     summary = json.loads((run / "summary.json").read_text())
     assert (summary["outcome"], summary["mode"]) == ("pass", "processes")
@@ -43,14 +43,13 @@ def test_a_flock_of_processes_keeps_apart(start: Start, tmp_path: Path) -> None:
     assert summary["min_separation_m"] >= 0.25
 
 
-def test_a_controller_that_fails_is_named_and_its_vehicle_hovers(
-    start: Start, tmp_path: Path
-) -> None:
-    (tmp_path / "weak.py").write_text(FALLS)
+def test_a_failing_controller_is_named_and_its_vehicle_hovers(start: Start, tmp_path: Path) -> None:
+    (tmp_path / "weak.py").write_text(FAILS)
     run = tmp_path / "run"
-    fleet = flown(start, run, "--duration", "3", "--set", "control.controller=weak:Falls")
+    fleet = launched(start, run, "--duration", "3", "--set", "control.controller=weak:Fails")
     assert fleet.status(40.0) == 0, fleet.text
-    assert "controller 'weak:Falls' of agent 2 failed at 1.0" in fleet.text
+    assert "controller 'weak:Fails' of agent 2 failed at 1.0" in fleet.text
     assert "LookupError: no wind" in fleet.text
+    assert "(not scheduled); its vehicle stops and hovers" in fleet.text
     kills = [json.loads(line) for line in (run / "events.jsonl").read_text().splitlines()]
     assert [(kill["kind"], kill["agent"], kill["status"]) for kill in kills] == [("kill", 2, 1)]

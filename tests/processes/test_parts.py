@@ -1,4 +1,4 @@
-"""The parts started by hand: what stands in their way is one line and status 2."""
+"""The processes started by hand: a start that fails is one line and status 2."""
 
 import json
 import sys
@@ -22,15 +22,15 @@ PYTHON = [sys.executable, "-m"]
 REPOSITORY = Path(__file__).parents[2]
 
 
-def test_without_a_router_agent_and_world_say_so_within_ten_seconds(
+def test_without_a_router_agent_and_world_fail_within_ten_seconds(
     start: Start, scenario: Callable[[float], str], endpoint: str, tmp_path: Path
 ) -> None:
     agent = start(*PYTHON, "agent", "--id", "0", "--run", "lonely", "--connect", endpoint)
     out = tmp_path / "run"
     world = start(*PYTHON, "worldsim", scenario(6.0), "--connect", endpoint, "--out", str(out))
-    said = f"no router answers at {endpoint} within 8 s"
-    assert (agent.status(10.0), agent.text) == (2, f"agent-0: {said}\n")
-    assert (world.status(10.0), world.text) == (2, f"world: {said}\n")
+    error = f"no router answers at {endpoint} within 8 s"
+    assert (agent.status(10.0), agent.text) == (2, f"agent-0: {error}\n")
+    assert (world.status(10.0), world.text) == (2, f"world: {error}\n")
     assert not out.exists()
 
 
@@ -41,11 +41,11 @@ def test_a_port_in_use_is_one_line(start: Start, endpoint: str) -> None:
     assert netem.text == f"netem: {endpoint}: the port is in use\n"
 
 
-def test_netem_serves_the_run_that_asks_first_and_refuses_a_second(
+def test_netem_serves_the_first_run_that_asks_and_refuses_a_second(
     start: Start, endpoint: str
 ) -> None:
     netem = start(*PYTHON, "netem", "--listen", endpoint)
-    netem.says("netem listens at")
+    netem.wait_for_output("netem listens at")
     question = msgspec.json.encode(MediumSetup(1, 2, 4, 80.0, Conditions()))
     with open_client(endpoint) as session:
         first, second = Bus(session, Keys("first")), Bus(session, Keys("second"))
@@ -57,9 +57,9 @@ def test_netem_serves_the_run_that_asks_first_and_refuses_a_second(
         assert netem.status(5.0) == 0, netem.text
 
 
-def test_netem_refuses_conditions_that_make_no_sense(start: Start, endpoint: str) -> None:
+def test_netem_refuses_invalid_conditions(start: Start, endpoint: str) -> None:
     netem = start(*PYTHON, "netem", "--listen", endpoint)
-    netem.says("netem listens at")
+    netem.wait_for_output("netem listens at")
     with open_client(endpoint) as session, pytest.raises(RefusedError, match="conditions: "):
         Bus(session, Keys("odd")).query("medium", None, b'{"seed": -1}', timeout_s=5.0)
 
@@ -73,7 +73,7 @@ def test_a_fleet_started_by_a_shell_loop_passes(
     assert "outcome: pass" in fleet.text
 
 
-def test_a_shell_loop_refuses_what_cannot_fly_and_tells_no_older_run(
+def test_a_shell_loop_refuses_bad_input_and_reports_no_earlier_run(
     start: Start, scenario: Callable[[float], str], tmp_path: Path
 ) -> None:
     by_hand = ("bash", str(REPOSITORY / "deploy/by-hand.sh"))
@@ -87,7 +87,7 @@ def test_a_shell_loop_refuses_what_cannot_fly_and_tells_no_older_run(
     assert "outcome" not in late.text
 
 
-def test_a_shell_loop_flies_through_no_other_netem(
+def test_a_shell_loop_does_not_use_the_netem_of_another_fleet(
     start: Start,
     scenario: Callable[[float], str],
     endpoint: str,
@@ -95,7 +95,7 @@ def test_a_shell_loop_flies_through_no_other_netem(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     other = start(*PYTHON, "netem", "--listen", endpoint)
-    other.says("netem listens at")
+    other.wait_for_output("netem listens at")
     monkeypatch.setenv("QSWARM_PORT", endpoint.rpartition(":")[2])
     out = tmp_path / "run"
     fleet = start("bash", str(REPOSITORY / "deploy/by-hand.sh"), scenario(8.0), str(out))
@@ -106,15 +106,15 @@ def test_a_shell_loop_flies_through_no_other_netem(
     assert "serves" not in other.text
 
 
-def test_netem_that_nobody_asked_ends_when_told_to(start: Start, endpoint: str) -> None:
+def test_netem_without_a_run_ends_on_sigterm(start: Start, endpoint: str) -> None:
     netem = start(*PYTHON, "netem", "--listen", endpoint)
-    netem.says("netem listens at")
+    netem.wait_for_output("netem listens at")
     netem.process.terminate()
     assert netem.status(5.0) == 0
 
 
 @pytest.mark.parametrize(
-    ("listen", "said"),
+    ("listen", "reason"),
     [
         ("tcp/0.0.0.0:7447", "not a loopback address"),
         ("tcp/192.168.1.2:7447", "not a loopback address"),
@@ -126,8 +126,8 @@ def test_netem_that_nobody_asked_ends_when_told_to(start: Start, endpoint: str) 
         ("", "not an endpoint"),
     ],
 )
-def test_a_router_listens_on_loopback_only(listen: str, said: str) -> None:
-    with pytest.raises(SessionError, match=said) as refusal:
+def test_a_router_listens_on_loopback_only(listen: str, reason: str) -> None:
+    with pytest.raises(SessionError, match=reason) as refusal:
         open_router(listen)
     assert "\n" not in str(refusal.value)
 

@@ -1,4 +1,4 @@
-"""The timeline on real processes: who dies, comes back, joins, pauses; what the radio does."""
+"""The timeline on real processes: kills, restarts, joins, leaves and pauses; radio faults."""
 
 import json
 from collections.abc import Callable
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.processes
 
 Start = Callable[..., Started]
 Write = Callable[..., str]
-UPON = ("kill", "leave", "join", "restart", "pause", "resume", "late")
+PROCESS_EVENTS = ("kill", "leave", "join", "restart", "pause", "resume", "late")
 
 
 @pytest.fixture
@@ -25,14 +25,14 @@ def run(tmp_path: Path) -> Path:
 def timeline(scenario: Callable[[float], str]) -> Write:
     def write(duration_s: float, *events: str) -> str:
         path = Path(scenario(duration_s))
-        told = "".join(f"\n[[event]]\n{event}\n" for event in events)
-        path.write_text(path.read_text().replace("agents = 4", "agents = 4\nboot_s = 0.5") + told)
+        tables = "".join(f"\n[[event]]\n{event}\n" for event in events)
+        path.write_text(path.read_text().replace("agents = 4", "agents = 4\nboot_s = 0.5") + tables)
         return str(path)
 
     return write
 
 
-def flown(start: Start, scenario: str, run: Path) -> dict[str, Any]:
+def summary_after(start: Start, scenario: str, run: Path) -> dict[str, Any]:
     fleet = start(*QSWARM, "run", scenario, "--out", str(run), "--no-recording", "--speed", "2")
     assert fleet.status(40.0) in (0, 1), fleet.text
     summary: dict[str, Any] = json.loads((run / "summary.json").read_text())
@@ -41,17 +41,17 @@ def flown(start: Start, scenario: str, run: Path) -> dict[str, Any]:
     return summary
 
 
-def upon(run: Path) -> list[tuple[float, str, int, bool]]:
+def process_events(run: Path) -> list[tuple[float, str, int, bool]]:
     return [
         (event["t_s"], event["kind"], event["agent"], event["planned"])
         for event in events_of(run)
-        if event["kind"] in UPON
+        if event["kind"] in PROCESS_EVENTS
     ]
 
 
-def test_the_killed_come_back_as_new_processes(start: Start, timeline: Write, run: Path) -> None:
-    summary = flown(start, timeline(14.0, "at_s = 6\nkill = [1, 2]\nfor_s = 1.5"), run)
-    assert upon(run) == [
+def test_killed_agents_restart_as_new_processes(start: Start, timeline: Write, run: Path) -> None:
+    summary = summary_after(start, timeline(14.0, "at_s = 6\nkill = [1, 2]\nfor_s = 1.5"), run)
+    assert process_events(run) == [
         (6.0, "kill", 1, True),
         (6.0, "kill", 2, True),
         (7.5, "restart", 1, True),
@@ -60,15 +60,17 @@ def test_the_killed_come_back_as_new_processes(start: Start, timeline: Write, ru
     assert (run / "logs/agent-1.log").read_text().count("flies in run") == 2
     assert [recovery["kind"] for recovery in summary["recoveries"]] == ["kill", "restart"]
     assert summary["recoveries"][1]["reformed_s"] is not None
-    back = [e for e in events_of(run) if e["kind"] == "slot" and e["agent"] == 1 and e["t_s"] > 7.5]
-    assert back[0]["t_s"] >= 8.0
+    claims = [
+        e for e in events_of(run) if e["kind"] == "slot" and e["agent"] == 1 and e["t_s"] > 7.5
+    ]
+    assert claims[0]["t_s"] >= 8.0
 
 
-def test_some_join_and_some_leave(start: Start, timeline: Write, run: Path) -> None:
+def test_agents_join_and_leave(start: Start, timeline: Write, run: Path) -> None:
     places = "{ kind = 'list', positions_m = [[-4.2, 0.3, 0], [-5.1, 0, 0]] }"
     joins = f"at_s = 5\njoin = {{ count = 2, start = {places} }}"
-    summary = flown(start, timeline(18.0, joins, "at_s = 10\nleave = [0, 3]"), run)
-    assert upon(run) == [
+    summary = summary_after(start, timeline(18.0, joins, "at_s = 10\nleave = [0, 3]"), run)
+    assert process_events(run) == [
         (5.0, "join", 4, True),
         (5.0, "join", 5, True),
         (10.0, "leave", 0, True),
@@ -78,20 +80,20 @@ def test_some_join_and_some_leave(start: Start, timeline: Write, run: Path) -> N
     assert [recovery["reformed_s"] is not None for recovery in summary["recoveries"]] == [True] * 2
 
 
-def test_the_paused_hover_and_go_on(start: Start, timeline: Write, run: Path) -> None:
-    summary = flown(start, timeline(14.0, "at_s = 5\npause = [1]\nfor_s = 3"), run)
-    assert upon(run) == [(5.0, "pause", 1, True), (8.0, "resume", 1, True)]
+def test_a_paused_agent_is_silent_and_continues(start: Start, timeline: Write, run: Path) -> None:
+    summary = summary_after(start, timeline(14.0, "at_s = 5\npause = [1]\nfor_s = 3"), run)
+    assert process_events(run) == [(5.0, "pause", 1, True), (8.0, "resume", 1, True)]
     assert not [e for e in events_of(run) if e["agent"] == 1 and 5.0 < e["t_s"] < 8.0]
     assert [recovery["reformed_s"] is not None for recovery in summary["recoveries"]] == [True] * 2
     assert (run / "logs/agent-1.log").read_text().count("flies in run") == 1
 
 
-def test_the_radio_is_parted_healed_and_made_worse(
+def test_the_radio_is_partitioned_healed_and_degraded(
     start: Start, timeline: Write, run: Path
 ) -> None:
-    parted = "at_s = 2\npartition = [[0, 1]]\nfor_s = 1"
-    worse = "at_s = 4\nnetem = { loss_percent = 60 }\nfor_s = 1"
-    packets = flown(start, timeline(6.0, parted, worse), run)["packets"]
+    partition = "at_s = 2\npartition = [[0, 1]]\nfor_s = 1"
+    degraded = "at_s = 4\nnetem = { loss_percent = 60 }\nfor_s = 1"
+    packets = summary_after(start, timeline(6.0, partition, degraded), run)["packets"]
     # 4 agents send 20 frames a second: 2 * 2 of 4 * 3 links are cut each way.
     assert 0.8 < packets["dropped_partition"] / (8 * 22) < 1.2
     assert 0.6 < packets["dropped_loss"] / (12 * 22 * 0.6) < 1.4
@@ -111,6 +113,8 @@ def test_by_hand_process_faults_are_refused_at_the_start(
     python = QSWARM[0]
     world = start(python, "-m", "worldsim", scenario, "--connect", endpoint, "--out", str(run))
     assert world.status(10.0) == 2
-    said = "event[1].kill: needs the launcher (qswarm run): who is started by hand is ended by hand"
-    assert world.text == f"world: {scenario}: {said}\n"
+    error = (
+        "event[1].kill: needs the launcher (qswarm run): who is started by hand is ended by hand"
+    )
+    assert world.text == f"world: {scenario}: {error}\n"
     assert not run.exists()

@@ -90,7 +90,7 @@ def run(
     """Fly a fleet of real processes: netem, world and one for each agent, over Zenoh."""
     from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
     from worldsim.fleet.launcher import run as fly_processes
-    from worldsim.fleet.process import Terms
+    from worldsim.fleet.process import RunOptions
     from worldsim.results.run_folder import RunDirectory
 
     if not isfinite(speed):
@@ -100,8 +100,8 @@ def run(
     command_ticks = VIRTUAL_COMMAND_TICKS if lockstep else PROCESS_COMMAND_TICKS
     admitted = _admitted(scenario, overrides, command_ticks)
     directory = RunDirectory.create(out, admitted)
-    terms = Terms(admitted.name, speed, not no_recording, lockstep, shards)
-    return fly_processes(admitted, directory, terms)
+    options = RunOptions(admitted.name, speed, not no_recording, lockstep, shards)
+    return fly_processes(admitted, directory, options)
 
 
 @app.command(

@@ -1,1 +1,1 @@
-"""A fleet of real processes: launching, conducting and watching them."""
+"""A fleet of real processes: launched, driven slot by slot, and monitored."""

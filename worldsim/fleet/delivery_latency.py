@@ -1,13 +1,14 @@
-"""How late frames came, from what the agents count: the last word of each process, and the sum.
+"""How late frames arrived at the agents: the last counts of each process, and their distribution.
 
-An agent's word is its own, and no more: one that contradicts itself, counts backwards, or speaks
-for a process that is not the agent's present one, is refused; one that counts more frames than the
-radio delivered to everybody is left out.
+An agent's counts are its own claim. Counts are rejected when they contradict each other, decrease,
+or belong to another process than the agent's current one; an agent that counts more frames than the
+radio delivered in total is left out.
 """
 
 from collections.abc import Sequence
 from itertools import accumulate
-from typing import Any
+
+import msgspec
 
 from netem.wire.channels import CHANNELS
 from netem.wire.frame import WireError
@@ -17,71 +18,95 @@ PERCENTILES = (1, 5, 50, 95, 99)
 Counts = Sequence[int]
 
 
-class ArrivalBook:
-    """What agents told of frames that came; slots_per_tick and slot_s [s] as in the run's clock."""
+class ChannelLatency(msgspec.Struct, frozen=True):
+    """The extra delay of one channel's frames, in summary.json's keys."""
+
+    frames: int
+    within_fraction: float  # share of frames within ``bound_ms``
+    excess_ms: dict[str, float]  # percentiles "p1" to "p99", and "max" [ms]
+
+
+class DeliveryLatency(msgspec.Struct, frozen=True):
+    """The extra delay of all frames, in summary.json's keys."""
+
+    bound_ms: float  # one slot and one tick [ms]
+    frames: int
+    within_fraction: float  # share of frames within ``bound_ms``
+    excess_ms: dict[str, float]  # percentiles "p1" to "p99", and "max" [ms]
+    channels: dict[str, ChannelLatency | None]  # by name; None without a frame
+
+
+class LatencyCollector:
+    """Collects the agents' counts of arrived frames by their extra delay.
+
+    slots_per_tick and slot_s [s] are those of the run's clock.
+    """
 
     def __init__(self, slots_per_tick: int, slot_s: float) -> None:
         self._bound_bins = (1 + slots_per_tick) * BINS_PER_SLOT
         self._slot_s = slot_s
         self._bin_ms = 1e3 * slot_s / BINS_PER_SLOT
-        self._told: dict[tuple[int, int], LatencyReport] = {}
+        self._latest: dict[tuple[int, int], LatencyReport] = {}  # by agent and incarnation
 
-    def take(self, agent: int, incarnation: int, data: bytes, now_s: float) -> None:
-        """Take what an agent told of itself by ``now_s`` [s].
+    def add(self, agent: int, incarnation: int, data: bytes, now_s: float) -> None:
+        """Take the encoded counts of an agent's current process at simulated time ``now_s`` [s].
 
-        Raises WireError where it is not to be believed.
+        Raises WireError when they do not decode or are not plausible.
         """
-        told = unpack_report(data)
-        if max(told.max_us) > 1e6 * now_s or not self._consistent(told):
-            raise WireError("an excess that none of its frames can have")
-        if told.incarnation != incarnation:
-            raise WireError(f"of incarnation {told.incarnation}, where {incarnation} flies")
-        before = self._told.get((agent, incarnation))
-        if before is not None and _backwards(before, told):
-            raise WireError("it counts backwards")
-        self._told[agent, incarnation] = told
+        report = unpack_report(data)
+        if max(report.max_us) > 1e6 * now_s or not self._consistent(report):
+            raise WireError("an extra delay that none of the counted frames can have")
+        if report.incarnation != incarnation:
+            raise WireError(f"of incarnation {report.incarnation}; {incarnation} is running")
+        previous = self._latest.get((agent, incarnation))
+        if previous is not None and _decreased(previous, report):
+            raise WireError("counts have decreased")
+        self._latest[agent, incarnation] = report
 
-    def summary(self, delivered: int) -> dict[str, Any] | None:
-        """Return the distribution as summary.json has it, None without a frame.
+    def summary(self, delivered: int) -> DeliveryLatency | None:
+        """Return the distribution over all agents, None without a frame.
 
-        delivered: how many frames the radio says it delivered at all.
+        delivered: number of frames that the radio delivered in total.
         """
-        told = [each for each in self._told.values() if _frames(each) <= delivered]
-        whole = self._distribution(told, range(len(CHANNELS)))
-        if whole is None:
+        counted = [each for each in self._latest.values() if _frames(each) <= delivered]
+        total = self._distribution(counted, range(len(CHANNELS)))
+        if total is None:
             return None
-        bound_ms = self._bound_bins * self._bin_ms
-        each = {name: self._distribution(told, [at]) for at, name in enumerate(CHANNELS)}
-        return {"bound_ms": bound_ms, **whole, "channels": each}
+        return DeliveryLatency(
+            self._bound_bins * self._bin_ms,
+            total.frames,
+            total.within_fraction,
+            total.excess_ms,
+            {name: self._distribution(counted, [at]) for at, name in enumerate(CHANNELS)},
+        )
 
-    def _consistent(self, told: LatencyReport) -> bool:
-        """Whether the greatest excess of each channel is where its last frames are."""
-        last = [max((at for at, n in enumerate(bins) if n), default=0) for bins in told.counts]
-        return last == [bin_of(max_us, self._slot_s) for max_us in told.max_us]
+    def _consistent(self, report: LatencyReport) -> bool:
+        """Return whether the greatest delay of each channel lies in its last bin with frames."""
+        last = [max((at for at, n in enumerate(bins) if n), default=0) for bins in report.counts]
+        return last == [bin_of(max_us, self._slot_s) for max_us in report.max_us]
 
     def _distribution(
-        self, told: Sequence[LatencyReport], channels: Sequence[int]
-    ) -> dict[str, Any] | None:
-        bins = [each.counts[at] for each in told for at in channels]
+        self, counted: Sequence[LatencyReport], channels: Sequence[int]
+    ) -> ChannelLatency | None:
+        bins = [each.counts[at] for each in counted for at in channels]
         counts = [sum(column) for column in zip(*bins, strict=True)]
         frames = sum(counts)
         if not frames:
             return None
-        most_ms = max(each.max_us[at] for each in told for at in channels) / 1000.0
+        most_ms = max(each.max_us[at] for each in counted for at in channels) / 1000.0
         excess_ms = {
             f"p{percent}": min(at * self._bin_ms, most_ms) if at < len(counts) - 1 else most_ms
             for percent in PERCENTILES
             for at in [quantile(counts, percent)]
         }
-        return {
-            "frames": frames,
-            "within_fraction": sum(counts[: self._bound_bins + 1]) / frames,
-            "excess_ms": {**excess_ms, "max": most_ms},
-        }
+        within = sum(counts[: self._bound_bins + 1]) / frames
+        return ChannelLatency(frames, within, {**excess_ms, "max": most_ms})
 
 
 def quantile(counts: Counts, percent: float) -> int:
-    """Return the bin at or below which so many percent of all counted lie; there is one at least.
+    """Return the bin of a percentile: the first at which so many percent are counted.
+
+    At least one count must not be zero.
 
     >>> quantile([0, 3, 0, 1], 50), quantile([0, 3, 0, 1], 99)
     (1, 3)
@@ -90,14 +115,16 @@ def quantile(counts: Counts, percent: float) -> int:
     return next(at for at, so_far in enumerate(accumulate(counts)) if so_far and so_far >= wanted)
 
 
-def _frames(told: LatencyReport) -> int:
-    return sum(map(sum, told.counts))
+def _frames(report: LatencyReport) -> int:
+    return sum(map(sum, report.counts))
 
 
-def _backwards(before: LatencyReport, now: LatencyReport) -> bool:
-    less = any(
-        one > other
-        for ones, others in zip(before.counts, now.counts, strict=True)
-        for one, other in zip(ones, others, strict=True)
+def _decreased(previous: LatencyReport, current: LatencyReport) -> bool:
+    fewer = any(
+        now < before
+        for befores, nows in zip(previous.counts, current.counts, strict=True)
+        for before, now in zip(befores, nows, strict=True)
     )
-    return less or any(a > b for a, b in zip(before.max_us, now.max_us, strict=True))
+    return fewer or any(
+        now < before for before, now in zip(previous.max_us, current.max_us, strict=True)
+    )

@@ -1,227 +1,247 @@
-"""What the world hears and says beside its topics: who is lost, when to stop, how far it is.
+"""The world's link to its launcher: exits, actions on processes, progress, stop requests.
 
-Under a launcher, deaths are what waitpid says, and the launcher shows progress. By hand, deaths
-are what liveliness hints at, and progress is printed.
+Under a launcher, exits are what waitpid reports, and the launcher shows progress. When processes
+are started by hand, exits are inferred from Zenoh liveliness, and progress is printed.
 """
 
 import select
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from math import inf
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, assert_never
 
-from worldsim.fleet.ipc import MessageSocket
+from worldsim.fleet.fork import ProcessExit
+from worldsim.fleet.ipc import (
+    ActionDone,
+    ActionRequest,
+    AgentExited,
+    AgentProcess,
+    MessageError,
+    ProcessAction,
+    ProcessesMissing,
+    Progress,
+    RunFailed,
+    RunOver,
+    Stalled,
+    ToWorld,
+    WorldToLauncher,
+    names_of,
+)
 
 PRINT_EVERY_S = 2.0
 
 
-class Loss(NamedTuple):
-    """An agent whose process is gone: by a signal, with a status, or nobody knows how.
-
-    incarnation: which of its processes; None where nobody counts them.
-    """
+class AgentExit(NamedTuple):
+    """The end of an agent's process."""
 
     agent: int
-    incarnation: int | None = None
-    signal: int | None = None
-    status: int | None = None
+    incarnation: int | None = None  # None: unknown, for processes started by hand
+    exit: ProcessExit = ProcessExit(None, None)  # unknown, for processes started by hand
 
     def __str__(self) -> str:
-        if self.signal is not None:
-            return f"agent-{self.agent} was killed by signal {self.signal}"
-        how = f" with status {self.status}" if self.status is not None else ""
-        return f"agent-{self.agent} ended{how}"
-
-
-class Progress(NamedTuple):
-    """How far a flight is. separation_m: the least so far; late: share of late ticks."""
-
-    time_s: float
-    duration_s: float
-    agents: int
-    in_place: int
-    separation_m: float | None
-    late: float | None
-
-    def __str__(self) -> str:
-        separation = "-" if self.separation_m is None else f"{self.separation_m:.2f} m"
-        late = "-" if self.late is None else f"{self.late:.1%}"
-        return (
-            f"{self.time_s:6.1f} of {self.duration_s:g} s   in place {self.in_place}/{self.agents}"
-            f"   least separation {separation}   late ticks {late}"
-        )
+        return f"agent-{self.agent} {self.exit}"
 
 
 class LauncherLink(Protocol):
-    """What a flight needs of whoever started it."""
+    """What the world needs of the launcher, or of its substitute when there is none."""
 
-    launches: bool
-    """Whether processes can be started and ended."""
+    controls_processes: bool
+    """Whether processes can be started, killed, paused and resumed."""
 
-    broken: str | None
-    """How a process ended of which there is one, or None."""
+    failure: str | None
+    """Why the run cannot go on (netem died, for instance), or None."""
 
     @property
-    def stopped(self) -> str | None:
-        """Why the flight must end now, or None."""
+    def stop_reason(self) -> str | None:
+        """Why the run must end now, or None."""
 
     def wait(self, left_s: float) -> None:
-        """Wait ``left_s`` [s], or less when there is news."""
+        """Wait ``left_s`` [s], or less when a message arrives."""
 
-    def losses(self) -> list[Loss]:
-        """Return whose process ended since the last call, planned or not."""
+    def agent_exits(self) -> list[AgentExit]:
+        """Return the agents' processes that ended since the last call, expected or not."""
 
-    def act(self, deed: str, whom: list[tuple[int, int]], after_s: float = 0.0) -> None:
-        """Ask for a deed on processes, (agent, incarnation) each: start, kill, pause or resume.
+    def request(
+        self,
+        action: ProcessAction,
+        processes: Sequence[AgentProcess],
+        after_s: float = 0.0,
+    ) -> None:
+        """Request an action on agents' processes; without processes do nothing.
 
-        after_s: how long a process that starts sleeps first [s].
+        A process that is started sleeps ``after_s`` [s] of wall time first.
         """
 
-    def has_done(self, deed: str, whom: list[tuple[int, int]]) -> bool:
-        """Whether a deed that was asked for has been done; it is told once."""
+    def has_done(self, action: ProcessAction, processes: Sequence[AgentProcess]) -> bool:
+        """Return whether a requested action has taken effect; True once for each request."""
 
-    def missing(self, names: list[str]) -> None:
-        """Say who is not there yet."""
+    def report_missing(self, names: Iterable[str]) -> None:
+        """Report which processes are missing at the start; no names: none is missing."""
 
-    def progress(self, progress: Progress) -> None:
-        """Say how far the flight is."""
+    def report_progress(self, progress: Progress) -> None:
+        """Report the state of the running fleet."""
 
-    def waiting(self, what: str) -> None:
-        """Say for what the flight has been standing still."""
+    def report_stall(self, waiting_for: str) -> None:
+        """Report that simulated time stands still, and what it waits for."""
 
-    def landing(self) -> None:
-        """Say that the run is over, before the others hear of it and end."""
+    def report_run_over(self) -> None:
+        """Report that the run is over, before the other processes learn of it and exit."""
 
 
-class Conducted:
-    """Under a launcher, at the other end of ``lines``."""
+class LaunchedLink:
+    """The link to a launcher over a socket."""
 
-    launches = True
+    controls_processes = True
 
-    def __init__(self, lines: MessageSocket) -> None:
-        self._lines = lines
-        self._losses: list[Loss] = []
-        self._done: list[tuple[str, list[list[int]]]] = []
-        self.broken: str | None = None
+    def __init__(self, launcher: WorldToLauncher) -> None:
+        self._launcher = launcher
+        self._exits: list[AgentExit] = []
+        self._done: list[ActionDone] = []
+        self.failure: str | None = None
 
     @property
-    def stopped(self) -> str | None:
-        """The launcher's end is the flight's, and that of a process of which there is one."""
-        return "the launcher is gone" if self._lines.closed else self.broken
+    def stop_reason(self) -> str | None:
+        """The run ends with the launcher, and with a failure that the launcher reports."""
+        return "the launcher is gone" if self._launcher.closed else self.failure
 
     def wait(self, left_s: float) -> None:
-        """Wait, but not longer than until the launcher says something."""
-        _wait([] if self._lines.closed else [self._lines], left_s)
-        self._hear()
+        """Wait ``left_s`` [s], or less when the launcher sends a message."""
+        if left_s > 0.0:
+            select.select([] if self._launcher.closed else [self._launcher], [], [], left_s)
+        self._receive()
 
-    def losses(self) -> list[Loss]:
-        """Return the exits that the launcher told."""
-        self._hear()
-        losses, self._losses = self._losses, []
-        return losses
+    def agent_exits(self) -> list[AgentExit]:
+        """Return the exits that the launcher reported since the last call."""
+        self._receive()
+        exits, self._exits = self._exits, []
+        return exits
 
-    def act(self, deed: str, whom: list[tuple[int, int]], after_s: float = 0.0) -> None:
-        """Ask the launcher for it."""
-        if whom:
-            self._lines.send(do=deed, whom=whom, after_s=after_s)
+    def request(
+        self,
+        action: ProcessAction,
+        processes: Sequence[AgentProcess],
+        after_s: float = 0.0,
+    ) -> None:
+        """Ask the launcher for an action."""
+        if processes:
+            self._launcher.send(ActionRequest(action, tuple(processes), after_s))
 
-    def has_done(self, deed: str, whom: list[tuple[int, int]]) -> bool:
-        """Whether the launcher's zygote has confirmed it."""
-        self._hear()
-        told = (deed, [list(who) for who in whom])
-        if told not in self._done:
+    def has_done(self, action: ProcessAction, processes: Sequence[AgentProcess]) -> bool:
+        """Return whether the zygote has acknowledged an action."""
+        self._receive()
+        done = ActionDone(action, tuple(processes))
+        if done not in self._done:
             return False
-        self._done.remove(told)
+        self._done.remove(done)
         return True
 
-    def missing(self, names: list[str]) -> None:
-        """Tell the launcher who is not there yet; an empty list when everybody is."""
-        self._lines.send(missing=names)
+    def report_missing(self, names: Iterable[str]) -> None:
+        """Tell the launcher which processes are missing."""
+        self._launcher.send(ProcessesMissing(tuple(names)))
 
-    def progress(self, progress: Progress) -> None:
-        """Tell the launcher how far the flight is."""
-        self._lines.offer(progress=progress._asdict())
+    def report_progress(self, progress: Progress) -> None:
+        """Send progress, unless the launcher has fallen behind in reading."""
+        self._launcher.offer(progress)
 
-    def waiting(self, what: str) -> None:
-        """Tell the launcher for what the flight stands still."""
-        self._lines.offer(waiting=what)
+    def report_stall(self, waiting_for: str) -> None:
+        """Send what the run waits for, unless the launcher has fallen behind in reading."""
+        self._launcher.offer(Stalled(waiting_for))
 
-    def landing(self) -> None:
-        """Tell the launcher that from now on everybody ends as planned."""
-        self._lines.send(landing=True)
+    def report_run_over(self) -> None:
+        """Tell the launcher that exits are expected from now on."""
+        self._launcher.send(RunOver())
 
-    def _hear(self) -> None:
-        for line in self._lines.receive():
-            if "lost" in line:
-                self._losses.append(Loss(*line["lost"]))
-            elif "done" in line:
-                self._done.append((line["done"], line["whom"]))
-            else:
-                self.broken = line["broken"]
+    def _receive(self) -> None:
+        try:
+            for message in self._launcher.receive():
+                self._handle(message)
+        except MessageError as error:
+            self.failure = str(error)
+
+    def _handle(self, message: ToWorld) -> None:
+        match message:
+            case AgentExited(process=process, exit=process_exit):
+                self._exits.append(AgentExit(process.agent, process.incarnation, process_exit))
+            case ActionDone():
+                self._done.append(message)
+            case RunFailed(reason=reason):
+                self.failure = reason
+            case _:
+                assert_never(message)
 
 
-class ByHand:
-    """Without a launcher; ``gone`` tells which names stopped showing signs of life."""
+class ManualLink:
+    """The substitute for a link when processes are started by hand.
 
-    launches = False
+    ``vanished`` returns the names of the processes whose liveliness ended since its last call.
+    """
 
-    def __init__(self, gone: Callable[[], list[str]]) -> None:
-        self.stopped: str | None = None
-        self.broken: str | None = None
-        self._gone = gone
+    controls_processes = False
+
+    def __init__(self, vanished: Callable[[], list[str]]) -> None:
+        self.stop_reason: str | None = None
+        self.failure: str | None = None
+        self._vanished = vanished
         self._print_at_s = -inf
 
     def wait(self, left_s: float) -> None:
-        """Wait; there is never news."""
-        _wait([], left_s)
+        """Wait ``left_s`` [s]; no message ever arrives."""
+        if left_s > 0.0:
+            time.sleep(left_s)
 
-    def losses(self) -> list[Loss]:
-        """Return the agents that went; when the medium went, everybody seems to have: stop."""
-        gone = self._gone()
-        if "netem" in gone:
-            self.stopped = "netem is gone"
+    def agent_exits(self) -> list[AgentExit]:
+        """Return the agents that vanished.
+
+        When netem, the router, vanished too, every process seems to have: then only stop the run.
+        """
+        vanished = self._vanished()
+        if "netem" in vanished:
+            self.stop_reason = "netem is gone"
             return []
-        agents = [int(name.removeprefix("agent-")) for name in gone if name.startswith("agent-")]
+        agents = [int(n.removeprefix("agent-")) for n in vanished if n.startswith("agent-")]
         for agent in agents:
             print(f"agent-{agent} is gone", flush=True)
-        return [Loss(agent) for agent in agents]
+        return [AgentExit(agent) for agent in agents]
 
-    def act(self, deed: str, whom: list[tuple[int, int]], after_s: float = 0.0) -> None:
-        """Refuse: what was started by hand is stopped by hand. Raises LookupError."""
-        raise LookupError(f"nobody can {deed} {whom}: these processes were started by hand")
+    def request(
+        self,
+        action: ProcessAction,
+        processes: Sequence[AgentProcess],
+        after_s: float = 0.0,
+    ) -> None:
+        """Refuse: a process that was started by hand is ended by hand. Raises LookupError."""
+        raise LookupError(
+            f"cannot {action} {names_of(processes)}: these processes were started by hand"
+        )
 
-    def has_done(self, deed: str, whom: list[tuple[int, int]]) -> bool:
-        """Refuse: nothing was asked for. Raises LookupError."""
-        raise LookupError(f"nobody was asked to {deed} {whom}")
+    def has_done(self, action: ProcessAction, processes: Sequence[AgentProcess]) -> bool:
+        """Refuse: no action was accepted. Raises LookupError."""
+        raise LookupError(f"no request to {action} {names_of(processes)} was accepted")
 
-    def missing(self, names: list[str]) -> None:
-        """Print who is not there yet, every two seconds."""
-        if not names:
-            print("everybody is there", flush=True)
-        elif self._due():
-            print(f"waiting for {', '.join(names)}", flush=True)
+    def report_missing(self, names: Iterable[str]) -> None:
+        """Print which processes are missing, at most every two seconds."""
+        missing = ", ".join(names)
+        if not missing:
+            print("all processes are present", flush=True)
+        elif self._print_is_due():
+            print(f"waiting for {missing}", flush=True)
 
-    def progress(self, progress: Progress) -> None:
-        """Print how far the flight is, every two seconds."""
-        if self._due():
+    def report_progress(self, progress: Progress) -> None:
+        """Print progress, at most every two seconds."""
+        if self._print_is_due():
             print(progress, flush=True)
 
-    def waiting(self, what: str) -> None:
-        """Print for what the flight stands still."""
-        print(f"waiting for {what}", flush=True)
+    def report_stall(self, waiting_for: str) -> None:
+        """Print what the run waits for."""
+        print(f"stalled: waiting for {waiting_for}", flush=True)
 
-    def landing(self) -> None:
-        """Print what is ahead: the end."""
+    def report_run_over(self) -> None:
+        """Print that the run is over."""
         print("world: the run is over", flush=True)
 
-    def _due(self) -> bool:
+    def _print_is_due(self) -> bool:
         now_s = time.monotonic()
         due = now_s >= self._print_at_s
         if due:
             self._print_at_s = now_s + PRINT_EVERY_S
         return due
-
-
-def _wait(news: list[MessageSocket], left_s: float) -> None:
-    if left_s > 0.0:
-        select.select(news, [], [], left_s)

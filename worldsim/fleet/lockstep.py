@@ -1,8 +1,8 @@
-"""A fleet of real processes in lockstep: simulated time stands still until everybody has spoken.
+"""A fleet of real processes in lockstep: simulated time waits for every process.
 
-Each slot: what is due is done, and has happened; the turn goes to the mediums and an observation to
-each agent that steps; every command and every medium's word come back; the vehicles fly. Whatever
-the host's speed or load, the run is the one of virtual time.
+In each slot the due operations are carried out and confirmed; a turn is sent to each medium and an
+observation to each agent that steps; when every agent's command and every medium's answer have
+arrived, the vehicles move. Whatever the host's speed and load, the run equals that of virtual time.
 """
 
 import time
@@ -38,23 +38,24 @@ from worldsim.engine.operations import (
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
 from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
 from worldsim.fleet.control import Control, Reception
+from worldsim.fleet.ipc import AgentProcess, ProcessAction, names_of
 from worldsim.fleet.launcher_link import LauncherLink
-from worldsim.fleet.progress import ProgressReporter, Standstill
+from worldsim.fleet.progress import ProgressReporter, StallReporter
 from worldsim.fleet.startup import Startup
 from worldsim.judge.run_events import By
 from worldsim.judge.tick import Packets
 from worldsim.scenario.tables import Scenario
 
-DONE_LOOK_EVERY_S = 0.02
+DONE_POLL_S = 0.02
 
 
 class LockstepFleet:
-    """A fleet in the air, everybody waiting for everybody."""
+    """A fleet whose processes wait for each other in every slot."""
 
     late_fraction: float | None = None
     delivery: None = None
-    refused: Mapping[str, int] = {}
-    """Nothing: what the world would refuse ends the run."""
+    rejected: Mapping[str, int] = {}
+    """Always empty: a message that the world rejects ends the run."""
 
     def __init__(
         self,
@@ -75,9 +76,9 @@ class LockstepFleet:
         self.begun = self._landed = False
         self._slots = scenario.slots
         self._launcher = launcher
-        self._unwanted: Callable[[], bool] = lambda: False
-        self._actions = AwaitedActions(startup, launcher, self._watch, self._over_already)
-        self._reception = Reception(bus, Control(scenario, self.loop, launcher.launches))
+        self._should_stop: Callable[[], bool] = lambda: False
+        self._actions = AwaitedActions(startup, launcher, self._check_exits, self._stopped)
+        self._reception = Reception(bus, Control(scenario, self.loop, launcher.controls_processes))
         self._progress_reporter = ProgressReporter(scenario.duration_s, self.loop, launcher)
         self._digest = Digest()
         self._truth = bus.publisher("truth", lockstep=True)
@@ -86,56 +87,56 @@ class LockstepFleet:
         self._commands = [bus.subscriber("command", agent, LOCKSTEP_RING) for agent in rows]
         self._done = [bus.subscriber("done", shard, LOCKSTEP_RING) for shard in range(shards)]
 
-    def fly(self, unwanted: Callable[[], bool]) -> bool:
-        """Fly the scenario's slots until the end, or until unwanted; return whether all of them.
+    def fly(self, should_stop: Callable[[], bool]) -> bool:
+        """Run the scenario's slots, at most until ``should_stop``; return whether all were run.
 
-        What goes wrong in between ends the run, and is its ``failure``.
+        An error in between ends the run, and becomes its ``failure``.
         """
-        self._unwanted = unwanted
+        self._should_stop = should_stop
         self.begun = True
         begun_s = time.perf_counter()
         try:
-            while self.loop.world.slot < self._slots and not unwanted():
+            while self.loop.world.slot < self._slots and not should_stop():
                 self._slot()
-                self._progress_reporter.tell(time.perf_counter() - begun_s, None)
+                self._progress_reporter.report(time.perf_counter() - begun_s, None)
         except RunOverError:
-            self.failure = self._broken()
+            self.failure = self._launcher_failure()
             return False
         except LockstepError as error:
             self.failure = f"{error}, {self.loop.world.time_s:.2f} s into the run"
             return False
-        self.failure = self._broken()
-        flown_s = self.loop.world.time_s
-        self.real_time_factor = flown_s / max(time.perf_counter() - begun_s, 1e-9)
+        self.failure = self._launcher_failure()
+        time_s = self.loop.world.time_s
+        self.real_time_factor = time_s / max(time.perf_counter() - begun_s, 1e-9)
         self.land()
         self.loop.finish()
         return self.loop.world.slot == self._slots
 
     def land(self) -> None:
-        """End the run for everybody, once."""
+        """End the run for all processes, once."""
         if not self._landed:
             self._landed = True
             if self.begun:
-                self._launcher.landing()
+                self._launcher.report_run_over()
             self._over(b"")
 
     def _slot(self) -> None:
         for operation in self.loop.due():
             self._carry_out(operation)
         self._reception.attend(self._carry_out)
-        self._watch()
+        self._check_exits()
         opened = self.loop.open()
-        self._open(opened)
+        self._send(opened)
         for agent, _ in opened.observations:
-            self._obey(agent, opened.slot)
-        self.loop.close(self._played(opened.slot))
+            self._await_command(agent, opened.slot)
+        self.loop.close(self._await_mediums(opened.slot))
 
     def _carry_out(self, operation: Operation, by: By = None) -> None:
-        """Carry out what happens between slots, wait until it has happened, and apply it."""
+        """Carry out an operation, wait until it is done, and apply it to the world."""
         self._actions.carry_out(operation, self.loop.members.incarnations)
         self.loop.apply(operation, by)
 
-    def _open(self, opened: Opened) -> None:
+    def _send(self, opened: Opened) -> None:
         turn = Turn(
             Truth(opened.slot, opened.time_s, opened.positions),
             tuple(agent for agent, _ in opened.observations),
@@ -146,7 +147,7 @@ class LockstepFleet:
         for agent, observation in opened.observations:
             self._observers[agent](encode(observation))
 
-    def _obey(self, agent: int, slot: int) -> None:
+    def _await_command(self, agent: int, slot: int) -> None:
         what = f"agent-{agent}'s command of slot {slot}"
         data = self._answer(self._commands[agent], what)
         try:
@@ -158,15 +159,15 @@ class LockstepFleet:
             raise LockstepError(f"{what} is of its incarnation {command.incarnation}")
         self.loop.obey(agent, command, data)
 
-    def _played(self, slot: int) -> bytes:
-        """Wait until all mediums have played a slot; return the digest of all fates so far."""
-        parts = [self._part(shard, slot) for shard in range(len(self._done))]
+    def _await_mediums(self, slot: int) -> bytes:
+        """Wait until all mediums are done with a slot; return the digest of all fates so far."""
+        parts = [self._await_medium(shard, slot) for shard in range(len(self._done))]
         self.medium_counters = together([part.medium_counters for part in parts])
         self._digest.update(joined_pages(dict(part.pages) for part in parts))
         return self._digest.value
 
-    def _part(self, shard: int, slot: int) -> Done:
-        what = f"{medium_name(shard)}'s word of slot {slot}"
+    def _await_medium(self, shard: int, slot: int) -> Done:
+        what = f"{medium_name(shard)}'s answer of slot {slot}"
         try:
             done = unpack_done(self._answer(self._done[shard], what))
         except WireError as error:
@@ -175,29 +176,29 @@ class LockstepFleet:
         return done
 
     def _answer(self, ring: Subscriber, what: str) -> bytes:
-        """Wait for a message; meanwhile see who is lost, and whether the run is still wanted."""
-        standstill = Standstill(what, self._launcher)
+        """Wait for a message; meanwhile check for exits, and whether the run must stop."""
+        stall = StallReporter(what, self._launcher)
 
-        def over() -> bool:
-            standstill.lasts(POLL_S)
-            self._watch()
-            return self._over_already()
+        def stopped() -> bool:
+            stall.add_wait(POLL_S)
+            self._check_exits()
+            return self._stopped()
 
-        return await_message(ring, what, over)
+        return await_message(ring, what, stopped)
 
-    def _over_already(self) -> bool:
-        return self._unwanted()
+    def _stopped(self) -> bool:
+        return self._should_stop()
 
-    def _watch(self) -> None:
-        """Raise LockstepError when somebody ended who takes part, and was not meant to."""
-        for loss in self._launcher.losses():
-            if self.loop.members.has(loss.agent, loss.incarnation):
-                raise LockstepError(str(loss))
+    def _check_exits(self) -> None:
+        """Raise LockstepError when the process of a running or booting agent has ended."""
+        for each in self._launcher.agent_exits():
+            if self.loop.members.has(each.agent, each.incarnation):
+                raise LockstepError(str(each))
 
-    def _broken(self) -> str | None:
-        """Return which process of which there is one is gone, if that is why the run ends."""
-        self._launcher.losses()
-        return self._launcher.broken
+    def _launcher_failure(self) -> str | None:
+        """Return the failure that the launcher has reported, such as netem's exit, or None."""
+        self._launcher.agent_exits()
+        return self._launcher.failure
 
     def _packets(self) -> Packets:
         return self.medium_counters.packets() if self.medium_counters is not None else {}
@@ -255,23 +256,26 @@ class AwaitedActions:
         self._until(lambda: self._up(agents), f"a sign of life of {agents}")
 
     def _up(self, agents: tuple[int, ...]) -> bool:
-        self._startup.instruct_agents()
+        self._startup.answer_setup_requests()
         self._watch()
         return not self._startup.absent(agents)
 
-    def _act(self, kind: str, agents: Iterable[int], incarnations: Sequence[int]) -> None:
-        whom = [(agent, incarnations[agent]) for agent in agents]
-        if whom:
-            self._launcher.act(kind, whom)
-            self._until(lambda: self._launcher.has_done(kind, whom), f"a {kind} of {whom}")
+    def _act(
+        self, action: ProcessAction, agents: Iterable[int], incarnations: Sequence[int]
+    ) -> None:
+        processes = [AgentProcess(agent, incarnations[agent]) for agent in agents]
+        if processes:
+            self._launcher.request(action, processes)
+            what = f"a {action} of {names_of(processes)}"
+            self._until(lambda: self._launcher.has_done(action, processes), what)
 
     def _until(self, there: Callable[[], bool], what: str) -> None:
-        waited_s, standstill = 0.0, Standstill(what, self._launcher)
+        waited_s, stall = 0.0, StallReporter(what, self._launcher)
         while not there():
             if self._unwanted():
                 raise RunOverError
             if waited_s > ANSWER_TIMEOUT_S:
                 raise LockstepError(f"{what} has not come within {ANSWER_TIMEOUT_S:g} s")
-            self._launcher.wait(DONE_LOOK_EVERY_S)
-            waited_s += DONE_LOOK_EVERY_S
-            standstill.lasts(DONE_LOOK_EVERY_S)
+            self._launcher.wait(DONE_POLL_S)
+            waited_s += DONE_POLL_S
+            stall.add_wait(DONE_POLL_S)

@@ -1,10 +1,11 @@
-"""The world as a process: it assembles a fleet of real processes, flies it, and judges it."""
+"""The world as a process: it waits for a fleet of real processes, runs it, and judges it."""
 
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 import zenoh
 
 from netem.messages import MediumCounters
@@ -25,19 +26,15 @@ from worldsim.scenario.tables import Scenario
 TOO_LATE_FRACTION = 0.01
 
 
-class Terms(NamedTuple):
-    """How a run is flown: its name, how much faster than the wall clock, recorded or not.
+class RunOptions(NamedTuple):
+    """The options of a run that are not part of its scenario."""
 
-    lockstep: in turns, at whatever speed that takes; shards: by how many mediums; users: the file
-    of passwords, where the router wants one.
-    """
-
-    run: str
-    speed: float = 1.0
-    recording: bool = True
-    lockstep: bool = False
-    shards: int = 1
-    users: Path | None = None
+    run: str  # name of the run
+    speed: float = 1.0  # simulated seconds in one second of wall time; without effect in lockstep
+    recording: bool = True  # whether run.rrd is written
+    lockstep: bool = False  # simulated time waits for every process
+    shards: int = 1  # number of mediums that share the agents
+    users: Path | None = None  # file of passwords, where the router requires one
 
     @property
     def mode(self) -> str:
@@ -49,17 +46,17 @@ def run(
     connect: str,
     scenario: Scenario,
     directory: Callable[[], RunDirectory],
-    terms: Terms,
-    launcher_of: Callable[[Startup], LauncherLink],
+    options: RunOptions,
+    link_of: Callable[[Startup], LauncherLink],
 ) -> int:
-    """Conduct a run at a router, and say in one line what stood in its way; return the status.
+    """Run the world at a router; print an error in one line; return the exit status.
 
-    ``directory`` is asked for once the router answers: without one, nothing is made.
+    ``directory`` is called once the router answers: without a router, no folder is made.
     """
     try:
-        login = login_of(terms.users, "world") if terms.users is not None else None
-        with open_client(connect, long_lease=terms.lockstep, login=login) as session:
-            return conduct(session, scenario, directory(), terms, launcher_of)
+        login = login_of(options.users, "world") if options.users is not None else None
+        with open_client(connect, long_lease=options.lockstep, login=login) as session:
+            return conduct(session, scenario, directory(), options, link_of)
     except (AccessError, SessionError, StartupError, RunDirectoryError) as error:
         print(f"world: {error}", file=sys.stderr)
         return 1 if isinstance(error, RunWriteError) else 2
@@ -69,79 +66,84 @@ def conduct(
     session: zenoh.Session,
     scenario: Scenario,
     directory: RunDirectory,
-    terms: Terms,
-    launcher_of: Callable[[Startup], LauncherLink],
+    options: RunOptions,
+    link_of: Callable[[Startup], LauncherLink],
 ) -> int:
-    """Assemble a fleet, fly it and judge it; return the exit status of the contract.
+    """Wait for a fleet, run it and judge it; return the exit status of the contract.
 
-    Raises MusterError when not everybody comes. Whatever ends the flight, SIGTERM or an error of
-    ours, the recording is finished and a summary written of what there was; a fleet that never
-    took off leaves neither.
+    Raises StartupError when a process does not start. However the run ends, by SIGTERM or by an
+    error of this program, the recording is finished and a summary of the part that was run is
+    written; if the run never began, neither is kept.
     """
     stop = StopRequest()
-    bus = Bus(session, Keys(terms.run))
+    bus = Bus(session, Keys(options.run))
     bus.declare_alive("world")
-    startup = Startup(bus, scenario, terms.lockstep, terms.shards)
-    launcher = launcher_of(startup)
-    notes = open_sinks(directory, scenario, directory.path.name, terms.mode, terms.recording)
-    flight = _flight(scenario, bus, notes, launcher, startup, terms)
-    whole = False
+    startup = Startup(bus, scenario, options.lockstep, options.shards)
+    launcher = link_of(startup)
+    sinks = open_sinks(directory, scenario, directory.path.name, options.mode, options.recording)
+    fleet = _fleet(scenario, bus, sinks, launcher, startup, options)
+    complete = False
 
-    def unwanted() -> bool:
-        return stop.requested or launcher.stopped is not None
+    def should_stop() -> bool:
+        return stop.requested or launcher.stop_reason is not None
 
     try:
-        whole = assemble(startup, terms.speed, unwanted, launcher) and flight.fly(unwanted)
+        present = assemble(startup, options.speed, should_stop, launcher)
+        complete = present and fleet.fly(should_stop)
     finally:
-        flight.land()
-        notes.close()
-        ended_by = None if whole else launcher.stopped or "interrupted"
-        summary = _summary(scenario, flight, terms.mode, ended_by)
-        if flight.begun:
+        fleet.land()
+        sinks.close()
+        launcher.wait(0.0)  # reads the reason that the launcher sends before its SIGTERM
+        ended_by = None if complete else launcher.stop_reason or "interrupted"
+        summary = _summary(scenario, fleet, options.mode, ended_by)
+        if fleet.begun:
             directory.write_summary(summary)
         else:
             directory.nothing_flew()
-    told = summary["outcome"] if flight.begun else f"{ended_by} before take-off"
-    print(f"world: {told}{_lateness(flight.medium_counters)}", flush=True)
+    outcome = summary["outcome"] if fleet.begun else f"{ended_by} before take-off"
+    print(f"world: {outcome}{_lateness(fleet.medium_counters)}", flush=True)
     return EXIT_STATUS[summary["outcome"]]
 
 
-def _flight(
+def _fleet(
     scenario: Scenario,
     bus: Bus,
-    notes: Sinks,
+    sinks: Sinks,
     launcher: LauncherLink,
     startup: Startup,
-    terms: Terms,
+    options: RunOptions,
 ) -> FreeRunningFleet | LockstepFleet:
-    if terms.lockstep:
-        return LockstepFleet(scenario, bus, notes, launcher, startup, terms.shards)
-    return FreeRunningFleet(scenario, bus, notes, launcher, startup, terms.speed)
+    if options.lockstep:
+        return LockstepFleet(scenario, bus, sinks, launcher, startup, options.shards)
+    return FreeRunningFleet(scenario, bus, sinks, launcher, startup, options.speed)
 
 
 def _lateness(medium_counters: MediumCounters | None) -> str:
     if medium_counters is None or medium_counters.late_s is None:
         return ""
-    typical_s, worst_s = medium_counters.late_s
-    return f"; netem late by {typical_s * 1e3:.1f} ms (median), {worst_s * 1e3:.1f} ms (worst)"
+    median_s, worst_s = medium_counters.late_s
+    return (
+        f"; netem sent batches {median_s * 1e3:.1f} ms (median), {worst_s * 1e3:.1f} ms (worst)"
+        " after they were due"
+    )
 
 
 def _summary(
-    scenario: Scenario, flight: FreeRunningFleet | LockstepFleet, mode: str, ended_by: str | None
+    scenario: Scenario, fleet: FreeRunningFleet | LockstepFleet, mode: str, ended_by: str | None
 ) -> dict[str, Any]:
-    late = flight.late_fraction
+    late_fraction = fleet.late_fraction
     return summarise(
         scenario,
-        flight.loop,
+        fleet.loop,
         mode=mode,
-        medium_counters=flight.medium_counters,
-        refused=flight.refused,
-        delivery=flight.delivery,
-        late_tick_fraction=late,
-        real_time_factor=flight.real_time_factor,
-        duration_s=flight.loop.world.time_s,
+        medium_counters=fleet.medium_counters,
+        refused=fleet.rejected,
+        delivery=msgspec.to_builtins(fleet.delivery),
+        late_tick_fraction=late_fraction,
+        real_time_factor=fleet.real_time_factor,
+        duration_s=fleet.loop.world.time_s,
         interrupted=ended_by is not None,
         ended_by=ended_by or "",
-        host_too_slow=late is not None and late >= TOO_LATE_FRACTION,
-        failure=flight.failure,
+        host_too_slow=late_fraction is not None and late_fraction >= TOO_LATE_FRACTION,
+        failure=fleet.failure,
     )

@@ -1,105 +1,131 @@
-"""fleet.json: which processes a running fleet consists of, and where its router listens."""
+"""fleet.json: the processes of a running fleet, and the endpoint of its router."""
 
-import json
+from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple, assert_never
+
+import msgspec
+from msgspec import Meta
 
 from netem.wire.keys import agent_name
+from worldsim.fleet.ipc import AgentProcess, Pid, ProcessAction
 from worldsim.results.run_folder import RunDirectoryError, write_json
 
 FILE = "fleet.json"
 
 
 class OperatorError(Exception):
-    """A request to a fleet that came to nothing; one line that says why."""
+    """A request to a running fleet that failed; the text is one line with the reason."""
+
+
+class ProcessEntry(msgspec.Struct, frozen=True):
+    """A process as fleet.json holds it.
+
+    A pid can be reused, but not together with its start time.
+    """
+
+    name: str
+    pid: Pid
+    started: Annotated[int, Meta(ge=0)] | None  # [clock ticks since boot]; None: ended at once
+
+
+class FleetFile(msgspec.Struct, frozen=True):
+    """The content of fleet.json."""
+
+    run: str
+    endpoint: str
+    processes: tuple[ProcessEntry, ...]
 
 
 class ProcessRow(NamedTuple):
-    """One process of a fleet; not ``alive`` when it ended, whoever has its pid now."""
+    """A process of a fleet, and whether it is still running."""
 
     name: str
     pid: int
     alive: bool
 
 
-class ProcessTable:
-    """Keeps a run's fleet.json while processes are started."""
-
-    def __init__(self, folder: Path, run: str, endpoint: str) -> None:
-        self._path = folder / FILE
-        self._content = {"run": run, "endpoint": endpoint}
-        self._processes: dict[str, tuple[int, int | None]] = {}
-        self._paused: set[str] = set()
-
-    def add(self, name: str, pid: int) -> None:
-        """Note a process that was just started; it takes the place of an earlier one."""
-        self._processes[name] = (pid, _started(pid))
-
-    def note(self, deed: str, whom: list[tuple[int, int]]) -> None:
-        """Note a deed on agents, (agent, incarnation) each: who is paused is meant to be."""
-        names = {agent_name(agent) for agent, _ in whom}
-        self._paused = self._paused | names if deed == "pause" else self._paused - names
-
-    def stopped(self) -> str:
-        """Return in words whose process is stopped though nobody planned that; "" for none."""
-        names = [
-            name
-            for name, (pid, _) in self._processes.items()
-            if name not in self._paused and _stat(pid)[:1] == ["T"]
-        ]
-        return f"; stopped: {', '.join(names)}" if names else ""
-
-    def write(self) -> None:
-        """Write the file. Raises RunDirectoryError when the disk fails."""
-        rows = [
-            {"name": name, "pid": pid, "started": started}
-            for name, (pid, started) in self._processes.items()
-        ]
-        write_json(self._path, {**self._content, "processes": rows})
-
-
 class Fleet(NamedTuple):
-    """A fleet as fleet.json tells of it: the run's name, its router, its processes."""
+    """A fleet as its fleet.json describes it."""
 
     run: str
     endpoint: str
     processes: list[ProcessRow]
 
 
-def fleet_of(run: Path) -> Fleet:
-    """Return the fleet of the run in a folder, or raise RunDirectoryError."""
+class ProcessTable:
+    """Maintains a run's fleet.json while processes are started."""
+
+    def __init__(self, folder: Path, run: str, endpoint: str) -> None:
+        self._path = folder / FILE
+        self._run = run
+        self._endpoint = endpoint
+        self._entries: dict[str, ProcessEntry] = {}
+        self._paused: set[str] = set()
+
+    def add(self, name: str, pid: int) -> None:
+        """Add a process that was just started; it replaces an earlier one of the same name."""
+        self._entries[name] = ProcessEntry(name, pid, _start_time(pid))
+
+    def note_action(self, action: ProcessAction, processes: Iterable[AgentProcess]) -> None:
+        """Note a requested action: a requested pause is not reported as stopped."""
+        names = {agent_name(process.agent) for process in processes}
+        match action:
+            case "pause":
+                self._paused |= names
+            case "start" | "kill" | "resume":
+                self._paused -= names
+            case _:
+                assert_never(action)
+
+    def stopped(self) -> list[str]:
+        """Return the names of the processes that are stopped without a requested pause."""
+        return [
+            entry.name
+            for entry in self._entries.values()
+            if entry.name not in self._paused and _stat(entry.pid)[:1] == ["T"]
+        ]
+
+    def write(self) -> None:
+        """Write the file. Raises RunWriteError when the disk fails."""
+        content = FleetFile(self._run, self._endpoint, tuple(self._entries.values()))
+        write_json(self._path, msgspec.to_builtins(content))
+
+
+def read_fleet(run: Path) -> Fleet:
+    """Return the fleet of the run in a folder.
+
+    Raises RunDirectoryError when the folder has no fleet.json, or one that is not valid.
+    """
     path = run / FILE
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-        rows = [ProcessRow(row["name"], row["pid"], _alive(row)) for row in told["processes"]]
-        return Fleet(str(told["run"]), str(told["endpoint"]), rows)
+        content = msgspec.json.decode(path.read_bytes(), type=FleetFile)
     except OSError as error:
-        raise RunDirectoryError(run, f"no {FILE} in it: no run of processes") from error
-    except (ValueError, KeyError, TypeError) as error:
-        raise RunDirectoryError(path, "cannot be read as a fleet's list of processes") from error
+        raise RunDirectoryError(run, f"not a process run (no {FILE})") from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise RunDirectoryError(path, f"not a valid {FILE}: {error}") from error
+    rows = [ProcessRow(entry.name, entry.pid, _alive(entry)) for entry in content.processes]
+    return Fleet(content.run, content.endpoint, rows)
 
 
 def processes(run: Path) -> list[ProcessRow]:
-    """Return the processes of the run in a folder, or raise RunDirectoryError."""
-    return fleet_of(run).processes
+    """Return the processes of the run in a folder. Raises RunDirectoryError as read_fleet."""
+    return read_fleet(run).processes
 
 
-def _alive(row: dict[str, int]) -> bool:
-    started = _started(row["pid"])
-    return started is not None and started == row["started"]
+def _alive(entry: ProcessEntry) -> bool:
+    started = _start_time(entry.pid)
+    return started is not None and started == entry.started
 
 
-def _started(pid: int) -> int | None:
-    """Return when a process started [clock ticks since boot], None when it is not running.
-
-    Pids come back; a pid with its start time does not.
-    """
+def _start_time(pid: int) -> int | None:
+    """Return when a process started [clock ticks since boot], None when it is not running."""
     state, *fields = _stat(pid) or ["X"]
     return None if state in "ZX" else int(fields[18])
 
 
 def _stat(pid: int) -> list[str]:
-    """Return what the kernel tells of a process, from its state on; nothing when it is gone."""
+    """Return the fields of /proc/<pid>/stat from the state on; none when the process is gone."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
     except OSError:

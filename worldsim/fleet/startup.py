@@ -1,4 +1,4 @@
-"""Before a flight: the medium takes its conditions, each agent its setup, and all report."""
+"""The start of a run: netem gets its conditions, each agent its setup, and all must be present."""
 
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -9,24 +9,25 @@ import zenoh
 from agent.config import AgentSetup
 from netem.messages import MediumSetup
 from netem.wire.bus import Bus, Handler, Liveliness, RefusedError, drain
-from netem.wire.keys import medium_name
+from netem.wire.keys import agent_name, medium_name
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 
 STARTUP_WITHIN_S = 30.0
-LOOK_EVERY_S = 0.02
-QUESTIONS_AT_ONCE = 64
+POLL_S = 0.02
+REQUESTS_PER_POLL = 64
 
 
 class StartupError(RuntimeError):
-    """Not everybody came; the text says who is missing."""
+    """A start that failed; the text names the missing processes, or netem's reason to refuse."""
 
 
 class Startup:
-    """Answers agents that ask for their setup, at the start and late; knows who is there.
+    """Configures netem and the agents, at the start and later; tells which are present.
 
-    lockstep: whether they take turns; shards: how many mediums share the agents out.
+    shards: the number of mediums that share the agents. Presence is Zenoh's liveliness: a hint,
+    not a proof.
     """
 
     def __init__(
@@ -36,66 +37,65 @@ class Startup:
         self._scenario = scenario
         self._lockstep = lockstep
         self._shards = shards
-        self._uninstructed = list(range(shards))
+        self._unconfigured = list(range(shards))
         self._incarnations = dict.fromkeys(range(scenario.fleet.agents), 0)
         self._liveliness: Liveliness = bus.liveliness()
-        self._questions: Handler[zenoh.Query] = bus.queryable("setup")
+        self._requests: Handler[zenoh.Query] = bus.queryable("setup")
 
-    def instruct_medium(self, speed: float) -> bool:
-        """Tell each medium its conditions; False while one is missing.
+    def configure_mediums(self, speed: float) -> bool:
+        """Send each medium its conditions; return False while one does not answer.
 
-        Raises RefusedError when one serves another run.
+        Raises RefusedError when a medium serves another run.
         """
-        while self._uninstructed:
-            shard = self._uninstructed[0]
-            question = msgspec.json.encode(self._medium_setup(shard, speed))
-            topic, who = ("shard", shard) if shard else ("medium", None)
-            if self._bus.query(topic, who, question, timeout_s=2.0) is None:
+        while self._unconfigured:
+            shard = self._unconfigured[0]
+            setup = msgspec.json.encode(self._medium_setup(shard, speed))
+            topic, number = ("shard", shard) if shard else ("medium", None)
+            if self._bus.query(topic, number, setup, timeout_s=2.0) is None:
                 return False
-            self._uninstructed.pop(0)
+            self._unconfigured.pop(0)
         return True
 
-    def instruct_agents(self) -> None:
-        """Answer the agents that ask."""
-        for query in drain(self._questions, QUESTIONS_AT_ONCE):
+    def answer_setup_requests(self) -> None:
+        """Send their setups to the agents that have asked for them."""
+        for query in drain(self._requests, REQUESTS_PER_POLL):
             with query:
                 self._answer(query)
 
     def missing(self) -> list[str]:
-        """Return the names of those who have not come."""
+        """Return the names of the processes of the start that are not present."""
         self._liveliness.departed()
-        agents = range(self._scenario.fleet.agents)
         mediums = [medium_name(shard) for shard in range(self._shards)]
-        wanted = [*mediums, *(f"agent-{agent}" for agent in agents)]
-        return [name for name in wanted if name not in self._liveliness.alive]
+        agents = [agent_name(agent) for agent in range(self._scenario.fleet.agents)]
+        return [name for name in [*mediums, *agents] if name not in self._liveliness.alive]
 
     def expect(self, incarnations: Mapping[int, int]) -> None:
-        """Let agents come, too, or again: each with its incarnation."""
+        """Accept agents that join or restart, each with its incarnation."""
         self._incarnations.update(incarnations)
 
     def absent(self, agents: Iterable[int]) -> list[int]:
-        """Return which of these agents show no sign of life."""
+        """Return those of some agents that are not present."""
         self._liveliness.departed()
-        return [agent for agent in agents if f"agent-{agent}" not in self._liveliness.alive]
+        return [agent for agent in agents if agent_name(agent) not in self._liveliness.alive]
 
     def present(self, agents: Iterable[int]) -> list[int]:
-        """Return which of these agents show a sign of life."""
+        """Return those of some agents that are present."""
         absent = self.absent(agents := list(agents))
         return [agent for agent in agents if agent not in absent]
 
-    def gone(self) -> list[str]:
-        """Return who went since the last call, as liveliness has it: a hint."""
+    def vanished(self) -> list[str]:
+        """Return the names of the processes that vanished since the last call."""
         return self._liveliness.departed()
 
     def _medium_setup(self, shard: int, speed: float) -> MediumSetup:
         rows = range(self._scenario.rows)
-        # By fours: so each medium has some of those who step in a slot.
-        own = tuple(a for a in rows if a // SLOTS_PER_TICK % self._shards == shard)
+        # Blocks of four agents, so that each medium has agents of every slot of a tick.
+        receivers = tuple(a for a in rows if a // SLOTS_PER_TICK % self._shards == shard)
         setup: MediumSetup = msgspec.structs.replace(
             self._scenario.medium_setup(),
             speed=speed,
             lockstep=self._lockstep,
-            receivers=own if self._shards > 1 else None,
+            receivers=receivers if self._shards > 1 else None,
         )
         return setup
 
@@ -103,7 +103,7 @@ class Startup:
         agent = str(query.key_expr).rsplit("/", 1)[1]
         incarnation = self._incarnations.get(int(agent)) if agent.isdecimal() else None
         if incarnation is None:
-            query.reply_err(f"no agent {agent} in a run of {len(self._incarnations)}")
+            query.reply_err(f"no agent {agent} in a run of {len(self._incarnations)} agents")
             return
         ticks = VIRTUAL_COMMAND_TICKS if self._lockstep else PROCESS_COMMAND_TICKS
         setup: AgentSetup = msgspec.structs.replace(
@@ -113,35 +113,34 @@ class Startup:
 
 
 def assemble(
-    startup: Startup, speed: float, unwanted: Callable[[], bool], launcher: LauncherLink
+    startup: Startup, speed: float, should_stop: Callable[[], bool], launcher: LauncherLink
 ) -> bool:
-    """Wait until everybody is there; False when ``unwanted`` says that it is for nothing.
+    """Wait until all processes are present; return False when ``should_stop`` says so first.
 
-    Raises :class:`MusterError` after STARTUP_WITHIN_S, and when the medium refuses.
+    Raises StartupError after STARTUP_WITHIN_S, and when a medium refuses the run.
     """
     deadline = time.monotonic() + STARTUP_WITHIN_S
     missing: list[str] | None = None
-    instructed = False
-    while not unwanted():
+    configured = False
+    while not should_stop():
         try:
-            instructed = instructed or startup.instruct_medium(speed)
+            configured = configured or startup.configure_mediums(speed)
         except RefusedError as error:
-            raise StartupError(f"netem refuses: {error}") from error
-        startup.instruct_agents()
+            raise StartupError(f"netem refused the run: {error}") from error
+        startup.answer_setup_requests()
         before, missing = missing, startup.missing()
         if missing != before:
-            launcher.missing(shortened(missing))
+            launcher.report_missing(shortened(missing))
         if not missing:
             return True
         if time.monotonic() > deadline:
-            raise StartupError(
-                f"not there within {STARTUP_WITHIN_S:g} s: {', '.join(shortened(missing))}"
-            )
-        time.sleep(LOOK_EVERY_S)
+            names = ", ".join(shortened(missing))
+            raise StartupError(f"not started within {STARTUP_WITHIN_S:g} s: {names}")
+        time.sleep(POLL_S)
     return False
 
 
 def shortened(names: list[str], most: int = 5) -> list[str]:
-    """Return a few names, and how many more there are."""
+    """Return the first few names, and how many more there are."""
     more = len(names) - most
     return names if more <= 0 else [*names[:most], f"{more} more"]

@@ -1,4 +1,4 @@
-"""The launcher's own children: forked, watched, reaped, ended."""
+"""The launcher's own child processes: forked, watched, reaped and ended."""
 
 import os
 import selectors
@@ -6,53 +6,57 @@ import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from worldsim.fleet.fork import Exit, fork, reaped
+from worldsim.fleet.fork import ProcessExit, fork, reap
 from worldsim.fleet.ipc import MessageSocket
 
-Act = Callable[[], None]
+Callback = Callable[[], None]
 
 
 class Supervisor:
-    """Named children and the lines to them: what happens on either is acted upon in ``turn``.
+    """Named child processes and the sockets to them; ``poll`` runs the callbacks of both.
 
-    ``on_exit`` hears the name of a child that ended, and how.
+    ``on_exit`` is called with the name of a child that ended, and its exit.
     """
 
-    def __init__(self, logs: Path, on_exit: Callable[[str, Exit], None]) -> None:
+    def __init__(self, logs: Path, on_exit: Callable[[str, ProcessExit], None]) -> None:
         self.pids: dict[str, int] = {}
         self._logs = logs
         self._on_exit = on_exit
-        self._watch = selectors.DefaultSelector()
+        self._selector = selectors.DefaultSelector()
 
     def start(self, name: str, death_signal: signal.Signals, main: Callable[[], int]) -> int:
         """Fork a child that writes to its log in the run's folder; return its pid."""
         pid = fork(self._logs / f"{name}.log", death_signal, main)
         self.pids[name] = pid
         exit_descriptor = os.pidfd_open(pid)
-        self._watch.register(
-            exit_descriptor, selectors.EVENT_READ, lambda: self._bury(exit_descriptor, name)
+        self._selector.register(
+            exit_descriptor, selectors.EVENT_READ, lambda: self._reap(exit_descriptor, name)
         )
         return pid
 
-    def listen(self, lines: MessageSocket, hear: Act) -> None:
-        """Call ``hear`` whenever something comes in on ``lines``, until they are closed."""
+    def watch(self, messages: MessageSocket[Any, Any], on_readable: Callback) -> None:
+        """Call ``on_readable`` whenever messages have arrived, until the socket is closed."""
 
-        def act() -> None:
-            hear()
-            if lines.closed:
-                self._watch.unregister(lines)
+        def read() -> None:
+            on_readable()
+            if messages.closed:
+                self._selector.unregister(messages)
 
-        self._watch.register(lines, selectors.EVENT_READ, act)
+        self._selector.register(messages, selectors.EVENT_READ, read)
 
-    def turn(self, timeout_s: float) -> None:
-        """Act on what has happened, or happens within ``timeout_s`` [s]."""
-        for key, _ in self._watch.select(timeout_s):
-            act: Act = key.data
-            act()
+    def poll(self, timeout_s: float) -> None:
+        """Run the callbacks of what has happened, or happens within ``timeout_s`` [s]."""
+        for key, _ in self._selector.select(timeout_s):
+            callback: Callback = key.data
+            callback()
 
     def end(self, names: list[str], within_s: float, number: signal.Signals | None) -> bool:
-        """Wait until these have ended, after a signal if one is given; say whether they have."""
+        """Wait until these children have ended, after a signal if one is given.
+
+        Returns whether all of them have ended within ``within_s`` [s].
+        """
         for name in names:
             if number is not None and name in self.pids:
                 os.kill(self.pids[name], number)
@@ -61,14 +65,14 @@ class Supervisor:
             left_s = deadline - time.monotonic()
             if left_s <= 0.0:
                 return False
-            self.turn(left_s)
+            self.poll(left_s)
         return True
 
-    def _bury(self, exit_descriptor: int, name: str) -> None:
-        end = reaped(self.pids[name])
-        if end is None:
+    def _reap(self, exit_descriptor: int, name: str) -> None:
+        process_exit = reap(self.pids[name])
+        if process_exit is None:
             return
-        self._watch.unregister(exit_descriptor)
+        self._selector.unregister(exit_descriptor)
         os.close(exit_descriptor)
         del self.pids[name]
-        self._on_exit(name, end)
+        self._on_exit(name, process_exit)

@@ -1,122 +1,161 @@
-"""The zygote: a warm process of one thread, without sessions, that agents are forked from.
+"""The zygote: a warm, single-threaded process without Zenoh sessions that forks the agents.
 
-It does what the launcher asks for over a socket pair, at the start or late: start agents, kill,
-pause or resume them. It reaps its agents and reports each exit as waitpid has it, which is what the
-launcher believes.
+The launcher sends it requests over a socket pair, at the start and during the run: start, kill,
+pause or resume agents. It reaps the agents and reports each exit as waitpid gives it; the launcher
+relies on these reports alone.
 """
 
 import gc
 import os
 import selectors
 import signal
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 from agent import process as agent_process
-from worldsim.fleet.fork import fork, reaped
-from worldsim.fleet.ipc import Line, MessageSocket
+from worldsim.fleet.fork import fork, reap
+from worldsim.fleet.ipc import (
+    ActionDone,
+    ActionRequest,
+    AgentExited,
+    AgentProcess,
+    AgentStarted,
+    EndRequest,
+    MessageError,
+    ToZygote,
+    ZygoteToLauncher,
+)
 
 END_WITHIN_S = 2.0
-SIGNALS = {"kill": signal.SIGKILL, "pause": signal.SIGSTOP, "resume": signal.SIGCONT}
-ARRIVED = {signal.SIGSTOP: os.WSTOPPED, signal.SIGCONT: os.WCONTINUED}
-"""What waitid waits for, to see that a signal has done what it should."""
 
 
-class Brood(NamedTuple):
-    """What all agents of a run have in common.
+class AgentProcessConfig(NamedTuple):
+    """The settings that all agent processes of a run share."""
 
-    patient: who is silent for long is still there. users: the file of passwords.
-    """
-
-    run: str
-    endpoint: str
-    logs: Path
-    patient: bool = False
-    users: Path | None = None
+    run: str  # name of the run
+    endpoint: str  # of the Zenoh router
+    logs: Path  # folder of the log files
+    long_lease: bool = False  # a silent agent keeps its session for long (lockstep)
+    users: Path | None = None  # file of passwords, where the router requires one
 
 
 class Zygote:
-    """Forks agents on request, and reports their exits; ends them all when asked or alone."""
+    """Forks agents on request and reports their exits.
 
-    def __init__(self, lines: MessageSocket, brood: Brood) -> None:
-        self._lines = lines
-        self._brood = brood
-        self._agents: dict[int, tuple[int, int]] = {}
-        self._watch = selectors.DefaultSelector()
+    It ends all agents when the launcher asks for it, is gone, or sends a message that does not
+    decode.
+    """
+
+    def __init__(self, launcher: ZygoteToLauncher, config: AgentProcessConfig) -> None:
+        self._launcher = launcher
+        self._config = config
+        self._agents: dict[int, AgentProcess] = {}  # by pid
+        self._selector = selectors.DefaultSelector()
         self._ending = False
+        self._status = 0
 
     def serve(self) -> int:
-        """Serve until told to end, or the launcher is gone; return 0 when no agent is left."""
-        gc.freeze()  # what is warm stays shared with the children
-        self._watch.register(self._lines, selectors.EVENT_READ, self._hear)
+        """Serve until asked to end or the launcher is gone, then end all agents.
+
+        Returns the exit status: 0, or 1 after a message that does not decode.
+        """
+        gc.freeze()  # keeps the warm objects' memory pages shared with the children
+        self._selector.register(self._launcher, selectors.EVENT_READ, self._receive)
         while not self._ending:
-            self._turn(None)
-        self._watch.unregister(self._lines)
+            self._poll(None)
+        self._selector.unregister(self._launcher)
+        self._end_agents()
+        return self._status
+
+    def _end_agents(self) -> None:
         self._signal_all(signal.SIGTERM)
-        self._signal_all(signal.SIGCONT)  # who is paused ends, too
+        self._signal_all(signal.SIGCONT)  # a paused agent handles SIGTERM once it continues
         deadline = time.monotonic() + END_WITHIN_S
         while self._agents and (left_s := deadline - time.monotonic()) > 0.0:
-            self._turn(left_s)
+            self._poll(left_s)
         self._signal_all(signal.SIGKILL)
         while self._agents:
-            self._turn(None)
-        return 0
+            self._poll(None)
 
-    def _turn(self, timeout_s: float | None) -> None:
-        for key, _ in self._watch.select(timeout_s):
-            act: Callable[[], None] = key.data
-            act()
+    def _poll(self, timeout_s: float | None) -> None:
+        for key, _ in self._selector.select(timeout_s):
+            callback: Callable[[], None] = key.data
+            callback()
 
-    def _hear(self) -> None:
-        for line in self._lines.receive():
-            self._obey(line)
-        self._ending = self._ending or self._lines.closed
+    def _receive(self) -> None:
+        try:
+            for message in self._launcher.receive():
+                self._handle(message)
+        except MessageError as error:
+            print(f"zygote: {error}", file=sys.stderr)
+            self._ending, self._status = True, 1
+        self._ending = self._ending or self._launcher.closed
 
-    def _obey(self, line: Line) -> None:
-        if "end" in line:
-            self._ending = True
-            return
-        for agent, incarnation in line["whom"]:
-            if line["do"] == "start":
-                self._spawn(agent, incarnation, line["after_s"])
-            else:
-                self._signal(agent, incarnation, SIGNALS[line["do"]])
-        self._lines.send(done=line["do"], whom=line["whom"])
+    def _handle(self, message: ToZygote) -> None:
+        match message:
+            case ActionRequest():
+                for process in message.processes:
+                    self._act_on(process, message)
+                self._launcher.send(ActionDone(message.action, message.processes))
+            case EndRequest():
+                self._ending = True
+            case _:
+                assert_never(message)
 
-    def _signal(self, agent: int, incarnation: int, number: signal.Signals) -> None:
-        """Send a signal to an agent's process; to one that has ended there is nothing to do."""
-        for pid, who in self._agents.items():
-            if who == (agent, incarnation):
+    def _act_on(self, process: AgentProcess, request: ActionRequest) -> None:
+        match request.action:
+            case "start":
+                self._start(process, request.after_s)
+            case "kill":
+                self._signal(process, signal.SIGKILL)
+            case "pause":
+                self._signal(process, signal.SIGSTOP, os.WSTOPPED)
+            case "resume":
+                self._signal(process, signal.SIGCONT, os.WCONTINUED)
+            case _:
+                assert_never(request.action)
+
+    def _signal(
+        self, process: AgentProcess, number: signal.Signals, awaited: int | None = None
+    ) -> None:
+        """Signal a process unless it has ended; wait for the state that waitid calls ``awaited``.
+
+        Without that wait, the acknowledgement could precede the signal's effect.
+        """
+        for pid, running in self._agents.items():
+            if running == process:
                 os.kill(pid, number)
-                if number in ARRIVED:
-                    os.waitid(os.P_PID, pid, ARRIVED[number] | os.WEXITED | os.WNOWAIT)
+                if awaited is not None:
+                    os.waitid(os.P_PID, pid, awaited | os.WEXITED | os.WNOWAIT)
 
-    def _spawn(self, agent: int, incarnation: int, after_s: float) -> None:
-        log = self._brood.logs / f"agent-{agent}.log"
-        pid = fork(log, signal.SIGKILL, lambda: self._live(agent, after_s))
+    def _start(self, process: AgentProcess, after_s: float) -> None:
+        log = self._config.logs / f"agent-{process.agent}.log"
+        pid = fork(log, signal.SIGKILL, lambda: self._run_agent(process.agent, after_s))
         exit_descriptor = os.pidfd_open(pid)
-        self._agents[pid] = (agent, incarnation)
-        self._watch.register(
-            exit_descriptor, selectors.EVENT_READ, lambda: self._bury(exit_descriptor, pid)
+        self._agents[pid] = process
+        self._selector.register(
+            exit_descriptor, selectors.EVENT_READ, lambda: self._reap(exit_descriptor, pid)
         )
-        self._lines.send(spawned=agent, pid=pid, incarnation=incarnation)
+        self._launcher.send(AgentStarted(process, pid))
 
-    def _live(self, agent: int, after_s: float) -> int:
-        self._lines.close()
+    def _run_agent(self, agent: int, after_s: float) -> int:
+        self._launcher.close()
         time.sleep(after_s)
-        brood = self._brood
-        return agent_process.run(agent, brood.run, brood.endpoint, brood.patient, brood.users)
+        config = self._config
+        return agent_process.run(
+            agent, config.run, config.endpoint, config.long_lease, config.users
+        )
 
-    def _bury(self, exit_descriptor: int, pid: int) -> None:
-        end = reaped(pid)
-        if end is None:
+    def _reap(self, exit_descriptor: int, pid: int) -> None:
+        process_exit = reap(pid)
+        if process_exit is None:
             return
-        self._watch.unregister(exit_descriptor)
+        self._selector.unregister(exit_descriptor)
         os.close(exit_descriptor)
-        agent, incarnation = self._agents.pop(pid)
-        self._lines.send(exit=[agent, incarnation, *end], pid=pid)
+        self._launcher.send(AgentExited(self._agents.pop(pid), pid, process_exit))
 
     def _signal_all(self, number: signal.Signals) -> None:
         for pid in self._agents:

@@ -1,0 +1,135 @@
+"""The zygote, with sleeping children as agents: acknowledgements, exits, and how it ends."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+DEADLINE_S = 30.0
+PRELUDE = """
+import os, select, signal, sys, time
+from pathlib import Path
+from agent import process as agent_process
+from worldsim.fleet.fork import ProcessExit, fork
+from worldsim.fleet.ipc import (
+    AgentExited, AgentProcess, AgentStarted, EndRequest, Message, ActionDone, ActionRequest,
+    zygote_sockets,
+)
+from worldsim.fleet.zygote import AgentProcessConfig, Zygote
+
+FIRST, SECOND = AgentProcess(0, 0), AgentProcess(1, 0)
+ready, is_ready = os.pipe()
+
+def sleep(*_):
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    os.write(is_ready, b".")
+    time.sleep(60.0)
+    return 7
+
+def serve():
+    launcher.close()
+    return Zygote(zygote_end, AgentProcessConfig("mine", "tcp/x", Path("."))).serve()
+
+agent_process.run = sleep
+launcher, zygote_end = zygote_sockets()
+zygote = fork(Path("zygote.log"), signal.SIGKILL, serve)
+zygote_end.close()
+messages = []
+
+def receive(kind):
+    while True:
+        for message in messages:
+            if isinstance(message, kind):
+                messages.remove(message)
+                return message
+        assert not launcher.closed, messages
+        select.select([launcher], [], [], 10.0)
+        messages.extend(launcher.receive())
+
+def request(action, *processes):
+    launcher.send(ActionRequest(action, processes))
+    assert receive(ActionDone) == ActionDone(action, processes)
+
+def state(pid):
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+
+request("start", FIRST, SECOND)
+pids = {each.process: each.pid for each in (receive(AgentStarted), receive(AgentStarted))}
+assert [os.read(ready, 1) for _ in pids] == [b".", b"."]
+"""
+ACTIONS = """
+request("pause", FIRST)
+assert state(pids[FIRST]) == "T" != state(pids[SECOND])
+request("resume", FIRST)
+assert state(pids[FIRST]) != "T"
+request("kill", AgentProcess(0, 1))  # no such incarnation
+request("kill", FIRST)
+assert receive(AgentExited) == AgentExited(FIRST, pids[FIRST], ProcessExit(9, None))
+request("kill", FIRST)  # it has ended already
+request("pause", FIRST)
+request("start", AgentProcess(0, 1))
+assert receive(AgentStarted).process == AgentProcess(0, 1)
+assert messages == []
+assert state(pids[SECOND]) not in "TZ"
+print("done")
+"""
+END = """
+request("pause", SECOND)
+launcher.send(MESSAGE())
+exits = [receive(AgentExited) for _ in pids]
+print(sorted((each.process.agent, *each.exit) for each in exits))
+print(os.waitstatus_to_exitcode(os.waitpid(zygote, 0)[1]))
+print(Path("zygote.log").read_text(), end="")
+"""
+LAUNCHER_GONE = """
+request("pause", SECOND)
+launcher.close()
+print(os.waitstatus_to_exitcode(os.waitpid(zygote, 0)[1]))
+print([Path(f"/proc/{pid}").exists() for pid in pids.values()])
+"""
+
+
+def ran(program: str, folder: Path) -> list[str]:
+    """Run a program after the prelude; return the lines that it prints."""
+    path = os.pathsep.join(sys.path)
+    done = subprocess.run(
+        [sys.executable, "-c", PRELUDE + program],
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
+        check=False,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": f"{Path(__file__).parents[2]}{os.pathsep}{path}"},
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout.splitlines()
+
+
+def test_actions_are_acknowledged_when_they_have_taken_effect(tmp_path: Path) -> None:
+    assert ran(ACTIONS, tmp_path) == ["done"]
+
+
+def test_it_ends_all_agents_on_request_also_a_paused_one(tmp_path: Path) -> None:
+    lines = ran(END.replace("MESSAGE", "EndRequest"), tmp_path)
+    assert lines == ["[(0, None, 0), (1, None, 0)]", "0"]
+
+
+def test_it_ends_all_agents_after_a_message_that_does_not_decode(tmp_path: Path) -> None:
+    agents, status, *log = ran(END.replace("MESSAGE", "Message"), tmp_path)
+    assert agents == "[(0, None, 0), (1, None, 0)]"
+    assert (status, len(log)) == ("1", 1)
+    assert log[0].startswith("zygote: launcher sent a message that cannot be decoded: ")
+
+
+def test_it_ends_all_agents_when_the_launcher_is_gone(tmp_path: Path) -> None:
+    assert ran(LAUNCHER_GONE, tmp_path) == ["0", "[False, False]"]
+
+
+@pytest.mark.parametrize("number", [9, 15])
+def test_no_agent_outlives_it(tmp_path: Path, number: int) -> None:
+    killed = f"os.kill(zygote, {number})"
+    gone = "[os.read(ready, 1), print('all ended')]"
+    program = f"os.close(is_ready)\n{killed}\nos.waitpid(zygote, 0)\n{gone}\n"
+    assert ran(program, tmp_path) == ["all ended"]

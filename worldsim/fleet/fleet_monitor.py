@@ -1,0 +1,209 @@
+"""The launcher's reactions to messages and exits: reports, relays, and the state of the run.
+
+Agents' exits come from the zygote, progress and requests from the world; the launcher's own
+children exit under its supervisor.
+"""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple, TypeVar, assert_never
+
+from worldsim.fleet.fork import ProcessExit
+from worldsim.fleet.ipc import (
+    ActionDone,
+    ActionRequest,
+    AgentExited,
+    AgentProcess,
+    AgentStarted,
+    FromWorld,
+    FromZygote,
+    LauncherToWorld,
+    LauncherToZygote,
+    MessageError,
+    ProcessesMissing,
+    Progress,
+    RunFailed,
+    RunOver,
+    Stalled,
+)
+from worldsim.fleet.process_table import ProcessTable
+from worldsim.fleet.terminal import Terminal
+
+REPORT_MISSING_EVERY_S = 5.0
+TAIL_LINES = 5
+MAX_TAIL_B = 4096
+
+_T = TypeVar("_T")
+
+
+class StartError(RuntimeError):
+    """A process of the fleet that did not start; the text names it and quotes its log."""
+
+
+class ProcessSockets(NamedTuple):
+    """The launcher's ends of its socket pairs."""
+
+    zygote: LauncherToZygote
+    world: LauncherToWorld
+
+
+class FleetMonitor:
+    """Handles the messages and exits of one launched fleet.
+
+    lockstep: an unexpected exit of an agent ends the run.
+    """
+
+    def __init__(
+        self,
+        sockets: ProcessSockets,
+        terminal: Terminal,
+        table: ProcessTable,
+        logs: Path,
+        lockstep: bool,
+    ) -> None:
+        self.run_over = False
+        """Whether exits are expected from now on."""
+        self.failed = False
+        """Whether the run cannot go on."""
+        self._zygote, self._world = sockets
+        self._terminal = terminal
+        self._table = table
+        self._logs = logs
+        self._lockstep = lockstep
+        self._expected_exits: set[AgentProcess] = set()
+        self._missing: tuple[str, ...] | None = None
+        self._report_missing_at_s = time.monotonic() + REPORT_MISSING_EVERY_S
+        self._time_s = 0.0
+
+    @property
+    def all_present(self) -> bool:
+        """Whether the world has reported that no process is missing: the run has begun."""
+        return self._missing == ()
+
+    def receive_from_zygote(self) -> None:
+        """Handle the messages that the zygote has sent.
+
+        Before the run has begun, raises StartError at an agent's exit and at a message that does
+        not decode. Raises RunWriteError when fleet.json cannot be written.
+        """
+        messages = self._received(self._zygote.receive)
+        for message in messages:
+            self._handle_zygote(message)
+        if not self.run_over and any(isinstance(each, AgentStarted) for each in messages):
+            self._table.write()
+
+    def receive_from_world(self) -> None:
+        """Handle the messages that the world has sent.
+
+        Raises StartError at one that does not decode, before the run has begun.
+        """
+        for message in self._received(self._world.receive):
+            self._handle_world(message)
+
+    def child_exited(self, name: str, process_exit: ProcessExit) -> None:
+        """Handle the exit of a child of the launcher: of the zygote, netem or the world.
+
+        Raises StartError before the run has begun.
+        """
+        self.receive_from_world()  # the world may have reported the run's end just before
+        if self.run_over:
+            return
+        if not self.all_present:
+            raise self._start_error(name, process_exit)
+        self._fail(f"{name} {process_exit}")
+
+    def report_missing(self) -> None:
+        """Print now and then which processes are still missing."""
+        if self._missing and time.monotonic() > self._report_missing_at_s:
+            self._report_missing_at_s = time.monotonic() + REPORT_MISSING_EVERY_S
+            self._terminal.print(f"still waiting for {', '.join(self._missing)}")
+
+    def log_tail(self, name: str) -> str:
+        """Return the last lines of a process's log, as part of a message."""
+        log = self._logs / f"{name}.log"
+        lines = log.read_bytes()[-MAX_TAIL_B:].decode("utf-8", "replace").splitlines()
+        if not lines:
+            return f"{log} is empty"
+        return "\n  ".join([f"{log} ends with:", *lines[-TAIL_LINES:]])
+
+    def _received(self, receive: Callable[[], list[_T]]) -> list[_T]:
+        """Return the messages of a socket; a message that does not decode fails the run."""
+        try:
+            return receive()
+        except MessageError as error:
+            if not self.run_over and not self.all_present:
+                raise StartError(f"the fleet did not start: {error}") from error
+            self._fail(str(error))
+            return []
+
+    def _fail(self, reason: str) -> None:
+        if self.run_over or self.failed:
+            return
+        self.failed = True
+        self._terminal.print(f"{reason} at about {self._time_s:.1f} s; the run ends")
+        self._world.send(RunFailed(reason))
+
+    def _handle_zygote(self, message: FromZygote) -> None:
+        match message:
+            case AgentStarted(process=process, pid=pid):
+                self._table.add(f"agent-{process.agent}", pid)
+            case AgentExited():
+                self._agent_exited(message)
+            case ActionDone():
+                self._world.send(message)
+            case _:
+                assert_never(message)
+
+    def _handle_world(self, message: FromWorld) -> None:
+        match message:
+            case Progress():
+                self._time_s = message.time_s
+                self._terminal.show(message)
+            case ActionRequest():
+                self._relay(message)
+            case ProcessesMissing(names=names):
+                self._missing = names
+            case Stalled(waiting_for=waiting_for):
+                self._report_stall(waiting_for)
+            case RunOver():
+                self.run_over = True
+            case _:
+                assert_never(message)
+
+    def _relay(self, request: ActionRequest) -> None:
+        """Send a request of the world to the zygote, the parent of the agents."""
+        if request.action == "kill":
+            self._expected_exits.update(request.processes)
+        self._table.note_action(request.action, request.processes)
+        self._zygote.send(request)
+
+    def _report_stall(self, waiting_for: str) -> None:
+        stopped = self._table.stopped()
+        suffix = f"; stopped: {', '.join(stopped)}" if stopped else ""
+        self._terminal.print(f"stalled: waiting for {waiting_for}{suffix}")
+
+    def _agent_exited(self, message: AgentExited) -> None:
+        # The kill that caused this exit, or the run's end, is there already: read it first.
+        self.receive_from_world()
+        if self.run_over:
+            return
+        name, process_exit = f"agent-{message.process.agent}", message.exit
+        if not self.all_present:
+            raise self._start_error(name, process_exit)
+        self._world.send(message)
+        self._terminal.print(
+            f"{name} (pid {message.pid}) {process_exit} at about {self._time_s:.1f} s"
+            f" {self._consequence(message.process)}"
+        )
+        if process_exit.status is not None:
+            self._terminal.print(self.log_tail(name))
+
+    def _consequence(self, process: AgentProcess) -> str:
+        if process in self._expected_exits:
+            return "(scheduled)"
+        ends = "the run ends" if self._lockstep else "its vehicle stops and hovers"
+        return f"(not scheduled); {ends}"
+
+    def _start_error(self, name: str, process_exit: ProcessExit) -> StartError:
+        return StartError(f"{name} did not start: it {process_exit}; {self.log_tail(name)}")
