@@ -36,7 +36,7 @@ BAD = [
     (("run", "small.toml", "--speed", "0"), "'--speed'"),
     (("run", "small.toml", "--speed", "inf"), "--speed"),
     (("sim", "small.toml", "--out", "small.toml"), "small.toml: exists"),
-    (("sim", "small.toml", "--out", "small.toml/x"), "cannot be made: not a directory"),
+    (("sim", "small.toml", "--out", "small.toml/x"), "cannot be created: not a directory"),
     (("run", "small.toml", "--out", "."), "exists; a run is never overwritten"),
     (("sim", "small.toml", "--seeds", "0:2", "--out", "."), "exists"),
     (("netem", "check", "small.toml", "--plot", "radio.txt"), "'radio.txt'; it ends in .png"),

@@ -92,7 +92,7 @@ def test_a_fleet_flies_passes_and_leaves_everything_in_its_folder(
     assert summary["real_time_factor"] > 1.0
     assert summary["packets"]["delivered"] > 0
     assert {event["agent"] for event in events_of(run) if event["kind"] == "slot"} == {0, 1, 2, 3}
-    assert "held" in fleet.text
+    assert "  met  " in fleet.text
     from worldsim.recording.verify import verify  # noqa: PLC0415 - a second that other tests save
 
     verification = verify(run)
@@ -104,7 +104,7 @@ def test_a_fleet_flies_passes_and_leaves_everything_in_its_folder(
     assert delivery["frames"] == sum(each["frames"] for each in delivery["channels"].values())
     assert delivery["excess_ms"].keys() == {"p1", "p5", "p50", "p95", "p99", "max"}
     assert delivery["bound_ms"] == 62.5
-    assert "after due" in fleet.text
+    assert "extra delivery delay: " in fleet.text
     assert [row.alive for row in processes(run)] == [False] * 7
     nobody_left(pids(run))
 
@@ -177,8 +177,8 @@ def test_an_interrupt_before_take_off_says_so_and_judges_nothing(
     fleet.kill_group(signal.SIGINT)
     assert fleet.status(8.0) == 130, fleet.text
     assert fleet.text.endswith(f"interrupted before take-off; logs in {run}/logs\n")
-    assert "HELD" not in fleet.text
-    assert "to look at it" not in fleet.text
+    assert "NOT MET" not in fleet.text
+    assert "view it: " not in fleet.text
     assert sorted(file.name for file in run.glob("*.*")) == ["fleet.json", "scenario.toml"]
     assert "world: interrupted before take-off" in (run / "logs/world.log").read_text()
 

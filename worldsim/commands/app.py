@@ -129,7 +129,7 @@ def sim(
     gallery: Gallery = False,
 ) -> int:
     """Fly the same fleet in virtual time, in one process, as fast as the host allows."""
-    from worldsim.campaign.virtual_runs import fly_many, fly_one
+    from worldsim.campaign.virtual_runs import simulate_many, simulate_one
     from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
 
     if seed is not None and seeds is not None:
@@ -140,8 +140,8 @@ def sim(
         for each in (seeds_of(seeds) if seeds is not None else (seed,))
     ]
     if seeds is None and len(scenarios) == 1:
-        return fly_one(flown[0], out, not no_recording)
-    return fly_many(flown, out, not no_recording, jobs or len(os.sched_getaffinity(0)))
+        return simulate_one(flown[0], out, not no_recording)
+    return simulate_many(flown, out, not no_recording, jobs or len(os.sched_getaffinity(0)))
 
 
 @app.command(epilog=examples("qswarm new my-wedge", "qswarm sim my-wedge.toml"))

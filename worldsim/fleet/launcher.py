@@ -10,7 +10,6 @@ import signal
 import socket
 import time
 from functools import partial
-from typing import Any
 
 from rich.console import Console
 
@@ -27,8 +26,9 @@ from worldsim.fleet.process_table import ProcessRow, ProcessTable, processes
 from worldsim.fleet.supervisor import Supervisor
 from worldsim.fleet.terminal import Terminal
 from worldsim.fleet.zygote import Brood, Zygote
+from worldsim.results.exit_status import EXIT_STATUS
 from worldsim.results.run_folder import RunDirectory, unwritable
-from worldsim.results.summary import EXIT_STATUS
+from worldsim.results.summary import Summary
 from worldsim.results.verdict_text import verdict
 from worldsim.scenario.tables import Scenario
 
@@ -62,7 +62,7 @@ def run(scenario: Scenario, directory: RunDirectory, terms: Terms) -> int:
     except StartError as error:
         launch.terminal.say(str(error))
         launch.end()
-        directory.nothing_flew()
+        directory.remove_results()
         status = NOT_STARTED
     except KeyboardInterrupt:
         ignore_signals()
@@ -117,21 +117,19 @@ class Launch:
         if self._flying or self._directory.summary.exists():
             self.conclude()
         else:
-            self._directory.nothing_flew()
+            self._directory.remove_results()
             self.terminal.say(f"interrupted before take-off; logs in {self._directory.logs}")
 
     def conclude(self) -> int:
         """Tell the verdict from the run's summary; return the exit status."""
         self.terminal.close()
         try:
-            summary: dict[str, Any] = json.loads(self._directory.summary.read_text("utf-8"))
+            summary: Summary = json.loads(self._directory.summary.read_text("utf-8"))
         except FileNotFoundError:
             self.terminal.say(f"no summary was written; {self._last_words('world')}")
             return UNKNOWN
         recorded = self._directory.recording.exists()
         self.terminal.say(verdict(summary, self._directory.path, recorded))
-        if recorded:
-            self.terminal.say(f"to look at it: qswarm view {self._directory.path}")
         return EXIT_STATUS[summary["outcome"]]
 
     def end(self) -> None:
@@ -174,7 +172,7 @@ class Launch:
         try:
             write_users(self._directory.users, self._users())
         except OSError as error:
-            self._directory.nothing_flew()
+            self._directory.remove_results()
             raise unwritable(self._directory.users, error) from error
 
     def _users(self) -> list[str]:

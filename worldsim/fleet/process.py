@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import zenoh
 
@@ -17,12 +17,11 @@ from worldsim.fleet.free_running import FreeRunningFleet
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.lockstep import LockstepFleet
 from worldsim.fleet.startup import Startup, StartupError, assemble
+from worldsim.results.exit_status import EXIT_STATUS
 from worldsim.results.run_folder import RunDirectory, RunDirectoryError, RunWriteError
 from worldsim.results.sinks import Sinks, open_sinks
-from worldsim.results.summary import EXIT_STATUS, summarise
+from worldsim.results.summary import FinishedRun, Mode, summarise
 from worldsim.scenario.tables import Scenario
-
-TOO_LATE_FRACTION = 0.01
 
 
 class Terms(NamedTuple):
@@ -40,7 +39,7 @@ class Terms(NamedTuple):
     users: Path | None = None
 
     @property
-    def mode(self) -> str:
+    def mode(self) -> Mode:
         """The clock's name in the summary."""
         return "lockstep" if self.lockstep else "processes"
 
@@ -96,11 +95,11 @@ def conduct(
         flight.land()
         notes.close()
         ended_by = None if whole else launcher.stopped or "interrupted"
-        summary = _summary(scenario, flight, terms.mode, ended_by)
+        summary = summarise(scenario, _finished(flight, terms.mode, ended_by))
         if flight.begun:
             directory.write_summary(summary)
         else:
-            directory.nothing_flew()
+            directory.remove_results()
     told = summary["outcome"] if flight.begun else f"{ended_by} before take-off"
     print(f"world: {told}{_lateness(flight.medium_counters)}", flush=True)
     return EXIT_STATUS[summary["outcome"]]
@@ -126,22 +125,17 @@ def _lateness(medium_counters: MediumCounters | None) -> str:
     return f"; netem late by {typical_s * 1e3:.1f} ms (median), {worst_s * 1e3:.1f} ms (worst)"
 
 
-def _summary(
-    scenario: Scenario, flight: FreeRunningFleet | LockstepFleet, mode: str, ended_by: str | None
-) -> dict[str, Any]:
-    late = flight.late_fraction
-    return summarise(
-        scenario,
-        flight.loop,
+def _finished(
+    flight: FreeRunningFleet | LockstepFleet, mode: Mode, cut_off_by: str | None
+) -> FinishedRun:
+    return FinishedRun(
         mode=mode,
+        loop=flight.loop,
         medium_counters=flight.medium_counters,
-        refused=flight.refused,
-        delivery=flight.delivery,
-        late_tick_fraction=late,
+        late_tick_fraction=flight.late_fraction,
         real_time_factor=flight.real_time_factor,
-        duration_s=flight.loop.world.time_s,
-        interrupted=ended_by is not None,
-        ended_by=ended_by or "",
-        host_too_slow=late is not None and late >= TOO_LATE_FRACTION,
+        cut_off_by=cut_off_by,
         failure=flight.failure,
+        rejected_by_world=flight.refused,
+        delivery=flight.delivery,
     )
