@@ -26,7 +26,7 @@ def with_every_key(text: str) -> str:
 def test_the_new_file_passes_check_and_its_run_passes(small: Path, qswarm: Command) -> None:
     printed = qswarm("new", "mine")
     assert (printed.status, printed.err) == (0, "")
-    assert printed.out == "mine.toml: written; to fly it: qswarm sim mine.toml\n"
+    assert printed.out == "mine.toml: written; run it with: qswarm sim mine.toml\n"
     checked = qswarm("check", "mine.toml")
     assert (checked.status, checked.err) == (0, "")
     assert load(Path("mine.toml")).name == "mine"

@@ -8,7 +8,7 @@ from worldsim.engine.virtual import fly
 from worldsim.judge.event_text import sentence
 from worldsim.judge.run_events import event_of
 from worldsim.scenario.file import load
-from worldsim.scenario.library import FOLDER
+from worldsim.scenario.library import find_scenario
 
 QUEUES = ("Q1", "Q2", "Q3", "Q4")
 SCHEDULED = {"planned": True}
@@ -150,7 +150,7 @@ def test_an_event_is_one_sentence(row: dict[str, Any], words: str) -> None:
 
 
 def test_every_event_of_a_run_names_its_agent() -> None:
-    scenario = load(FOLDER / "join-leave-12.toml")
+    scenario = load(find_scenario("join-leave-12"))
     events = fly(scenario).loop.events
     assert {"join", "leave", "slot", "queue", "role"} <= {event.kind for event in events}
     queues = [queue.name for queue in scenario.formation.queue]

@@ -40,12 +40,12 @@ def test_a_flying_fleet_does_what_it_is_told_and_refuses_what_cannot_be(
     assert told("netem", "set", "loss_percent=101")[0] == 2
     assert told("netem", "set", "loss_percent=20", "--for", "2")[0] == 0
     status, said = told("mission", "column.toml", "--to", "2")
-    assert (status, "formation agent 2: formation column" in said) == (0, True)
+    assert (status, "new formation 'column', given to a2" in said) == (0, True)
     assert told("fault", "kill", "3", "--for", "1")[0] == 0
     assert told("netem", "jam", "centre_m=[9,9,9]", "radius_m=0.5", "--for", "8")[0] == 0
     shown = told("netem", "show")[1]
     assert "range_m = 6" in shown
-    assert "not parted, 1 jam" in shown
+    assert "not partitioned, 1 jam" in shown
     assert "radius_m = 0.5" in shown
     paused = pids(run)["agent-1"]
     assert told("fault", "pause", "1")[0] == 0
