@@ -29,7 +29,7 @@ BAD = [
     (("sim", "small.toml", "--agents", "0"), "small.toml: fleet.agents: got 0"),
     (("sim", "small.toml", "--agents", "3"), "small.toml: fleet.start.positions_m: 2 positions"),
     (("sim", "small.toml", "--seed", "-1"), "small.toml: seed: got -1"),
-    (("sim", "small.toml", "--duration", "nan"), "small.toml: duration_s: nan"),
+    (("sim", "small.toml", "--duration", "nan"), "small.toml: duration_s: nan is not allowed"),
     (("sim", "small.toml", "--set", "netem.loss_percent"), "write it as netem.loss_percent=50"),
     (("sim", "small.toml", "--set", "=50"), "write it as netem.loss_percent=50"),
     (("sim", "small.toml", "--set", "netem.loss=50"), "netem.loss: unknown key"),
