@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A fleet without the launcher: netem, the world and the agents, each started by a plain command.
 #   deploy/by-hand.sh [SCENARIO [DIR]]
-# The parts may as well be typed into different shells. QSWARM_PORT chooses another port than 7447.
+# The commands can also be typed into different shells. QSWARM_PORT sets a port other than 7447.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -19,7 +19,7 @@ print(tomllib.load(sys.stdin.buffer)["fleet"]["agents"])' <<<"$resolved")
 pids=()
 trap 'kill "${pids[@]}" 2>/dev/null || true; wait' EXIT
 
-# Nobody else starts before netem listens: at a port in use another netem would answer them.
+# The others start after netem listens: at a port in use they would reach another netem.
 exec {netem}< <(exec "$python" -m netem --listen "$endpoint")
 pids+=($!)
 read -r line <&"$netem" || exit 2

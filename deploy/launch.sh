@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
-# Sets up .venv if needed, then flies a fleet of real processes:
+# Sets up .venv if needed, then runs a scenario with real processes:
 #
 #     deploy/launch.sh [SCENARIO] [options of 'qswarm run']
 #
-# Without a scenario it is wedge-9: nine agents that form a pyramidal wedge.
+# The default scenario is wedge-9: nine agents that form a pyramidal wedge.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 # shellcheck source=deploy/setup.sh
 source "$here/setup.sh"
 
-# names_scenario ARGUMENTS: whether one of them is a scenario, wherever it stands.
+# names_scenario ARGUMENTS: whether one is a scenario: the first, or a .toml file anywhere.
 names_scenario() {
     local argument
     case ${1--} in -*) ;; *) return 0 ;; esac

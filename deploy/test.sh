@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Sets up .venv if needed, then runs every check: format, lint, types, import contracts, tests.
-# Arguments go to pytest. The exit status is 0 only if all of them passed.
+# Arguments go to pytest. The exit status is 0 only if every check passed.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 # shellcheck source=deploy/setup.sh
@@ -8,7 +8,7 @@ source "$here/setup.sh"
 
 failed=0
 
-# check NAME COMMAND: say in one line whether it passed; show what it said only if it did not.
+# check NAME COMMAND: print one line with the result, and the output only of a failed check.
 check() {
     local name=$1 output
     shift
@@ -30,7 +30,7 @@ printf '%-16s ...\n' tests
 if [ $# -gt 0 ]; then
     "$venv/bin/pytest" "$@" || failed=1
 else
-    # What is timed by the wall clock runs alone; the rest shares the cores, a file to a worker.
+    # Tests on the wall clock run alone; the others share the cores, one file per worker.
     "$venv/bin/pytest" -m "not processes" --numprocesses auto --dist loadfile || failed=1
     "$venv/bin/pytest" -m processes || failed=1
 fi

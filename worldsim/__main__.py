@@ -12,6 +12,7 @@ from worldsim.fleet.process import RunOptions, run
 from worldsim.fleet.process_table import ProcessTable
 from worldsim.results.run_folder import RunDirectory
 from worldsim.scenario.file import load
+from worldsim.scenario.library import find_scenario
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
 
@@ -37,7 +38,7 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
-    add("scenario", type=Path, metavar="SCENARIO", help="a scenario file (TOML)")
+    add("scenario", metavar="SCENARIO", help="a scenario file (TOML), or a scenario of the library")
     add("--connect", required=True, metavar="ENDPOINT", help="the router: tcp/127.0.0.1:7447")
     add("--out", required=True, type=Path, metavar="DIR", help="the run's folder; must not exist")
     add(
@@ -55,8 +56,9 @@ def main(arguments: list[str] | None = None) -> int:
     """Conduct a run as the command line says; return the exit status."""
     options = _parser().parse_args(arguments)
     try:
-        scenario = load(options.scenario)
-        admit(scenario, options.scenario, PROCESS_COMMAND_TICKS, by_hand=True)
+        file = find_scenario(options.scenario)
+        scenario = load(file)
+        admit(scenario, file, PROCESS_COMMAND_TICKS, by_hand=True)
     except ScenarioError as error:
         print(f"world: {error}", file=sys.stderr)
         return 2

@@ -1,4 +1,4 @@
-"""A small scenario that flies in a blink, and the command line with what it printed."""
+"""A small scenario that runs in a moment, and the command line with what it printed."""
 
 import os
 from collections.abc import Callable
@@ -7,35 +7,24 @@ from typing import NamedTuple
 
 import pytest
 
+from tests.small_scenario import SMALL
 from worldsim.commands.app import command
 
-SMALL = """
-name = "small"
-duration_s = 5.0
-[fleet]
-agents = 2
-start = { kind = "list", positions_m = [[0.3, 0, 0], [-1.3, 0, 0]] }
-[formation]
-name = "line"
-vertices = { V1 = [0, 0, 0] }
-queue = [{ name = "Q", vertices = ["V1"], shape = { kind = "ray", direction = [-1, 0, 0] } }]
-"""
 
-
-class TelemetryRow(NamedTuple):
-    """What a command left behind: its exit status and what it said."""
+class Printed(NamedTuple):
+    """A command's exit status, and what it printed on stdout and stderr."""
 
     status: int
     out: str
     err: str
 
 
-Command = Callable[..., TelemetryRow]
+Command = Callable[..., Printed]
 
 
 @pytest.fixture
 def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The scenario's file, in an empty folder that is the present one."""
+    """The small scenario's file, alone in the current folder."""
     monkeypatch.chdir(tmp_path)
     file = tmp_path / "small.toml"
     file.write_text(SMALL)
@@ -44,8 +33,8 @@ def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def qswarm(capsys: pytest.CaptureFixture[str]) -> Command:
-    def run(*arguments: str | os.PathLike[str]) -> TelemetryRow:
+    def run(*arguments: str | os.PathLike[str]) -> Printed:
         status = command([os.fspath(argument) for argument in arguments])
-        return TelemetryRow(status, *capsys.readouterr())
+        return Printed(status, *capsys.readouterr())
 
     return run

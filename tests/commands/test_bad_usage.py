@@ -8,6 +8,7 @@ import pytest
 
 from tests.commands.conftest import Command
 
+NO_SUCH_NAME = "no such file, and no such scenario in the library; closest: "
 BAD = [
     ((), "Missing command"),
     (("fly",), "No such command 'fly'"),
@@ -15,12 +16,20 @@ BAD = [
     (("sim", "none.toml"), "none.toml: no such file"),
     (("run", "none.toml"), "none.toml: no such file"),
     (("check", "none.toml"), "none.toml: no such file"),
+    (("sim", "wegde-9"), f"wegde-9: {NO_SUCH_NAME}wedge-9, "),
+    (("run", "wegde-9"), f"wegde-9: {NO_SUCH_NAME}wedge-9, "),
+    (("check", "wegde-9"), f"wegde-9: {NO_SUCH_NAME}wedge-9, "),
+    (("netem", "check", "wegde-9"), f"wegde-9: {NO_SUCH_NAME}wedge-9, "),
+    (("sim", "%&"), f"%&: {NO_SUCH_NAME}"),
+    (("sim", "wedge-9.toml"), "wedge-9.toml: no such file; the library has 'wedge-9'"),
+    (("sim", "a/wedge-9.toml"), "a/wedge-9.toml: no such file; the library has 'wedge-9'"),
+    (("sim", "."), ".: cannot be read: Is a directory"),
     (("sim", "small.toml", "--bogus"), "No such option: --bogus"),
     (("sim", "small.toml", "--agents", "many"), "'--agents'"),
     (("sim", "small.toml", "--agents", "0"), "small.toml: fleet.agents: got 0"),
     (("sim", "small.toml", "--agents", "3"), "small.toml: fleet.start.positions_m: 2 positions"),
     (("sim", "small.toml", "--seed", "-1"), "small.toml: seed: got -1"),
-    (("sim", "small.toml", "--duration", "nan"), "small.toml: duration_s: nan"),
+    (("sim", "small.toml", "--duration", "nan"), "small.toml: duration_s: nan is not allowed"),
     (("sim", "small.toml", "--set", "netem.loss_percent"), "write it as netem.loss_percent=50"),
     (("sim", "small.toml", "--set", "=50"), "write it as netem.loss_percent=50"),
     (("sim", "small.toml", "--set", "netem.loss=50"), "netem.loss: unknown key"),
@@ -30,30 +39,32 @@ BAD = [
     (("sim", "small.toml", "--seeds", "3"), "write first:end, as 0:20"),
     (("sim", "small.toml", "--seeds", "5:5"), "write first:end, as 0:20"),
     (("sim", "small.toml", "--seeds", "0:9999999"), "at most 1000000"),
-    (("sim", "small.toml", "--seeds", "0:2", "--seed", "1"), "not beside --seed"),
+    (("sim", "small.toml", "--seeds", "0:2", "--seed", "1"), "cannot be combined with --seed"),
     (("sim", "small.toml", "small.toml"), "small-seed1: would be written twice"),
     (("sim", "small.toml", "--jobs", "0"), "'--jobs'"),
     (("run", "small.toml", "--speed", "0"), "'--speed'"),
     (("run", "small.toml", "--speed", "inf"), "--speed"),
+    (("run", "small.toml", "--speed", "2", "--lockstep"), "cannot be combined with --lockstep"),
+    (("run", "small.toml", "--shards", "2"), "needs --lockstep"),
     (("sim", "small.toml", "--out", "small.toml"), "small.toml: exists"),
-    (("sim", "small.toml", "--out", "small.toml/x"), "cannot be made: not a directory"),
+    (("sim", "small.toml", "--out", "small.toml/x"), "cannot be created: not a directory"),
     (("run", "small.toml", "--out", "."), "exists; a run is never overwritten"),
     (("sim", "small.toml", "--seeds", "0:2", "--out", "."), "exists"),
-    (("netem", "check", "small.toml", "--plot", "radio.txt"), "'radio.txt'; it ends in .png"),
+    (("netem", "check", "small.toml", "--plot", "radio.txt"), "'radio.txt'; must end in .png"),
     (("verify", "none"), "none: no such"),
     (("ps", "none"), "none: not a process run (no fleet.json)"),
 ]
 
 
 @pytest.mark.parametrize(("arguments", "says"), BAD, ids=[" ".join(each) for each, _ in BAD])
-def test_it_is_one_line_and_exit_2(
+def test_bad_input_is_one_line_and_exit_2(
     small: Path, qswarm: Command, arguments: tuple[str, ...], says: str
 ) -> None:
-    told = qswarm(*arguments)
-    assert told.status == 2
-    assert told.out == ""
-    assert says in told.err
-    assert told.err.count("\n") == 1
+    printed = qswarm(*arguments)
+    assert printed.status == 2
+    assert printed.out == ""
+    assert says in printed.err
+    assert printed.err.count("\n") == 1
     assert list(small.parent.iterdir()) == [small]
 
 
@@ -65,12 +76,30 @@ def test_a_run_is_never_overwritten(small: Path, qswarm: Command) -> None:
 
 
 def test_the_process_itself_exits_2_with_one_line(small: Path) -> None:
-    program = "from worldsim.commands.app import main; main()"
     done = subprocess.run(
-        [sys.executable, "-c", program, "check", "none.toml"],
+        [sys.executable, "-c", MAIN, "check", "none.toml"],
         capture_output=True,
         text=True,
         check=False,
-        env={"PYTHONPATH": str(Path(__file__).parents[2])},
+        env=ENVIRONMENT,
     )
     assert (done.returncode, done.stdout, done.stderr) == (2, "", "none.toml: no such file\n")
+
+
+def test_a_reader_that_ends_early_causes_no_error_message(small: Path) -> None:
+    started = subprocess.Popen(
+        [sys.executable, "-c", MAIN, "check", str(small)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=ENVIRONMENT,
+    )
+    with started:
+        assert started.stdout is not None
+        assert started.stderr is not None
+        started.stdout.close()
+        assert started.stderr.read() == b""
+    assert started.returncode == 141
+
+
+MAIN = "from worldsim.commands.app import main; main()"
+ENVIRONMENT = {"PYTHONPATH": str(Path(__file__).parents[2])}

@@ -1,4 +1,4 @@
-"""Commands to a running fleet, where there is none, or where they say nothing."""
+"""Commands to a running fleet: bad input, and fleets that are not running."""
 
 import json
 import os
@@ -10,36 +10,43 @@ from tests.commands.conftest import Command
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "says"),
     [
-        (("fault", "run", "explode", "2"), "'explode'; kill, leave, restart, pause, resume, join"),
-        (("fault", "run", "join", "some"), "'some'; a number from 0"),
-        (("netem", "run", "explode"), "'explode'; show, set, partition, heal, jam, flap"),
-        (("netem", "run", "partition", "a,b"), "'a'; a number from 0"),
-        (("netem", "run", "set", "loss"), "WORD: 'loss'; write it as KEY=VALUE"),
-        (("netem", "run", "set", "=3"), "WORD: '=3'; write it as KEY=VALUE"),
-        (("netem", "run", "show", "links"), "WORD: 'links'; show stands alone"),
-        (("netem", "run", "heal", "0,1"), "WORD: '0,1'; heal stands alone"),
-        (("mission", "run"), "a formation file or --frame, one of them"),
-        (("mission", "run", "there.toml", "--frame", "yaw_deg=1"), "one of them"),
+        (
+            ("fault", "run", "explode", "2"),
+            "'explode'; allowed: kill, leave, restart, pause, resume, join",
+        ),
+        (("fault", "run", "join", "some"), "SELECTOR: 'some'; a whole number from 0"),
+        (
+            ("netem", "run", "explode"),
+            "ACTION: 'explode'; allowed: show, set, partition, heal, jam, flap",
+        ),
+        (("netem", "run", "partition", "a,b"), "'a'; a whole number from 0"),
+        (("netem", "run", "set", "loss"), "'loss'; write it as KEY=VALUE"),
+        (("netem", "run", "set", "=3"), "'=3'; write it as KEY=VALUE"),
+        (("netem", "run", "show", "links"), "'links'; show takes no further words"),
+        (("netem", "run", "heal", "0,1"), "'0,1'; heal takes no further words"),
+        (("mission", "run"), "either a formation or --frame"),
+        (("mission", "run", "there.toml", "--frame", "yaw_deg=1"), "exactly one of them"),
         (("mission", "run", "missing.toml"), "missing.toml: no such file"),
+        (("mission", "run", "helx"), "no such formation in the library; closest: helix"),
         (("netem", "run", "show"), "run: not a process run (no fleet.json)"),
         (("fault", "run", "kill", "2"), "run: not a process run (no fleet.json)"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(
-    small: Path, qswarm: Command, words: tuple[str, ...], said: str
+    small: Path, qswarm: Command, words: tuple[str, ...], says: str
 ) -> None:
-    told = qswarm(*words)
-    assert (told.status, told.out) == (2, "")
-    assert said in told.err
-    assert told.err.count("\n") == 1
+    printed = qswarm(*words)
+    assert (printed.status, printed.out) == (2, "")
+    assert says in printed.err
+    assert printed.err.count("\n") == 1
 
 
-def test_a_fleet_that_has_landed_is_told(small: Path, qswarm: Command) -> None:
+def test_a_fleet_that_has_ended_is_an_error(small: Path, qswarm: Command) -> None:
     Path("run").mkdir()
     row = {"name": "world", "pid": os.getpid(), "started": 1}
     fleet = {"run": "small", "endpoint": "tcp/127.0.0.1:9", "processes": [row]}
     Path("run/fleet.json").write_text(json.dumps(fleet))
-    told = qswarm("fault", "run", "kill", "2")
-    assert (told.status, told.err) == (2, "run: the run has ended\n")
+    printed = qswarm("fault", "run", "kill", "2")
+    assert (printed.status, printed.err) == (2, "run: the run has ended\n")

@@ -1,4 +1,4 @@
-"""sim: one run or many, each in its folder, a verdict that is the exit status."""
+"""sim: one run or many, each in its own folder, with the verdict as exit status."""
 
 import json
 import signal
@@ -16,10 +16,10 @@ def summary(folder: str | Path) -> dict[str, Any]:
     return json.loads((Path(folder) / "summary.json").read_text())  # type: ignore[no-any-return]
 
 
-def test_one_run_leaves_all_of_its_folder(small: Path, qswarm: Command) -> None:
-    told = qswarm("sim", small, "--no-recording", "--out", "deep/one")
-    assert told.status == 0
-    assert told.out.splitlines()[-1] == "pass  deep/one/summary.json"
+def test_one_run_writes_its_folder(small: Path, qswarm: Command) -> None:
+    printed = qswarm("sim", small, "--no-recording", "--out", "deep/one")
+    assert printed.status == 0
+    assert printed.out.splitlines()[-1] == "pass  deep/one/summary.json"
     names = sorted(path.name for path in Path("deep/one").iterdir())
     assert names == ["events.jsonl", "logs", "scenario.toml", "summary.json"]
     assert load(Path("deep/one/scenario.toml")) == load(small)
@@ -30,9 +30,9 @@ def test_one_run_leaves_all_of_its_folder(small: Path, qswarm: Command) -> None:
 
 def test_a_recording_is_made_and_verified(small: Path, qswarm: Command) -> None:
     assert qswarm("sim", small, "--out", "seen").status == 0
-    told = qswarm("verify", "seen")
-    assert told.status == 0
-    assert "the summary agrees" in told.out
+    printed = qswarm("verify", "seen")
+    assert printed.status == 0
+    assert "summary.json agrees" in printed.out
 
 
 def test_without_out_the_folder_is_named_after_scenario_and_time(
@@ -45,19 +45,17 @@ def test_without_out_the_folder_is_named_after_scenario_and_time(
     assert all(folder.name.startswith("small-2") for folder in folders)
 
 
-def test_what_was_expected_and_not_held_is_exit_1(small: Path, qswarm: Command) -> None:
-    told = qswarm(
+def test_an_expectation_that_is_not_met_is_exit_1(small: Path, qswarm: Command) -> None:
+    printed = qswarm(
         "sim", small, "--no-recording", "--out", "late", "--set", "expect.converge_within_s=0.01"
     )
-    assert told.status == 1
-    assert "NOT HELD converge line: " in told.out
+    assert printed.status == 1
+    assert "NOT MET  line: converged in " in printed.out
     assert summary("late")["outcome"] == "fail"
-    assert summary("late")["reason"] == "not held: converge line"
+    assert summary("late")["reason"] == "not met: converge line"
 
 
-def test_the_same_seed_gives_the_same_trace_and_another_another(
-    small: Path, qswarm: Command
-) -> None:
+def test_the_trace_depends_on_the_seed_alone(small: Path, qswarm: Command) -> None:
     for out, seed in (("a", "1"), ("b", "1"), ("c", "2")):
         qswarm(
             "sim", small, "--no-recording", "--out", out, "--seed", seed,
@@ -71,9 +69,11 @@ def test_the_same_seed_gives_the_same_trace_and_another_another(
 def test_many_seeds_have_a_folder_each_and_a_summary_over_all(
     small: Path, qswarm: Command, jobs: str
 ) -> None:
-    told = qswarm("sim", small, "--no-recording", "--seeds", "3:6", "--jobs", jobs, "--out", "many")
-    assert told.status == 0
-    assert [row.split()[0] for row in told.out.splitlines()[1:4]] == [
+    printed = qswarm(
+        "sim", small, "--no-recording", "--seeds", "3:6", "--jobs", jobs, "--out", "many"
+    )
+    assert printed.status == 0
+    assert [row.split()[0] for row in printed.out.splitlines()[1:4]] == [
         "small-seed3",
         "small-seed4",
         "small-seed5",
@@ -93,10 +93,10 @@ def test_one_failed_seed_fails_all(small: Path, qswarm: Command) -> None:
     other = small.with_name("hard.toml")
     other.write_text(small.read_text().replace('"small"', '"hard"'))
     other.write_text(other.read_text() + "[expect]\nconverge_within_s = 0.01\n")
-    told = qswarm("sim", small, other, "--no-recording", "--out", "both")
-    assert told.status == 1
-    assert "hard: 0 of 1 passed" in told.out
-    assert "small: 1 of 1 passed" in told.out
+    printed = qswarm("sim", small, other, "--no-recording", "--out", "both")
+    assert printed.status == 1
+    assert "hard: 0 of 1 runs passed" in printed.out
+    assert "small: 1 of 1 runs passed" in printed.out
     assert [row["run"] for row in summary("both")["rows"]] == ["hard-seed1", "small-seed1"]
 
 
@@ -108,41 +108,41 @@ def is_running(pid: str) -> bool:
     return state not in "ZX"
 
 
-def flying_for_long(jobs: str, *more: str) -> Started:
+def long_sim(jobs: str, *more: str) -> Started:
     sweep = [*QSWARM, "sim", "small.toml", "--duration", "1000", *more]
-    return Started([*sweep, "--jobs", jobs, "--out", "cut"], Path("said"), Path.cwd())
+    return Started([*sweep, "--jobs", jobs, "--out", "cut"], Path("output"), Path.cwd())
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_ends_a_run_with_its_summary(small: Path, number: signal.Signals) -> None:
-    started = flying_for_long("1")
-    eventually(lambda: slots_told("cut"), 20.0)
+    started = long_sim("1")
+    eventually(lambda: has_events("cut"), 20.0)
     started.process.send_signal(number)
     assert started.status(within_s=20.0) == 130, small
-    told = summary("cut")
-    assert told["outcome"] == "inconclusive"
-    assert told["reason"] == f"interrupted after {told['duration_s']:.1f} s"
-    assert 0.0 < told["duration_s"] < 1000.0
-    assert f"inconclusive ({told['reason']})" in started.text
+    printed = summary("cut")
+    assert printed["outcome"] == "inconclusive"
+    assert printed["reason"] == f"interrupted after {printed['duration_s']:.1f} s"
+    assert 0.0 < printed["duration_s"] < 1000.0
+    assert f"inconclusive ({printed['reason']})" in started.text
     assert Path("cut/run.rrd").stat().st_size > 0
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_ends_a_sweep_with_its_workers_and_summaries(small: Path, jobs: str) -> None:
-    started = flying_for_long(jobs, "--no-recording", "--seeds", "0:4")
-    pid, wanted = started.process.pid, int(jobs)
-    eventually(lambda: sum(map(slots_told, Path("cut").glob("*"))) >= wanted, 20.0)
+    started = long_sim(jobs, "--no-recording", "--seeds", "0:4")
+    pid, started_runs = started.process.pid, int(jobs)
+    eventually(lambda: sum(map(has_events, Path("cut").glob("*"))) >= started_runs, 20.0)
     workers = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
     started.process.send_signal(signal.SIGINT)
     assert started.status(within_s=20.0) == 130, small
     overall = summary("cut")
     assert (overall["outcome"], overall["reason"]) == ("inconclusive", "interrupted")
-    assert wanted <= overall["runs"] == len(list(Path("cut").glob("*/summary.json"))) < 4
+    assert started_runs <= overall["runs"] == len(list(Path("cut").glob("*/summary.json"))) < 4
     assert started.text.endswith("inconclusive (interrupted)  cut/summary.json\n")
     eventually(lambda: not any(map(is_running, workers)), 10.0)
 
 
-def slots_told(run: str | Path) -> bool:
-    """Whether a run is in the air: somebody has told of a slot."""
+def has_events(run: str | Path) -> bool:
+    """Whether a run is under way: an agent has taken a slot."""
     events = Path(run) / "events.jsonl"
     return events.exists() and events.stat().st_size > 0

@@ -1,4 +1,4 @@
-"""view: what it opens, in which words it refuses, and that it serves loopback alone."""
+"""view: which recordings it opens, its errors, and that it serves loopback alone."""
 
 import re
 import signal
@@ -13,49 +13,49 @@ from worldsim.recording.viewer import recordings
 
 
 @pytest.fixture
-def flown(small: Path, qswarm: Command) -> Path:
+def recorded(small: Path, qswarm: Command) -> Path:
     """Two recorded runs in one folder."""
-    told = qswarm(
+    printed = qswarm(
         "sim", small, "--seeds", "1:3", "--duration", "0.5", "--jobs", "1", "--out", "two"
     )
-    assert told.status == 1
+    assert printed.status == 1
     return small.parent / "two"
 
 
-def test_a_run_a_recording_and_a_folder_of_runs_are_found(flown: Path) -> None:
-    both = [flown / "small-seed1" / "run.rrd", flown / "small-seed2" / "run.rrd"]
-    assert recordings([flown]) == both
-    assert recordings([flown / "small-seed2", both[0]]) == both[::-1]
+def test_a_run_a_recording_and_a_folder_of_runs_are_found(recorded: Path) -> None:
+    both = [recorded / "small-seed1" / "run.rrd", recorded / "small-seed2" / "run.rrd"]
+    assert recordings([recorded]) == both
+    assert recordings([recorded / "small-seed2", both[0]]) == both[::-1]
 
 
 @pytest.mark.parametrize("web", [[], ["--web"]])
-def test_nothing_to_view_is_one_line_and_exit_2(
-    small: Path, qswarm: Command, web: list[str]
-) -> None:
+def test_no_recording_is_one_line_and_exit_2(small: Path, qswarm: Command, web: list[str]) -> None:
     small.with_name("bare").mkdir()
     for run, says in (("none", "none: no such run"), ("bare", "bare: no recording in it")):
-        told = qswarm("view", run, *web)
-        assert (told.status, told.out, told.err.count("\n")) == (2, "", 1)
-        assert told.err.startswith(says)
+        printed = qswarm("view", run, *web)
+        assert (printed.status, printed.out, printed.err.count("\n")) == (2, "", 1)
+        assert printed.err.startswith(says)
 
 
 def test_without_a_display_the_browser_is_named(
-    flown: Path, qswarm: Command, monkeypatch: pytest.MonkeyPatch
+    recorded: Path, qswarm: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for display in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(display, raising=False)
-    told = qswarm("view", flown)
-    assert (told.status, told.out) == (2, "")
-    assert "--web" in told.err
+    printed = qswarm("view", recorded)
+    assert (printed.status, printed.out) == (2, "")
+    assert "--web" in printed.err
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_browser_is_served_on_loopback_until_it_is_ended(
-    flown: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+    recorded: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
 ) -> None:
-    configuration = flown.parent / "configuration"
+    configuration = recorded.parent / "configuration"
     monkeypatch.setenv("XDG_CONFIG_HOME", str(configuration))
-    started = Started([*QSWARM, "view", "two", "--web"], flown.parent / "said", flown.parent)
+    started = Started(
+        [*QSWARM, "view", "two", "--web"], recorded.parent / "output", recorded.parent
+    )
     started.wait_for_output("Ctrl-C ends it")
     address = re.search(r"http://127\.0\.0\.1:\d+/", started.text)
     assert address is not None

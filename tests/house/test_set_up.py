@@ -1,6 +1,6 @@
-"""Set-up and launch, with a stand-in for Python that only makes believe it installs.
+"""Set-up and launch, with a stand-in for Python that pretends to install.
 
-The scripts are copied into a small checkout; what the stand-in was asked to do is in its log.
+The scripts are copied into a small checkout; the stand-in logs its calls.
 """
 
 import os
@@ -71,7 +71,7 @@ def script(checkout: Path) -> Script:
     return run
 
 
-def asked(checkout: Path) -> list[str]:
+def calls(checkout: Path) -> list[str]:
     log = checkout.parent / "log"
     return log.read_text().splitlines() if log.exists() else []
 
@@ -82,38 +82,38 @@ def test_the_first_start_sets_up_and_the_second_is_silent(checkout: Path, script
     assert (first.returncode, first.stdout) == (0, wedge + "\n")
     assert "setting up" in first.stderr
     assert (second.stdout, second.stderr) == (f"{wedge} --seed 3\n", "")
-    assert asked(checkout) == ["venv", f"pip {checkout}"]
+    assert calls(checkout) == ["venv", f"pip {checkout}"]
 
 
 @pytest.mark.parametrize(
     "arguments", [["my.toml", "--seed", "3"], ["--seed", "3", "my.toml"], ["other"]]
 )
-def test_a_scenario_that_is_named_is_taken(script: Script, arguments: list[str]) -> None:
+def test_a_given_scenario_is_passed_on(script: Script, arguments: list[str]) -> None:
     assert script("launch.sh", *arguments).stdout == f"qswarm run {' '.join(arguments)}\n"
 
 
-def test_a_setting_that_ends_like_a_scenario_is_none(checkout: Path, script: Script) -> None:
-    told = script("launch.sh", "--set", "formation.file=lines.toml").stdout
-    assert told.startswith(f"qswarm run {checkout}/deploy/scenarios/wedge-9.toml --set ")
+def test_a_setting_that_ends_in_toml_is_not_a_scenario(checkout: Path, script: Script) -> None:
+    printed = script("launch.sh", "--set", "formation.file=lines.toml").stdout
+    assert printed.startswith(f"qswarm run {checkout}/deploy/scenarios/wedge-9.toml --set ")
 
 
-def test_the_checks_add_what_they_need_and_launching_needs_no_more(
+def test_the_checks_install_more_and_launching_after_them_nothing(
     checkout: Path, script: Script
 ) -> None:
     assert script("launch.sh").returncode == 0
     assert script("test.sh").returncode == 0
     assert script("launch.sh").stderr == ""
-    assert asked(checkout) == ["venv", f"pip {checkout}", f"pip {checkout}[dev]"]
+    assert calls(checkout) == ["venv", f"pip {checkout}", f"pip {checkout}[dev]"]
 
 
-def test_every_check_is_told_and_pytest_has_the_last_word(script: Script) -> None:
+def test_every_check_is_reported_and_pytest_runs_last(script: Script) -> None:
     lines = script("test.sh", "-k", "wedge").stdout.splitlines()
     names = ["format", "lint", "types", "imports"]
     assert [line.split() for line in lines[:4]] == [[name, "passed"] for name in names]
     assert lines[-1] == "pytest -k wedge"
 
 
-def test_one_failed_check_fails_all_and_shows_why(checkout: Path, script: Script) -> None:
+def test_a_failed_check_fails_all_and_shows_its_output(checkout: Path, script: Script) -> None:
     script("test.sh")
     (checkout / ".venv/bin/mypy").write_text("#!/bin/bash\necho 'a.py: wrong'; exit 1\n")
     done = script("test.sh")
@@ -122,25 +122,25 @@ def test_one_failed_check_fails_all_and_shows_why(checkout: Path, script: Script
     assert done.stdout.splitlines()[-1].startswith("pytest")
 
 
-def test_a_set_up_that_was_cut_off_is_begun_anew(checkout: Path, script: Script) -> None:
+def test_an_interrupted_set_up_is_repeated(checkout: Path, script: Script) -> None:
     failed = script("launch.sh", BREAKS="pip")
     assert (failed.returncode, failed.stdout) == (2, "")
-    assert "the next start begins it anew" in failed.stderr
+    assert "the next start repeats it" in failed.stderr
     assert script("launch.sh").returncode == 0
-    assert asked(checkout) == ["venv", f"pip {checkout}"] * 2
+    assert calls(checkout) == ["venv", f"pip {checkout}"] * 2
 
 
-def test_other_requirements_are_installed_into_what_is_there(
+def test_changed_requirements_are_installed_into_the_same_environment(
     checkout: Path, script: Script
 ) -> None:
     script("launch.sh")
     with (checkout / "constraints.txt").open("a") as file:
         file.write("another==1.0\n")
     assert script("launch.sh").returncode == 0
-    assert asked(checkout) == ["venv", f"pip {checkout}", f"pip {checkout}"]
+    assert calls(checkout) == ["venv", f"pip {checkout}", f"pip {checkout}"]
 
 
-def test_a_checkout_that_was_moved_is_set_up_anew(checkout: Path, script: Script) -> None:
+def test_a_moved_checkout_is_set_up_again(checkout: Path, script: Script) -> None:
     script("launch.sh")
     checkout.rename(before := checkout.with_name("before"))
     shutil.copytree(before, checkout)
@@ -149,17 +149,17 @@ def test_a_checkout_that_was_moved_is_set_up_anew(checkout: Path, script: Script
     stamp = checkout / ".venv/set-up-run"
     stamp.write_text(stamp.read_text().replace(str(checkout), str(before)))
     assert script("launch.sh").returncode == 0
-    assert asked(checkout) == ["venv", f"pip {checkout}"] * 2
+    assert calls(checkout) == ["venv", f"pip {checkout}"] * 2
 
 
 @pytest.mark.parametrize(
     ("environment", "says"),
     [
-        ({"VERSION": "3.9.2"}, "is Python 3.9.2, 3.11 or newer is needed"),
-        ({"PYTHON": "no-such-python"}, "no 'no-such-python' here; install Python 3.11 or newer"),
+        ({"VERSION": "3.9.2"}, "is Python 3.9.2; 3.11 or newer is needed"),
+        ({"PYTHON": "no-such-python"}, "'no-such-python' not found; install Python 3.11 or newer"),
     ],
 )
-def test_without_a_python_that_does_it_says_so(
+def test_without_a_suitable_python_the_error_names_one(
     checkout: Path, script: Script, environment: dict[str, str], says: str
 ) -> None:
     done = script("launch.sh", **environment)

@@ -104,7 +104,7 @@ def test_a_run_passes_and_leaves_all_of_its_files(start: Start, scenario: Write,
     assert summary["real_time_factor"] > 1.0
     assert summary["packets"]["delivered"] > 0
     assert {event["agent"] for event in events_of(run) if event["kind"] == "slot"} == {0, 1, 2, 3}
-    assert "held" in fleet.text
+    assert "  met  " in fleet.text
     from worldsim.recording.verify import verify  # noqa: PLC0415 - a second that other tests save
 
     verification = verify(run)
@@ -116,7 +116,7 @@ def test_a_run_passes_and_leaves_all_of_its_files(start: Start, scenario: Write,
     assert delivery["frames"] == sum(each["frames"] for each in delivery["channels"].values())
     assert delivery["excess_ms"].keys() == {"p1", "p5", "p50", "p95", "p99", "max"}
     assert delivery["bound_ms"] == 62.5
-    assert "after due" in fleet.text
+    assert "extra delivery delay: " in fleet.text
     assert [row.alive for row in processes(run)] == [False] * 7
     none_left(pids(run))
 
@@ -191,8 +191,8 @@ def test_an_interrupt_before_take_off_is_reported_without_a_verdict(
     fleet.kill_group(signal.SIGINT)
     assert fleet.status(8.0) == 130, fleet.text
     assert fleet.text.endswith(f"interrupted before take-off; logs in {run}/logs\n")
-    assert "HELD" not in fleet.text
-    assert "to view the recording" not in fleet.text
+    assert "NOT MET" not in fleet.text
+    assert "view it: " not in fleet.text
     assert sorted(file.name for file in run.glob("*.*")) == ["fleet.json", "scenario.toml"]
     assert "world: interrupted before take-off" in (run / "logs/world.log").read_text()
 

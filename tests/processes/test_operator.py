@@ -40,12 +40,12 @@ def test_a_running_fleet_carries_out_commands_and_refuses_impossible_ones(
     assert command("netem", "set", "loss_percent=101")[0] == 2
     assert command("netem", "set", "loss_percent=20", "--for", "2")[0] == 0
     status, output = command("mission", "column.toml", "--to", "2")
-    assert (status, "formation agent 2: formation column" in output) == (0, True)
+    assert (status, "new formation 'column', given to a2" in output) == (0, True)
     assert command("fault", "kill", "3", "--for", "1")[0] == 0
     assert command("netem", "jam", "centre_m=[9,9,9]", "radius_m=0.5", "--for", "8")[0] == 0
     shown = command("netem", "show")[1]
     assert "range_m = 6" in shown
-    assert "not parted, 1 jam" in shown
+    assert "not partitioned, 1 jam" in shown
     assert "radius_m = 0.5" in shown
     paused = pids(run)["agent-1"]
     assert command("fault", "pause", "1")[0] == 0

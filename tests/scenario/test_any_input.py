@@ -1,4 +1,4 @@
-"""Whatever stands in a file: a scenario comes out, or one line that says what is wrong."""
+"""Any content of a file gives a scenario, or an error of one line."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -93,7 +93,7 @@ def test_it_is_a_scenario_or_one_line(text: str) -> None:
 
 
 @given(st.text(max_size=60))
-def test_any_text_is_refused_in_one_line(text: str) -> None:
+def test_any_text_is_rejected_in_one_line(text: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         parse(text, "any.toml")
     assert str(caught.value).isprintable()
@@ -108,7 +108,7 @@ def tables_within(kind: Any) -> Iterator[Any]:
         yield from tables_within(inner)
 
 
-def test_there_are_words_for_every_key_of_the_format() -> None:
+def test_every_key_of_the_format_has_an_allowed_values_text() -> None:
     kinds = set(tables_within(Scenario))
     assert len(kinds) > 10
     for kind in kinds:

@@ -1,4 +1,4 @@
-"""Bad input: each case names the file and the key, in one line, before anything is built."""
+"""Bad input: the error names the file and the key, in one line, before anything is built."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ OVERRIDDEN = [
     ("netem.range_m", "-6", "netem.range_m", "above 0"),
     ("netem.range_m", "0", "netem.range_m", "above 0"),
     ("netem.range_m", "nan", "netem.range_m", "finite"),
-    ("netem.range_m", "inf", "netem.range_m", "leave it out"),
+    ("netem.range_m", "inf", "netem.range_m", "inf is not allowed; give a finite number, or omit"),
     ("netem.delay_ms", "-1", "netem.delay_ms", "from 0"),
     ("netem.loss_percent", "abc", "netem.loss_percent", "got the text 'abc'; allowed: a number"),
     ("netem.loss_percent", "101", "netem.loss_percent", "up to 100"),
@@ -28,7 +28,7 @@ OVERRIDDEN = [
     ("fleet.agents", "0", "fleet.agents", "a whole number from 1 up to 1000"),
     ("fleet.agents", "1.5", "fleet.agents", "a whole number"),
     ("fleet.agents", "true", "fleet.agents", "got true"),
-    ("fleet.agents.x", "1", "fleet.agents", "no table"),
+    ("fleet.agents.x", "1", "fleet.agents", "is not a table"),
     ("fleet", "3", "fleet", "a table of agents, tick_hz, start"),
     ("fleet.tick_hz", "0", "fleet.tick_hz", "above 0"),
     ("fleet.start", "{ size_m = [1, 1, 1] }", "fleet.start.kind", "'box' or 'list'"),
@@ -51,17 +51,17 @@ OVERRIDDEN = [
     ("duration_s", "0.001", "duration_s", "at least one tick"),
     ("formation.file", "nope.toml", "formation.file", "no such file"),
     ("formation.file", "7", "formation.file", "as text"),
-    ("formation.name", "x", "formation.name", "not beside file"),
+    ("formation.name", "x", "formation.name", "cannot be combined with file"),
     ("formation", "{}", "formation.name", "is missing"),
     ("a..b", "1", "a..b", "table.key"),
 ]
 
 
-@pytest.mark.parametrize(("key", "value", "told", "says"), OVERRIDDEN)
-def test_the_key_at_fault_is_named(key: str, value: str, told: str, says: str) -> None:
+@pytest.mark.parametrize(("key", "value", "named", "says"), OVERRIDDEN)
+def test_an_error_names_its_key(key: str, value: str, named: str, says: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         load(WEDGE, {key: value})
-    assert str(caught.value).startswith(f"{WEDGE}: {told}: ")
+    assert str(caught.value).startswith(f"{WEDGE}: {named}: ")
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -96,7 +96,7 @@ FORMATIONS = [
 
 
 @pytest.mark.parametrize(("vertices", "queues", "key", "says"), FORMATIONS)
-def test_a_formation_file_at_fault_is_named_itself(
+def test_an_error_in_a_formation_file_names_that_file(
     tmp_path: Path, vertices: str, queues: str, key: str, says: str
 ) -> None:
     formation = tmp_path / "f.toml"
@@ -108,7 +108,7 @@ def test_a_formation_file_at_fault_is_named_itself(
 
 
 @pytest.mark.parametrize(("vertices", "queues", "key", "says"), FORMATIONS)
-def test_a_formation_in_place_is_told_by_its_key(
+def test_an_error_in_an_inline_formation_names_its_key(
     vertices: str, queues: str, key: str, says: str
 ) -> None:
     text = f"fleet = {{ agents = 2 }}\n[formation]\nname = 'f'\n{vertices}\nqueue = [{queues}]\n"
@@ -132,7 +132,7 @@ def test_a_formation_in_place_is_told_by_its_key(
         (b'"a\\nb" = 1\n', "a\\nb: unknown key"),
     ],
 )
-def test_a_file_that_is_no_scenario(tmp_path: Path, content: bytes, says: str) -> None:
+def test_a_file_that_is_not_a_scenario(tmp_path: Path, content: bytes, says: str) -> None:
     file = tmp_path / "broken.toml"
     file.write_bytes(content)
     with pytest.raises(ScenarioError) as caught:
@@ -142,14 +142,14 @@ def test_a_file_that_is_no_scenario(tmp_path: Path, content: bytes, says: str) -
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+def test_a_missing_file_or_a_folder(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match=r"none\.toml: no such file"):
         load(tmp_path / "none.toml")
     with pytest.raises(ScenarioError, match="cannot be read: Is a directory"):
         load(tmp_path)
 
 
-def test_an_override_is_told_as_one() -> None:
+def test_an_error_in_an_override_mentions_the_command_line() -> None:
     with pytest.raises(ScenarioError, match="it was set on the command line"):
         load(WEDGE, {"fleet.agents": "0"})
     with pytest.raises(ScenarioError) as caught:
@@ -157,7 +157,7 @@ def test_an_override_is_told_as_one() -> None:
     assert "command line" not in str(caught.value)
 
 
-def test_slots_too_near_to_one_another_are_refused() -> None:
+def test_slots_too_close_together_are_rejected() -> None:
     second = QUEUE.replace("'Q'", "'R'").replace("'V1'", "'V2'")
     near = f"{{ name = 'f', vertices = {{ V1 = [0, 0, 0], V2 = [0.4, 0, 0] }}, queue = [{QUEUE},"
     with pytest.raises(ScenarioError, match=r"formation\.queue 'Q' and 'R': .* at least 0\.5 m"):
@@ -190,7 +190,7 @@ LINKS = [
 
 @pytest.mark.parametrize(("key", "value", "says"), LINKS)
 @pytest.mark.parametrize("table", ["netem", "netem.local", "netem.multihop"])
-def test_a_link_that_cannot_be_is_refused(table: str, key: str, value: str, says: str) -> None:
+def test_an_invalid_link_is_rejected(table: str, key: str, value: str, says: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         load(WEDGE, {f"{table}.{key}": value})
     assert f": {table}.{key.partition('.')[0]}" in str(caught.value)

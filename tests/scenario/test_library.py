@@ -12,15 +12,15 @@ from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
 from worldsim.scenario.file import load
+from worldsim.scenario.library import FORMATIONS, SCENARIOS
 from worldsim.scenario.rules import warnings_for
 
-LIBRARY = Path("deploy/formations")
-SCENARIOS = sorted(Path("deploy/scenarios").glob("*.toml"))
+FILES = sorted(SCENARIOS.rglob("*.toml"))
 EDGE = 1.0 / sqrt(3.0)
 
 
 def formation(name: str) -> Formation:
-    spec = msgspec.toml.decode((LIBRARY / f"{name}.toml").read_bytes(), type=FormationSpec)
+    spec = msgspec.toml.decode((FORMATIONS / f"{name}.toml").read_bytes(), type=FormationSpec)
     return Formation(spec, spacing=1.0)
 
 
@@ -30,20 +30,20 @@ def slot(team: Formation, queue: int, rank: int) -> Vector:
     return found.point
 
 
-@pytest.mark.parametrize("file", SCENARIOS, ids=lambda file: file.stem)
-def test_every_scenario_of_the_library_is_sound(file: Path) -> None:
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_every_scenario_is_valid_without_warnings_and_named_as_its_file(file: Path) -> None:
     scenario = load(file)
     assert scenario.name == file.stem
     assert warnings_for(scenario) == []
 
 
-@pytest.mark.parametrize("file", sorted(LIBRARY.glob("*.toml")), ids=lambda file: file.stem)
-def test_every_formation_of_the_library_is_sound_and_named_as_its_file(file: Path) -> None:
+@pytest.mark.parametrize("file", sorted(FORMATIONS.rglob("*.toml")), ids=lambda file: file.stem)
+def test_every_formation_is_valid_and_named_as_its_file(file: Path) -> None:
     assert formation(file.stem).name == file.stem
 
 
-def test_wedge_9_is_what_its_figures_say() -> None:
-    scenario = load(Path("deploy/scenarios/wedge-9.toml"))
+def test_wedge_9_is_the_documented_example() -> None:
+    scenario = load(SCENARIOS / "wedge-9.toml")
     assert (scenario.fleet.agents, scenario.duration_s, scenario.netem.range_m) == (9, 20.0, 6.0)
     assert scenario.expect.converge_within_s == 12.0
 
@@ -51,9 +51,9 @@ def test_wedge_9_is_what_its_figures_say() -> None:
 def test_the_wedge_runs_back_from_its_apex_along_four_edges() -> None:
     wedge = formation("pyramidal-wedge")
     ends = {slot(wedge, queue, 1) for queue in range(4)}
-    wanted = [(-EDGE, y * EDGE, z * EDGE) for y in (-1, 1) for z in (-1, 1)]
+    corners = [(-EDGE, y * EDGE, z * EDGE) for y in (-1, 1) for z in (-1, 1)]
     assert len(ends) == 4
-    assert all(min(dist(end, corner) for end in ends) < 1e-12 for corner in wanted)
+    assert all(min(dist(end, corner) for end in ends) < 1e-12 for corner in corners)
     assert wedge.layout(9).places[0] == wedge.vertex_places["V1"]
 
 
@@ -95,7 +95,7 @@ def divided(draw: st.DrawFn, sharing: tuple[bool, ...] = (False, True)) -> tuple
 
 
 @given(divided())
-def test_nobody_is_left_over_and_nobody_counted_twice(case: tuple[Formation, int]) -> None:
+def test_every_agent_gets_exactly_one_place(case: tuple[Formation, int]) -> None:
     team, agents = case
     common = min(agents, len(team.common))
     assert sum(team.divide(agents)) + common == agents
@@ -114,7 +114,7 @@ def test_each_queue_gets_its_share_rounded_down_or_up(case: tuple[Formation, int
 
 
 @given(divided(sharing=(False,)))
-def test_every_vertex_is_manned_before_anybody_stands_behind_one(
+def test_every_vertex_is_filled_before_a_second_slot_is(
     case: tuple[Formation, int],
 ) -> None:
     team, agents = case
@@ -123,7 +123,7 @@ def test_every_vertex_is_manned_before_anybody_stands_behind_one(
 
 
 @given(divided(sharing=(True,)))
-def test_who_is_rounded_up_had_the_larger_remainder(case: tuple[Formation, int]) -> None:
+def test_queues_with_the_larger_remainders_are_rounded_up(case: tuple[Formation, int]) -> None:
     team, agents = case
     free = max(0, agents - len(team.common))
     rests = [

@@ -1,4 +1,4 @@
-"""A resolved scenario is a scenario: what is dumped is parsed to the same."""
+"""A resolved scenario is a scenario: parsing what is dumped gives an equal one."""
 
 from typing import Any
 
@@ -70,13 +70,13 @@ def scenarios(draw: st.DrawFn) -> Scenario:
 
 
 @given(scenarios())
-def test_what_is_dumped_is_parsed_to_the_same(scenario: Scenario) -> None:
+def test_parsing_a_dumped_scenario_gives_it_back(scenario: Scenario) -> None:
     text = dump(scenario)
     assert parse(text) == scenario
     assert dump(parse(text)) == text
 
 
-def test_every_default_is_written_out_and_nothing_else() -> None:
+def test_defaults_are_written_and_missing_values_are_not() -> None:
     text = dump(parse("fleet = { agents = 1 }\n[formation]\n" + ONE_QUEUE))
     assert "max_speed_mps = 0.5" in text
     assert "direction = [0.0, 0.0, 1.0]" in text

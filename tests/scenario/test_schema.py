@@ -1,4 +1,4 @@
-"""The JSON Schema of a scenario file takes what check takes, and refuses what no key may hold."""
+"""The JSON Schema of a scenario file accepts what check accepts, and rejects invalid values."""
 
 import json
 import tomllib
@@ -10,7 +10,7 @@ from jsonschema import Draft202012Validator, ValidationError
 
 from worldsim.commands.app import command
 from worldsim.scenario.file import dump, parse
-from worldsim.scenario.library import FOLDER
+from worldsim.scenario.library import SCENARIOS
 from worldsim.scenario.schema import schema
 from worldsim.scenario.template import template
 
@@ -23,12 +23,12 @@ def test_it_is_a_schema_and_check_prints_it(capsys: pytest.CaptureFixture[str]) 
     assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(schema()))
 
 
-@pytest.mark.parametrize("file", sorted(FOLDER.rglob("*.toml")), ids=lambda file: file.stem)
-def test_it_takes_the_library(file: Path) -> None:
+@pytest.mark.parametrize("file", sorted(SCENARIOS.rglob("*.toml")), ids=lambda file: file.stem)
+def test_it_accepts_the_library(file: Path) -> None:
     VALIDATOR.validate(tomllib.loads(file.read_text()))
 
 
-def test_it_takes_a_formation_in_place_and_a_resolved_scenario() -> None:
+def test_it_accepts_an_inline_formation_and_a_resolved_scenario() -> None:
     VALIDATOR.validate(tomllib.loads(template("placed")))
     VALIDATOR.validate(tomllib.loads(dump(parse(template("placed")))))
 
@@ -47,6 +47,6 @@ def test_it_takes_a_formation_in_place_and_a_resolved_scenario() -> None:
         ("netem", {"los_percent": 50}),
     ],
 )
-def test_it_refuses_what_no_key_may_hold(key: str, value: Any) -> None:
+def test_it_rejects_invalid_values(key: str, value: Any) -> None:
     with pytest.raises(ValidationError):
         VALIDATOR.validate({**tomllib.loads(template("bad")), key: value})

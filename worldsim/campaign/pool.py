@@ -1,7 +1,7 @@
-"""Runs in virtual time, one or many: each into its folder, many with a summary over all.
+"""Runs in virtual time, one or many: each into its own folder, and a summary over many.
 
-Who is asked to stop ends the runs in flight between slots: each writes a summary of what there was,
-and runs that have not begun leave nothing.
+A stop request ends the active runs between two slots. Each of them writes a summary of what it
+has simulated so far; runs that have not begun leave nothing.
 """
 
 import multiprocessing
@@ -15,63 +15,71 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypedDict
 
 from netem.wire.shutdown import StopRequest
 from worldsim.engine.step import SlotLoop
-from worldsim.engine.virtual import fly
+from worldsim.engine.virtual import Flight, fly
+from worldsim.results.provenance import provenance
 from worldsim.results.run_folder import RunDirectory
 from worldsim.results.sinks import open_sinks
-from worldsim.results.summary import summarise
+from worldsim.results.summary import FinishedRun, Summary, summarise
 from worldsim.scenario.tables import Scenario
 
-Summary = dict[str, Any]
-LOOK_EVERY_S = 0.2
+POLL_EVERY_S = 0.2
 
 
 class Job(NamedTuple):
-    """One run to fly: the scenario, where to, and whether to record it."""
+    """One run to make."""
 
     scenario: Scenario
-    folder: Path | None
+    folder: Path | None  # a new folder; None: one named after the scenario and the time
     recording: bool
+
+
+class Result(NamedTuple):
+    """One run that was made."""
+
+    folder: Path
+    summary: Summary
 
 
 def simulate(
     job: Job, stop: StopRequest, on_progress: Callable[[SlotLoop], None] | None = None
-) -> Summary:
-    """Fly one run into a new folder; return its summary and, under ``folder``, where it is.
+) -> Result:
+    """Make one run, and write its folder. A stop request ends it early, and inconclusive.
 
-    It ends early when ``stop`` is asked for, inconclusive.
     Raises RunDirectoryError when the folder exists or cannot be written.
     """
     scenario = job.scenario
     directory = RunDirectory.create(job.folder, scenario)
-    notes = open_sinks(directory, scenario, directory.path.name, "virtual", job.recording)
+    sinks = open_sinks(directory, scenario, directory.path.name, "virtual", job.recording)
     try:
-        flight = fly(scenario, notes, on_progress=on_progress, unwanted=lambda: stop.requested)
+        flight = fly(scenario, sinks, on_progress=on_progress, unwanted=lambda: stop.requested)
     finally:
-        notes.close()
-    flown_s = flight.loop.world.time_s
-    summary = summarise(
-        scenario,
-        flight.loop,
+        sinks.close()
+    summary = summarise(scenario, finished(flight, scenario))
+    directory.write_summary(summary)
+    return Result(directory.path, summary)
+
+
+def finished(flight: Flight, scenario: Scenario) -> FinishedRun:
+    """Return a flight in virtual time for its summary; no tick can be late there."""
+    world = flight.loop.world
+    return FinishedRun(
         mode="virtual",
+        loop=flight.loop,
         medium_counters=flight.medium_counters,
         late_tick_fraction=0.0,
-        real_time_factor=flown_s / flight.wall_s,
-        duration_s=flown_s,
-        interrupted=flight.loop.world.slot < scenario.slots,
-        host_too_slow=False,
+        real_time_factor=world.time_s / flight.wall_s,
+        cut_off_by="interrupted" if world.slot < scenario.slots else None,
     )
-    directory.write_summary(summary)
-    return {**summary, "folder": str(directory.path)}
 
 
-def sweep(jobs: list[Job], workers: int, stop: StopRequest) -> Iterator[Summary]:
-    """Fly many runs in up to ``workers`` processes; yield each summary as it is done.
+def sweep(jobs: list[Job], workers: int, stop: StopRequest) -> Iterator[Result]:
+    """Make many runs in up to ``workers`` processes; yield each result as soon as it is there.
 
-    When ``stop`` is asked for, the runs in flight are the last.
+    After a stop request no further run begins.
     """
     if workers == 1 or len(jobs) == 1:
         for job in jobs:
@@ -79,47 +87,48 @@ def sweep(jobs: list[Job], workers: int, stop: StopRequest) -> Iterator[Summary]
                 yield simulate(job, stop)
         return
     with _pool(min(workers, len(jobs))) as pool:
-        yield from _done([pool.submit(_in_worker, job) for job in jobs], stop)
+        yield from _results([pool.submit(_in_worker, job) for job in jobs], stop)
 
 
-def _done(pending: list[Future[Summary | None]], stop: StopRequest) -> Iterator[Summary]:
+def _results(pending: list[Future[Result | None]], stop: StopRequest) -> Iterator[Result]:
     interrupted = False
     while pending:
-        done, _ = wait(pending, LOOK_EVERY_S, FIRST_COMPLETED)
-        finished = [future for future in pending if future in done]
+        done, _ = wait(pending, POLL_EVERY_S, FIRST_COMPLETED)
+        completed = [future for future in pending if future in done]
         pending = [future for future in pending if future not in done]
-        for future in finished:
-            summary = _result(future, stop)
-            if summary is not None:
-                yield summary
+        for future in completed:
+            result = _result(future, stop)
+            if result is not None:
+                yield result
         if stop.requested and not interrupted:
             interrupted = True
             _interrupt(pending)
 
 
-def _interrupt(pending: list[Future[Summary | None]]) -> None:
+def _interrupt(pending: list[Future[Result | None]]) -> None:
     for future in pending:
         future.cancel()
     for worker in multiprocessing.active_children():
         worker.terminate()
 
 
-def _result(future: Future[Summary | None], stop: StopRequest) -> Summary | None:
-    """Return what a worker brought; None for a run that an interruption kept from beginning."""
+def _result(future: Future[Result | None], stop: StopRequest) -> Result | None:
+    """Return a worker's result; None for a run that did not begin before a stop request."""
     if future.cancelled():
         return None
     try:
         return future.result()
     except BrokenProcessPool:
-        # A worker that is told to end before it can hear of it just ends.
+        # SIGTERM ends a worker that has not installed its handler yet.
         if stop.requested:
             return None
         raise
 
 
-def over_all(summaries: Iterable[Summary], interrupted: bool = False) -> Summary:
-    """Return the summary over many runs, by scenario, with a row for each run."""
-    rows = sorted(summaries, key=lambda summary: (summary["scenario"], summary["seed"]))
+def over_all(results: Iterable[Result], interrupted: bool = False) -> dict[str, Any]:
+    """Return the summary over many runs: figures by scenario, and a row for each run."""
+    rows = [_row(result) for result in results]
+    rows.sort(key=lambda row: (row["scenario"], row["seed"]))
     names = sorted({row["scenario"] for row in rows})
     outcomes = [row["outcome"] for row in rows] + ["inconclusive"] * interrupted
     return {
@@ -129,29 +138,32 @@ def over_all(summaries: Iterable[Summary], interrupted: bool = False) -> Summary
         "outcome": next((bad for bad in ("fail", "inconclusive") if bad in outcomes), "pass"),
         "reason": "interrupted" if interrupted else None,
         "scenarios": [_of_scenario(name, rows) for name in names],
-        "rows": [_row(row) for row in rows],
+        "rows": rows,
+        **provenance(),
     }
 
 
-def _of_scenario(name: str, rows: list[Summary]) -> Summary:
-    mine = [_row(row) for row in rows if row["scenario"] == name]
-    figures = ("min_separation_m", "converge_s", "residual_m", "turns_over_limit_fraction")
-    return {
-        "scenario": name,
-        "runs": len(mine),
-        **{
-            outcome: sum(row["outcome"] == outcome for row in mine)
-            for outcome in ("pass", "fail", "inconclusive")
-        },
-        **{figure: _spread([row[figure] for row in mine]) for figure in figures},
-    }
+class Row(TypedDict):
+    """A run's row in the summary over many runs, under the keys of summary.json."""
+
+    run: str  # its folder's name
+    scenario: str
+    seed: int
+    outcome: str
+    reason: str | None
+    min_separation_m: float | None
+    converge_s: float | None  # of several formations the slowest
+    residual_m: float | None  # of several formations the largest
+    turns_over_limit_fraction: float | None
+    real_time_factor: float | None
+    trace_sha256: str | None
 
 
-def _row(summary: Summary) -> Summary:
-    """Return a run's line: of several formations the slowest and the worst residual count."""
+def _row(result: Result) -> Row:
+    summary = result.summary
     phases = summary["phases"]
     return {
-        "run": Path(summary["folder"]).name,
+        "run": result.folder.name,
         "scenario": summary["scenario"],
         "seed": summary["seed"],
         "outcome": summary["outcome"],
@@ -165,13 +177,29 @@ def _row(summary: Summary) -> Summary:
     }
 
 
+def _of_scenario(name: str, rows: list[Row]) -> dict[str, Any]:
+    own = [row for row in rows if row["scenario"] == name]
+    return {
+        "scenario": name,
+        "runs": len(own),
+        **{
+            outcome: sum(row["outcome"] == outcome for row in own)
+            for outcome in ("pass", "fail", "inconclusive")
+        },
+        "min_separation_m": _spread([row["min_separation_m"] for row in own]),
+        "converge_s": _spread([row["converge_s"] for row in own]),
+        "residual_m": _spread([row["residual_m"] for row in own]),
+        "turns_over_limit_fraction": _spread([row["turns_over_limit_fraction"] for row in own]),
+    }
+
+
 def _worst(values: list[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return max(known) if len(known) == len(values) and known else None
 
 
-def _spread(values: list[float | None]) -> Summary | None:
-    """Return least, median and greatest of what was measured, and in how many runs it was."""
+def _spread(values: list[float | None]) -> dict[str, float] | None:
+    """Return minimum, median and maximum over the runs that measured a value; None: no run did."""
     known = [value for value in values if value is not None]
     if not known:
         return None
@@ -185,7 +213,7 @@ def _spread(values: list[float | None]) -> Summary | None:
 
 @contextmanager
 def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Worker processes that end with this one, however it ends."""
+    """Give worker processes that end when this process ends, however it ends."""
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
     try:
@@ -203,13 +231,13 @@ def _stop_of_worker() -> StopRequest:
     return StopRequest()
 
 
-def _in_worker(job: Job) -> Summary | None:
+def _in_worker(job: Job) -> Result | None:
     stop = _stop_of_worker()
     return None if stop.requested else simulate(job, stop)
 
 
 def _begin_worker() -> None:
-    """Leave Ctrl-C to the parent, who asks by SIGTERM, and go when the parent is gone."""
+    """Ignore Ctrl-C, which the parent passes on as SIGTERM, and end when the parent is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _stop_of_worker()
     threading.Thread(target=_leave_with_parent, daemon=True).start()

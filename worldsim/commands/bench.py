@@ -1,4 +1,4 @@
-"""The command about speed: qswarm bench."""
+"""The command about speed: ``bench``."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -6,19 +6,29 @@ from typing import Annotated
 
 import typer
 
-Repeats = Annotated[
-    int, typer.Option(min=1, max=100, help="How often each is measured; the best counts.")
-]
-Json = Annotated[
-    Path | None,
-    typer.Option("--json", metavar="FILE", help="Where the figures go besides, as JSON."),
-]
+from worldsim.commands.options import examples
+from worldsim.results.exit_status import PASS
+
+commands = typer.Typer()
 
 
-def bench(repeats: Repeats = 3, json: Json = None) -> int:
-    """Measure what a control step, a frame in the medium, virtual time and a recording cost.
+@commands.command(epilog=examples("qswarm bench", "qswarm bench --repeats 5 --json speed.json"))
+def bench(
+    repeats: Annotated[
+        int,
+        typer.Option(
+            metavar="N", min=1, max=100, help="Measurements of each figure; the best one counts."
+        ),
+    ] = 3,
+    json: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="Also write the figures as JSON."),
+    ] = None,
+) -> int:
+    """Measure the CPU cost of agents, radio and recording.
 
-    CPU time of one core, never the wall clock; a busy host still adds to it. Takes half a minute.
+    The figures are CPU time of one core, not wall time, though a busy host still adds to them.
+    It takes about half a minute.
     """
     from worldsim.bench.table import measured
     from worldsim.results.run_folder import write_json
@@ -29,9 +39,9 @@ def bench(repeats: Repeats = 3, json: Json = None) -> int:
     rows = []
     for row in measured(repeats):
         rows.append({**asdict(row), "reached": row.reached})
-        against = f"goal {'>=' if row.more else '<='} {row.goal:g}"
+        goal = f"goal {'>=' if row.more else '<='} {row.goal:g}"
         verdict = "" if row.reached else "  not reached"
-        print(f"{row.name:44} {row.measured:10.1f} {row.unit:18} {against}{verdict}", flush=True)
+        print(f"{row.name:44} {row.measured:10.1f} {row.unit:18} {goal}{verdict}", flush=True)
     if json is not None:
         write_json(json, {"rows": rows})
-    return 0
+    return PASS

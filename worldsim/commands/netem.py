@@ -1,4 +1,4 @@
-"""The command about the radio: qswarm netem check SCENARIO, and netem RUN for a running fleet."""
+"""The command about the radio: ``netem check SCENARIO``, and ``netem RUN`` for a running fleet."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -6,59 +6,80 @@ from typing import Annotated
 
 import typer
 
-from worldsim.commands.operate import ForSeconds, radio
-from worldsim.commands.options import Seed, Settings, overrides_of
+from worldsim.commands.operate import ForSeconds, change_radio
+from worldsim.commands.options import Seed, Settings, examples, overrides_of
+from worldsim.results.exit_status import FAIL, PASS
 
 PICTURES = (".png", ".svg", ".pdf")
-Words = Annotated[
-    list[str],
-    typer.Argument(
-        metavar="(check SCENARIO | RUN VERB [WORD]...)",
-        help="VERB: show, set, partition, heal, jam or flap; WORD: KEY=VALUE.",
-    ),
-]
-Plot = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE", help="Where the picture goes. [runs/SCENARIO-netem-TIME.png]"),
-]
+
+commands = typer.Typer()
 
 
+@commands.command(
+    epilog=examples(
+        "qswarm netem check bursty-9",
+        "qswarm netem check my.toml --set netem.loss_percent=50 --plot radio.png",
+        "qswarm netem runs/mine set loss_percent=50 multihop.delay_ms=200 --for 10",
+        "qswarm netem runs/mine partition 0,1/2,3",
+        "qswarm netem runs/mine partition groups=[[0,1]] kind=one_way --for 5",
+        "qswarm netem runs/mine jam centre_m=[0,0,0] radius_m=2",
+        "qswarm netem runs/mine show",
+    )
+)
 def netem(
-    words: Words,
+    words: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="check SCENARIO | RUN ACTION [KEY=VALUE]",
+            help="ACTION: show, set, partition, heal, jam or flap.",
+        ),
+    ],
     seed: Seed = None,
     settings: Settings = None,
-    plot: Plot = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Picture that check draws (png, svg or pdf).",
+            show_default="runs/SCENARIO-netem-TIME.png",
+        ),
+    ] = None,
     for_s: ForSeconds = None,
 ) -> int:
-    """Try a scenario's radio, or change that of a running fleet.
+    """Check a scenario's radio, or change a running fleet's radio.
 
-    check: 100 000 packets a link, configured against measured; a picture.
+    check sends 100 000 packets over each kind of link, compares what was configured with what was
+    measured, and draws a picture.
     """
     match words:
         case ["check", scenario]:
-            return _check(Path(scenario), overrides_of(settings, None, seed, None), plot)
-        case [run, verb, *rest]:
-            return radio(Path(run), verb, rest, for_s)
+            return _check(scenario, overrides_of(settings, None, seed, None), plot)
+        case [run, action, *rest]:
+            return change_radio(Path(run), action, rest, for_s)
     raise typer.BadParameter(
-        f"{' '.join(words)!r}; check SCENARIO, or RUN and a verb", param_hint="netem"
+        f"{' '.join(words)!r}; write check SCENARIO, or RUN ACTION", param_hint="netem"
     )
 
 
-def _check(file: Path, overrides: dict[str, str], plot: Path | None) -> int:
+def _check(given: str, overrides: dict[str, str], plot: Path | None) -> int:
     from worldsim.link_check.report import report
     from worldsim.scenario.file import load
+    from worldsim.scenario.library import find_scenario
     from worldsim.scenario.toml import ScenarioError
 
-    scenario = load(file, overrides)
+    scenario = load(find_scenario(given), overrides)
     if plot is not None and plot.suffix not in PICTURES:
-        raise typer.BadParameter(f"'{plot}'; it ends in {', '.join(PICTURES)}", param_hint="--plot")
+        detail = f"'{plot}'; must end in {', '.join(PICTURES)}"
+        raise typer.BadParameter(detail, param_hint="--plot")
     picture = plot or Path("runs") / f"{scenario.name}-netem-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.png"
     if picture.exists():
         raise ScenarioError(picture, "", "exists; nothing is overwritten")
     try:
         all_ok = report(scenario, picture)
+    except BrokenPipeError:  # of the output, not of the picture
+        raise
     except OSError as error:
         raise ScenarioError(picture, "", f"cannot be written: {error.strerror}") from error
     result = "ok: all within" if all_ok else "OUTSIDE: not all within"
     print(f"\n{result} tolerance; drawn in {picture}")
-    return 0 if all_ok else 1
+    return PASS if all_ok else FAIL

@@ -1,4 +1,8 @@
-"""Commands to a running fleet: qswarm mission | fault | netem RUN; the last is read elsewhere."""
+"""The commands to a running fleet: ``mission`` and ``fault``, and what ``netem RUN`` does.
+
+A running fleet is found by its run directory. Its world carries out the request and answers with
+the events that followed.
+"""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -6,69 +10,103 @@ from typing import Annotated, Any
 import typer
 
 from worldsim.commands.options import RunFolder, examples
+from worldsim.results.exit_status import PASS
 
-VERBS = ("kill", "leave", "restart", "pause", "resume", "join")
-UNSPOKEN = frozenset({"planned", "by", "tables", "conditions", "path", "number"})
-RADIO = ("show", "set", "partition", "heal", "jam", "flap")
+FAULTS = ("kill", "leave", "restart", "pause", "resume", "join")
+RADIO_ACTIONS = ("show", "set", "partition", "heal", "jam", "flap")
 ForSeconds = Annotated[
-    float | None, typer.Option("--for", metavar="S", help="Undo it after so many seconds.")
+    float | None, typer.Option("--for", metavar="S", help="Undo it after S simulated seconds.")
 ]
 
-
-def attach(app: typer.Typer) -> None:
-    """Add these commands to the command line."""
-    for command, lines in COMMANDS:
-        app.command(epilog=examples(*lines))(command)
+commands = typer.Typer()
 
 
+@commands.command(
+    epilog=examples(
+        "qswarm mission runs/mine three-horizontal-lines --to 4",
+        "qswarm mission runs/mine my-formation.toml",
+        "qswarm mission runs/mine --frame yaw_deg=90",
+        "qswarm mission runs/mine --frame waypoints_m=[[0,0,0],[9,0,0]] --frame speed_mps=0.2",
+    )
+)
 def mission(
     run: RunFolder,
     formation: Annotated[
-        Path | None, typer.Argument(metavar="[FORMATION]", help="A formation file (TOML).")
+        str | None,
+        typer.Argument(
+            metavar="FORMATION", help="A formation file (TOML), or a formation of the library."
+        ),
     ] = None,
     to: Annotated[
-        int | None, typer.Option(metavar="I", help="The agent that it is given to. [the lowest id]")
+        int | None,
+        typer.Option(
+            metavar="I", help="Agent that receives the mission.", show_default="lowest id"
+        ),
     ] = None,
     frame: Annotated[
         list[str] | None,
-        typer.Option(metavar="KEY=VALUE", help="Where the frame goes, keys as in [frame]."),
+        typer.Option(
+            metavar="KEY=VALUE", help="Change a key of the target frame, as in [frame]; repeatable."
+        ),
     ] = None,
     version: Annotated[
-        int | None, typer.Option(metavar="N", help="Its version. [the next]")
+        int | None,
+        typer.Option(metavar="N", help="Version of the mission.", show_default="the next one"),
     ] = None,
 ) -> int:
-    """Give a running team a new formation, or a new frame: to one agent, it spreads by radio."""
+    """Give a running fleet a new formation or target frame.
+
+    One agent receives the mission; it spreads to the others by radio.
+    """
     if (formation is None) == (not frame):
-        raise typer.BadParameter("a formation file or --frame, one of them", param_hint="mission")
+        raise typer.BadParameter(
+            "give either a formation or --frame, exactly one of them", param_hint="mission"
+        )
     event = {"frame": _table(frame or [])} if formation is None else _formation(formation)
-    return _told(run, event, to=to, version=version)
+    return _request(run, event, to=to, version=version)
 
 
+@commands.command(
+    epilog=examples(
+        "qswarm fault runs/mine kill 2 vertex:V1 --for 5",
+        "qswarm fault runs/mine pause random:2",
+        "qswarm fault runs/mine join 2",
+    )
+)
 def fault(
     run: RunFolder,
-    verb: Annotated[str, typer.Argument(metavar="VERB", help="One of: " + ", ".join(VERBS))],
-    whom: Annotated[
+    action: Annotated[
+        str, typer.Argument(metavar="ACTION", help="One of: " + ", ".join(FAULTS) + ".")
+    ],
+    selectors: Annotated[
         list[str],
-        typer.Argument(metavar="SELECTOR...", help="Ids, vertex:V1, queue:Q1, random:2 or all."),
+        typer.Argument(
+            metavar="SELECTOR",
+            help="Agents: ids, vertex:V1, queue:Q1, random:2 or all. With join: how many.",
+        ),
     ],
     for_s: ForSeconds = None,
 ) -> int:
-    """Hurt a running fleet: processes that die, stop, come back; 'join N' for new ones."""
-    if verb not in VERBS:
-        raise typer.BadParameter(f"{verb!r}; {', '.join(VERBS)}", param_hint="VERB")
-    if verb == "join":
-        return _told(run, {"join": _number(" ".join(whom))}, for_s=for_s)
-    chosen = [int(each) if each.isdecimal() else each for each in whom]
-    return _told(run, {verb: chosen}, for_s=for_s)
+    """Inject a process fault into a running fleet.
+
+    kill ends processes, leave removes the vehicles too, restart brings them back; pause stops
+    processes until resume; join adds new agents.
+    """
+    if action not in FAULTS:
+        raise _bad(action, "ACTION", f"allowed: {', '.join(FAULTS)}")
+    if action == "join":
+        return _request(run, {"join": _number(" ".join(selectors), "SELECTOR")}, for_s=for_s)
+    chosen = [int(each) if each.isdecimal() else each for each in selectors]
+    return _request(run, {action: chosen}, for_s=for_s)
 
 
-def radio(run: Path, verb: str, words: list[str], for_s: float | None) -> int:
-    """Change the radio of a running fleet, or show it; return the exit status."""
-    if verb in {"show", "heal"} and words:
-        raise typer.BadParameter(f"{' '.join(words)!r}; {verb} stands alone", param_hint="WORD")
-    match verb:
+def change_radio(run: Path, action: str, words: list[str], for_s: float | None) -> int:
+    """Change the radio of a running fleet, or print its state; return the exit status."""
+    if action in {"show", "heal"} and words:
+        raise _bad(" ".join(words), "KEY=VALUE", f"{action} takes no further words")
+    match action:
         case "show":
-            return _shown(run)
+            return _print_radio(run)
         case "set":
             event: dict[str, Any] = {"netem": _table(words)}
         case "heal":
@@ -76,49 +114,27 @@ def radio(run: Path, verb: str, words: list[str], for_s: float | None) -> int:
         case "partition" if not any("=" in word for word in words):
             event = {"partition": _groups(words)}
         case "partition" | "jam" | "flap":
-            event = {verb: _table(words)}
+            event = {action: _table(words)}
         case _:
-            raise typer.BadParameter(f"{verb!r}; {', '.join(RADIO)}", param_hint="VERB")
-    return _told(run, event, for_s=for_s)
+            raise _bad(action, "ACTION", f"allowed: {', '.join(RADIO_ACTIONS)}")
+    return _request(run, event, for_s=for_s)
 
 
-COMMANDS = (
-    (
-        mission,
-        (
-            "qswarm mission runs/mine --to 4 deploy/formations/three-horizontal-lines.toml",
-            "qswarm mission runs/mine --frame yaw_deg=90",
-            "qswarm mission runs/mine --frame waypoints_m=[[0,0,0],[9,0,0]] --frame speed_mps=0.2",
-        ),
-    ),
-    (
-        fault,
-        (
-            "qswarm fault runs/mine kill 2 vertex:V1 --for 5",
-            "qswarm fault runs/mine pause random:2",
-            "qswarm fault runs/mine join 2",
-        ),
-    ),
-)
-
-
-def _told(run: Path, event: dict[str, Any], **terms: Any) -> int:
-    """Ask for an event, and print what came of it."""
+def _request(run: Path, event: dict[str, Any], *, for_s: float | None = None, **terms: Any) -> int:
+    """Request an event from a run's world, and print the events that followed."""
     from worldsim.fleet.control import Request
     from worldsim.fleet.operator_client import ask
-    from worldsim.judge.run_events import as_row
+    from worldsim.judge.event_text import sentence
 
-    if (for_s := terms.pop("for_s", None)) is not None:
+    if for_s is not None:
         event = {**event, "for_s": for_s}
-    for told in map(as_row, ask(run, Request(event, **terms)).events):
-        t_s, kind, agent = told.pop("t_s"), told.pop("kind"), told.pop("agent")
-        whose = "" if agent is None else f" agent {agent}"
-        rest = ", ".join(f"{k} {v}" for k, v in told.items() if k not in UNSPOKEN)
-        print(f"{t_s:.2f} s: {kind}{whose}{': ' if rest else ''}{rest}")
-    return 0
+    for followed in ask(run, Request(event, **terms)).events:
+        print(f"{followed.t_s:.2f} s: {sentence(followed)}")
+    return PASS
 
 
-def _shown(run: Path) -> int:
+def _print_radio(run: Path) -> int:
+    """Print the radio's state as TOML: the keys of [netem], and the faults in force."""
     import msgspec
 
     from worldsim.fleet.control import Request
@@ -126,39 +142,40 @@ def _shown(run: Path) -> int:
     from worldsim.scenario.file import as_toml
 
     answer = ask(run, Request())
-    standing: dict[str, list[dict[str, Any]]] = {}
+    in_force: dict[str, list[dict[str, Any]]] = {}
     for active in answer.faults:
         for kind, keys in msgspec.to_builtins(active.fault).items():
-            if kind != "netem":
-                standing.setdefault(kind, []).append({"since_s": active.since_s, **keys})
-    told = [_counted(kind, len(each)) for kind, each in standing.items() if kind != "partition"]
-    parted = "parted" if "partition" in standing else "not parted"
-    print(f"# at {answer.t_s:.2f} s, {', '.join([parted, *told])}")
+            if kind != "netem":  # the conditions below include it
+                in_force.setdefault(kind, []).append({"since_s": active.since_s, **keys})
+    counts = [_counted(kind, len(each)) for kind, each in in_force.items() if kind != "partition"]
+    parted = "partitioned" if "partition" in in_force else "not partitioned"
+    print(f"# at {answer.t_s:.2f} s: {', '.join([parted, *counts])}")
     tables = msgspec.to_builtins(answer.conditions)
     conditions = {key: value for key, value in tables.items() if value != {}}
-    print(as_toml({"netem": conditions, **standing}), end="")
-    return 0
+    print(as_toml({"netem": conditions, **in_force}), end="")
+    return PASS
 
 
 def _counted(kind: str, count: int) -> str:
     return f"{count} {kind}{'s' if count > 1 else ''}"
 
 
-def _formation(file: Path) -> dict[str, Any]:
+def _formation(given: str) -> dict[str, Any]:
     from worldsim.scenario.file import formation_tables
+    from worldsim.scenario.library import find_formation
 
-    return {"formation": formation_tables(file)}
+    return {"formation": formation_tables(find_formation(given))}
 
 
 def _table(settings: list[str]) -> dict[str, Any]:
-    """Return KEY=VALUE... as a table; dotted keys lead into tables within it."""
+    """Return KEY=VALUE... as a table; a dotted key names a key of an inner table."""
     from worldsim.commands.options import overrides_of
     from worldsim.scenario.toml import override
 
     for setting in settings:
         key, equals, _ = setting.partition("=")
         if not equals or not key.strip():
-            raise typer.BadParameter(f"{setting!r}; write it as KEY=VALUE", param_hint="WORD")
+            raise _bad(setting, "KEY=VALUE", "write it as KEY=VALUE")
     table: dict[str, Any] = {}
     override(table, overrides_of(settings, None, None, None), "KEY=VALUE")
     return table
@@ -166,10 +183,15 @@ def _table(settings: list[str]) -> dict[str, Any]:
 
 def _groups(words: list[str]) -> list[list[int]]:
     """Return the groups of a partition written as 0,1/2,3."""
-    return [[_number(each) for each in group.split(",")] for group in "".join(words).split("/")]
+    groups = "".join(words).split("/")
+    return [[_number(each, "partition") for each in group.split(",")] for group in groups]
 
 
-def _number(text: str) -> int:
+def _number(text: str, hint: str) -> int:
     if not text.strip().isdecimal():
-        raise typer.BadParameter(f"{text!r}; a number from 0", param_hint="WORD")
+        raise _bad(text, hint, "a whole number from 0 is needed")
     return int(text)
+
+
+def _bad(given: str, hint: str, detail: str) -> typer.BadParameter:
+    return typer.BadParameter(f"{given!r}; {detail}", param_hint=hint)

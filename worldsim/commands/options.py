@@ -1,32 +1,42 @@
-"""What commands share: arguments, options, and what is made of them."""
+"""What commands share: arguments and options, the scenario they name, messages on stderr."""
 
 import re
+import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from worldsim.scenario.tables import Scenario
 
 MAX_RUNS = 1_000_000
 
 
 def examples(*lines: str) -> str:
-    """Return examples as the end of a command's help."""
+    """Return example command lines as the end of a command's help."""
     return "\n".join(("\b", "Examples:", *(f"  {line}" for line in lines)))
 
 
-def _print_gallery(wanted: bool) -> None:
-    if wanted:
-        from worldsim.scenario.library import gallery
+def complain(line: str) -> None:
+    """Print an error or a warning on stderr."""
+    print(line, file=sys.stderr)
 
-        pieces = gallery()
-        width = max(len(str(piece.file)) for piece in pieces)
-        for piece in pieces:
-            print(f"{piece.file!s:{width}}  {piece.shows}")
+
+def _print_library(requested: bool) -> None:
+    if requested:
+        from worldsim.scenario.library import scenarios
+
+        entries = scenarios()
+        width = max(len(entry.name) for entry in entries)
+        for entry in entries:
+            print(f"{entry.name:{width}}  {entry.shows}")
         raise typer.Exit
 
 
-def _print_schema(wanted: bool) -> None:
-    if wanted:
+def _print_schema(requested: bool) -> None:
+    if requested:
         import json
 
         from worldsim.scenario.schema import schema
@@ -35,17 +45,23 @@ def _print_schema(wanted: bool) -> None:
         raise typer.Exit
 
 
-ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO", help="A scenario file (TOML).")]
-ScenarioFiles = Annotated[
-    list[Path], typer.Argument(metavar="SCENARIO", help="One or more scenario files (TOML).")
+ScenarioFile = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENARIO", help="A scenario file (TOML), or a scenario of the library."
+    ),
 ]
-Gallery = Annotated[
+ScenarioFiles = Annotated[
+    list[str],
+    typer.Argument(metavar="SCENARIO", help="Scenario files (TOML), or scenarios of the library."),
+]
+List = Annotated[
     bool,
     typer.Option(
         "--list",
         is_eager=True,
-        callback=_print_gallery,
-        help="List the scenarios that come along, and fly none.",
+        callback=_print_library,
+        help="List the scenarios of the library and exit.",
     ),
 ]
 Schema = Annotated[
@@ -54,38 +70,68 @@ Schema = Annotated[
         "--schema",
         is_eager=True,
         callback=_print_schema,
-        help="Print the JSON Schema of a scenario file, and check none.",
+        help="Print the JSON Schema of scenario files and exit.",
     ),
 ]
-RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="The folder of a run.")]
-Agents = Annotated[int | None, typer.Option(metavar="N", help="Fly this many agents instead.")]
-Seed = Annotated[int | None, typer.Option(metavar="S", help="Another seed: starts and radio.")]
+RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="The output directory of a run.")]
+Agents = Annotated[
+    int | None, typer.Option(metavar="N", help="Number of agents (instead of the scenario's).")
+]
+Seed = Annotated[
+    int | None,
+    typer.Option(metavar="S", help="Seed of starts and radio (instead of the scenario's)."),
+]
 Duration = Annotated[
-    float | None, typer.Option(metavar="T", help="Simulated seconds to fly instead.")
+    float | None,
+    typer.Option(metavar="T", help="Simulated seconds (instead of the scenario's)."),
 ]
 Settings = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Set any key; may be given again."),
+    typer.Option("--set", metavar="KEY=VALUE", help="Set any key of the scenario; repeatable."),
 ]
 Lockstep = Annotated[
     bool,
-    typer.Option("--lockstep", help="Take turns, slot by slot: the same result on any host."),
+    typer.Option(
+        "--lockstep",
+        help="Synchronous: simulated time waits for every process; repeatable on any host.",
+    ),
 ]
 Shards = Annotated[
     int,
-    typer.Option(metavar="N", min=1, max=64, help="Share the radio out to N processes (lockstep)."),
+    typer.Option(metavar="N", min=1, max=64, help="Number of radio processes (needs --lockstep)."),
 ]
 Out = Annotated[
     Path | None,
-    typer.Option(metavar="DIR", help="Where to; must not exist. [runs/SCENARIO-TIME]"),
+    typer.Option(
+        metavar="DIR",
+        help="Output directory (must not exist).",
+        show_default="runs/SCENARIO-TIME",
+    ),
 ]
-NoRecording = Annotated[bool, typer.Option("--no-recording", help="Write no run.rrd.")]
+NoRecording = Annotated[
+    bool, typer.Option("--no-recording", help="Do not write the recording, run.rrd.")
+]
+
+
+def load_scenario(given: str, overrides: Mapping[str, str], command_ticks: int) -> "Scenario":
+    """Return a scenario, given by path or name, that may run where a command lives so long [ticks].
+
+    Raises ScenarioError.
+    """
+    from worldsim.engine.preflight import admit
+    from worldsim.scenario.file import load
+    from worldsim.scenario.library import find_scenario
+
+    file = find_scenario(given)
+    scenario = load(file, overrides)
+    admit(scenario, file, command_ticks)
+    return scenario
 
 
 def overrides_of(
     settings: list[str] | None, agents: int | None, seed: int | None, duration: float | None
 ) -> dict[str, str]:
-    """Return the keys to override; an option of its own wins over --set.
+    """Return the overridden keys; --agents, --seed and --duration win over --set.
 
     Raises typer.BadParameter for a setting that is not KEY=VALUE.
     """
@@ -102,15 +148,17 @@ def overrides_of(
 
 
 def check_lockstep(lockstep: bool, speed: float, shards: int) -> None:
-    """Raise typer.BadParameter for what goes with lockstep alone, or not with it."""
+    """Raise typer.BadParameter for options that --lockstep excludes, or that need it."""
     if lockstep and speed != 1.0:
-        raise typer.BadParameter("not beside --lockstep: it has no speed", param_hint="--speed")
+        raise typer.BadParameter(
+            "cannot be combined with --lockstep, which has no fixed speed", param_hint="--speed"
+        )
     if shards > 1 and not lockstep:
         raise typer.BadParameter("needs --lockstep", param_hint="--shards")
 
 
 def seeds_of(text: str) -> range:
-    """Return the seeds that a text like 0:20 names, half open. Raises typer.BadParameter."""
+    """Return the seeds of a text such as 0:20, the end excluded. Raises typer.BadParameter."""
     parts = re.fullmatch(r"(\d{1,15}):(\d{1,15})", text)
     seeds = range(int(parts[1]), int(parts[2])) if parts else range(0)
     if not seeds or len(seeds) > MAX_RUNS:

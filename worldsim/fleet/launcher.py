@@ -9,7 +9,6 @@ import os
 import signal
 import socket
 from functools import partial
-from typing import Any
 
 from rich.console import Console
 
@@ -32,8 +31,9 @@ from worldsim.fleet.process_table import ProcessRow, ProcessTable, processes
 from worldsim.fleet.supervisor import Supervisor
 from worldsim.fleet.terminal import Terminal
 from worldsim.fleet.zygote import AgentProcessConfig, Zygote
+from worldsim.results.exit_status import EXIT_STATUS
 from worldsim.results.run_folder import RunDirectory, unwritable
-from worldsim.results.summary import EXIT_STATUS
+from worldsim.results.summary import Summary
 from worldsim.results.verdict_text import verdict
 from worldsim.scenario.tables import Scenario
 
@@ -60,7 +60,7 @@ def run(scenario: Scenario, directory: RunDirectory, options: RunOptions) -> int
     except StartError as error:
         launcher.terminal.print(str(error))
         launcher.end()
-        directory.nothing_flew()
+        directory.remove_results()
         status = NOT_STARTED
     except KeyboardInterrupt:
         ignore_signals()
@@ -116,21 +116,19 @@ class Launcher:
         if self._monitor.all_present or self._directory.summary.exists():
             self.conclude()
         else:
-            self._directory.nothing_flew()
+            self._directory.remove_results()
             self.terminal.print(f"interrupted before take-off; logs in {self._directory.logs}")
 
     def conclude(self) -> int:
         """Print the verdict from the run's summary; return the exit status."""
         self.terminal.close()
         try:
-            summary: dict[str, Any] = json.loads(self._directory.summary.read_text("utf-8"))
+            summary: Summary = json.loads(self._directory.summary.read_text("utf-8"))
         except FileNotFoundError:
             self.terminal.print(f"no summary was written; {self._monitor.log_tail('world')}")
             return UNKNOWN
         recorded = self._directory.recording.exists()
         self.terminal.print(verdict(summary, self._directory.path, recorded))
-        if recorded:
-            self.terminal.print(f"to view the recording: qswarm view {self._directory.path}")
         return EXIT_STATUS[summary["outcome"]]
 
     def end(self) -> None:
@@ -174,7 +172,7 @@ class Launcher:
         try:
             write_users(self._directory.users, ["world", OPERATOR, *self._mediums(), *agents])
         except OSError as error:
-            self._directory.nothing_flew()
+            self._directory.remove_results()
             raise unwritable(self._directory.users, error) from error
 
     def _run_zygote(self) -> int:

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import zenoh
@@ -18,12 +18,11 @@ from worldsim.fleet.free_running import FreeRunningFleet
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.lockstep import LockstepFleet
 from worldsim.fleet.startup import Startup, StartupError, assemble
+from worldsim.results.exit_status import EXIT_STATUS
 from worldsim.results.run_folder import RunDirectory, RunDirectoryError, RunWriteError
 from worldsim.results.sinks import Sinks, open_sinks
-from worldsim.results.summary import EXIT_STATUS, summarise
+from worldsim.results.summary import FinishedRun, Mode, summarise
 from worldsim.scenario.tables import Scenario
-
-TOO_LATE_FRACTION = 0.01
 
 
 class RunOptions(NamedTuple):
@@ -37,7 +36,7 @@ class RunOptions(NamedTuple):
     users: Path | None = None  # file of passwords, where the router requires one
 
     @property
-    def mode(self) -> str:
+    def mode(self) -> Mode:
         """The clock's name in the summary."""
         return "lockstep" if self.lockstep else "processes"
 
@@ -95,11 +94,11 @@ def conduct(
         sinks.close()
         launcher.wait(0.0)  # reads the reason that the launcher sends before its SIGTERM
         ended_by = None if complete else launcher.stop_reason or "interrupted"
-        summary = _summary(scenario, fleet, options.mode, ended_by)
+        summary = summarise(scenario, _finished(fleet, options.mode, ended_by))
         if fleet.begun:
             directory.write_summary(summary)
         else:
-            directory.nothing_flew()
+            directory.remove_results()
     outcome = summary["outcome"] if fleet.begun else f"{ended_by} before take-off"
     print(f"world: {outcome}{_lateness(fleet.medium_counters)}", flush=True)
     return EXIT_STATUS[summary["outcome"]]
@@ -128,22 +127,17 @@ def _lateness(medium_counters: MediumCounters | None) -> str:
     )
 
 
-def _summary(
-    scenario: Scenario, fleet: FreeRunningFleet | LockstepFleet, mode: str, ended_by: str | None
-) -> dict[str, Any]:
-    late_fraction = fleet.late_fraction
-    return summarise(
-        scenario,
-        fleet.loop,
+def _finished(
+    fleet: FreeRunningFleet | LockstepFleet, mode: Mode, cut_off_by: str | None
+) -> FinishedRun:
+    return FinishedRun(
         mode=mode,
+        loop=fleet.loop,
         medium_counters=fleet.medium_counters,
-        refused=fleet.rejected,
-        delivery=msgspec.to_builtins(fleet.delivery),
-        late_tick_fraction=late_fraction,
+        late_tick_fraction=fleet.late_fraction,
         real_time_factor=fleet.real_time_factor,
-        duration_s=fleet.loop.world.time_s,
-        interrupted=ended_by is not None,
-        ended_by=ended_by or "",
-        host_too_slow=late_fraction is not None and late_fraction >= TOO_LATE_FRACTION,
+        cut_off_by=cut_off_by,
         failure=fleet.failure,
+        rejected_by_world=fleet.rejected,
+        delivery=msgspec.to_builtins(fleet.delivery),
     )

@@ -1,10 +1,13 @@
-"""Faults of the radio as the run's events report them, and back.
+"""Faults of the radio as the run's events report them, back to orders, and in words.
 
 The world turns each order to the medium into an event; the judge turns the event into the order
 again, and so knows what is in force from a recording as from a flight.
 """
 
+from collections.abc import Sequence
 from typing import assert_never
+
+import msgspec
 
 from netem.conditions import NetworkConditions
 from netem.faults import FaultOrder, Flap, Heal, Jam, Partition, RadioEvent
@@ -64,6 +67,32 @@ def order_of(event: RadioRunEvent) -> FaultOrder:
     return FaultOrder(number=_number(event), at_s=_since_s(event), event=_begun(event))
 
 
+def radio_sentence(event: RadioRunEvent) -> str:
+    """Return what an event did to the radio, as a sentence."""
+    match event:
+        case Partitioned(groups=groups, parted=kind, bridge=bridge):
+            across = f", bridged by {_list(bridge)}" if bridge else ""
+            words = f"radio partitioned ({kind}): {' | '.join(map(_list, groups))}{across}"
+        case Healed(number=number):
+            words = "all partitions healed" if number is None else "partition healed"
+        case Jammed(jam=Jam() as jam):
+            words = f"radio jammed within {jam.radius_m:g} m of [{_list(jam.centre_m)}] m"
+        case Jammed():
+            words = "jam ended"
+        case Flapped(flap=FlapWindow() as flap):
+            links = ", ".join(f"{source} -> {to}" for source, to in flap.links) or "all links"
+            words = f"links flap with a period of {flap.period_s:g} s: {links}"
+        case Flapped():
+            words = "flapping links restored"
+        case ConditionsChanged(undone=Conditions() as undone):
+            words = f"link conditions restored: end of {_settings(undone)}"
+        case ConditionsChanged():
+            words = f"link conditions changed: {_settings(event)}"
+        case _:
+            assert_never(event)
+    return words
+
+
 def _conditions_changed(
     order: FaultOrder, change: Conditions, conditions: Conditions, t_s: float, by: By
 ) -> ConditionsChanged:
@@ -108,3 +137,13 @@ def _begun(event: RadioRunEvent) -> RadioEvent | None:
                 return None
             return RadioEvent(netem=Conditions(**{k: getattr(event, k) for k in _CHANGE_KEYS}))
     assert_never(event)
+
+
+def _settings(conditions: Conditions | ConditionsChanged) -> str:
+    keys = {name: getattr(conditions, name) for name in Conditions.__struct_fields__}
+    given = msgspec.to_builtins(Conditions(**keys))
+    return ", ".join(f"{key} = {value}" for key, value in given.items())
+
+
+def _list(values: Sequence[object]) -> str:
+    return ", ".join(map(str, values))

@@ -16,13 +16,13 @@ import rerun as rr
 
 from agent.qstructure.formation import Formation, FormationSpec
 from agent.qstructure.frame_path import Track
+from worldsim.judge.event_text import WARNINGS, sentence
 from worldsim.judge.run_events import FormationGiven, FrameGiven, MissionRunEvent, RunEvent, as_row
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout
 from worldsim.recording.blueprint import blueprint_of, view_region
 from worldsim.recording.columns import ColumnBlock, Entity
-from worldsim.recording.event_text import WARNINGS, event_text
 from worldsim.recording.formation_entities import FormationEntities
 from worldsim.recording.hierarchy_columns import HierarchyColumns
 from worldsim.recording.obstacle_shapes import ObstacleEntities
@@ -79,6 +79,7 @@ class RunRecorder:
         self._ticks: list[Tick] = []
         self._figures: list[Figures] = []
         self._events: list[RunEvent] = []
+        self._queue_names = [queue.name for queue in scenario.formation.queue]
         self._attempt(self._open, path, formation, run_id, mode)
 
     def tick(self, tick: Tick, figures: Figures) -> None:
@@ -183,7 +184,7 @@ class RunRecorder:
 
     def _send_events(self) -> None:
         times_s = [event.t_s for event in self._events]
-        texts = [event_text(event) for event in self._events]
+        texts = [self._text(event) for event in self._events]
         levels = ["WARN" if isinstance(event, WARNINGS) else "INFO" for event in self._events]
         columns = [
             *rr.TextLog.columns(text=texts, level=levels),
@@ -191,6 +192,12 @@ class RunRecorder:
         ]
         at = _time_columns(times_s, [self._tick_at(time_s) for time_s in times_s])
         rr.send_columns(layout.EVENTS, at, columns, recording=self._stream)
+
+    def _text(self, event: RunEvent) -> str:
+        """Return an event as a sentence, with the queues' names at its time."""
+        if isinstance(event, FormationGiven | FrameGiven):
+            self._queue_names = [queue.name for queue in event.tables.queue]
+        return sentence(event, self._queue_names)
 
     def _tick_at(self, time_s: float) -> int:
         return int(time_s * self._scenario.fleet.tick_hz + 1e-6)

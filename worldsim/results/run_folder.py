@@ -1,7 +1,8 @@
-"""The folder of one run: made once, never overwritten, readable at any moment of the run."""
+"""The folder of one run: created once, never overwritten, readable at any moment of the run."""
 
 import json
 import sys
+from collections.abc import Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,10 +14,11 @@ from worldsim.scenario.tables import Scenario
 
 RUNS = Path("runs")
 USERS = "users"
+"""The file of the processes' passwords, there while the run lasts."""
 
 
 class RunDirectoryError(Exception):
-    """A run's folder that cannot be made or written; one line that names it and says why."""
+    """A run's folder cannot be created or written; one line with the path and the reason."""
 
     def __init__(self, path: Path, detail: str) -> None:
         super().__init__(path, detail)
@@ -26,11 +28,11 @@ class RunDirectoryError(Exception):
 
 
 class RunWriteError(RunDirectoryError):
-    """A run whose result could not be kept, on a full disk say."""
+    """A run's result cannot be written, for example on a full disk."""
 
 
 class RunDirectory:
-    """Where one run keeps what it shows: scenario, events, logs, recording, summary."""
+    """The files of one run: scenario, events, logs, recording, summary."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -42,9 +44,9 @@ class RunDirectory:
 
     @classmethod
     def create(cls, path: Path | None, scenario: Scenario) -> "RunDirectory":
-        """Make the folder with the resolved scenario in it; None: one named after the time.
+        """Create the folder with the resolved scenario in it; None: one named after the time.
 
-        Raises RunDirectoryError when there is something at ``path``, or it cannot be written.
+        Raises RunDirectoryError when ``path`` exists or cannot be written.
         """
         directory = cls(make_folder(path, scenario.name))
         try:
@@ -56,9 +58,9 @@ class RunDirectory:
         return directory
 
     def event(self, event: dict[str, Any]) -> None:
-        """Append one event as a line.
+        """Append one event as a line of JSON.
 
-        A disk that fails must not stop a fleet in flight: it is said once, on stderr.
+        A failing disk must not stop a running fleet: it is reported once, on stderr.
         """
         try:
             with self._events.open("a", encoding="utf-8") as file:
@@ -70,13 +72,13 @@ class RunDirectory:
 
     @property
     def users(self) -> Path:
-        """The passwords of a run's processes, while it lasts."""
+        """The file of the processes' passwords, there while the run lasts."""
         return self.path / USERS
 
-    def nothing_flew(self) -> None:
-        """Take away what looks like a flight; scenario and logs stay, and tell why there is none.
+    def remove_results(self) -> None:
+        """Remove recording, summary and events of a run that never started.
 
-        Raises RunWriteError.
+        Scenario and logs stay, for the reason. Raises RunWriteError.
         """
         try:
             for file in (self.recording, self.summary, self._events):
@@ -84,25 +86,25 @@ class RunDirectory:
         except OSError as error:
             raise RunWriteError(self.path, _reason(error)) from error
 
-    def write_summary(self, summary: dict[str, Any]) -> None:
-        """Write summary.json whole or not at all. Raises RunWriteError, on a full disk say."""
+    def write_summary(self, summary: Mapping[str, Any]) -> None:
+        """Write summary.json completely or not at all. Raises RunWriteError."""
         write_json(self.summary, summary)
 
 
 def make_folder(path: Path | None, name: str) -> Path:
-    """Make a new folder, ``runs/<name>-<UTC time>`` for None. Raises RunDirectoryError."""
+    """Create a new folder, ``runs/<name>-<UTC time>`` for None. Raises RunDirectoryError."""
     chosen = path if path is not None else _named_after_now(name)
     if chosen.exists():
         raise RunDirectoryError(chosen, "exists; a run is never overwritten")
     try:
         chosen.mkdir(parents=True)
     except OSError as error:
-        raise RunDirectoryError(chosen, f"cannot be made: {_reason(error)}") from error
+        raise RunDirectoryError(chosen, f"cannot be created: {_reason(error)}") from error
     return chosen
 
 
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write strict JSON so that a reader sees all of it or none, or raise RunWriteError."""
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write strict JSON so that a reader sees all of it or nothing. Raises RunWriteError."""
     draft = path.with_suffix(".part")
     try:
         draft.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
@@ -114,16 +116,16 @@ def write_json(path: Path, content: dict[str, Any]) -> None:
 
 
 def unwritable(path: Path, error: OSError) -> RunDirectoryError:
-    """Return what is said of a file that a run cannot start without."""
+    """Return the error for a file without which a run cannot start."""
     return RunDirectoryError(path, _reason(error))
 
 
 def _named_after_now(name: str) -> Path:
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
-    chosen, again = RUNS / f"{name}-{stamp}", 1
+    chosen, count = RUNS / f"{name}-{stamp}", 1
     while chosen.exists():
-        again += 1
-        chosen = RUNS / f"{name}-{stamp}-{again}"
+        count += 1
+        chosen = RUNS / f"{name}-{stamp}-{count}"
     return chosen
 
 

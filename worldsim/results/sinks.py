@@ -1,4 +1,4 @@
-"""Where a flight's ticks and events go as they happen: the recording and events.jsonl."""
+"""The sinks of a run's ticks and events: the recording and events.jsonl."""
 
 from typing import Protocol
 
@@ -11,14 +11,14 @@ from worldsim.scenario.tables import Scenario
 
 
 class ClosingRecorder(Recorder, Protocol):
-    """A recorder that must be closed for its last ticks to be kept."""
+    """A recorder that writes its last ticks when it is closed."""
 
     def close(self) -> None:
-        """Write what is still to be written."""
+        """Write the rest of the recording."""
 
 
 class Sinks:
-    """Keeps events in the run's folder, and hands everything to the recorder if there is one."""
+    """Writes events to the run's folder, and ticks and events to the recorder if there is one."""
 
     def __init__(self, directory: RunDirectory, recorder: ClosingRecorder | None) -> None:
         self._directory = directory
@@ -31,7 +31,7 @@ class Sinks:
             self._recorder.tick(tick, figures)
 
     def event(self, event: RunEvent) -> None:
-        """Keep one event."""
+        """Write one event."""
         self._directory.event(as_row(event))
         if self._recorder is not None:
             self._recorder.event(event)
@@ -45,10 +45,10 @@ class Sinks:
 def open_sinks(
     directory: RunDirectory, scenario: Scenario, run: str, mode: str, recording: bool
 ) -> Sinks:
-    """Open a run's notebook, with a recording or without."""
+    """Open the sinks of a run, with a recording or without one."""
     if not recording:
         return Sinks(directory, None)
-    # rerun costs a second and 90 MB: only the process that records pays for it.
+    # Importing rerun takes a second and 90 MB: only the process that records does it.
     from worldsim.recording.recorder import RunRecorder  # noqa: PLC0415
 
     return Sinks(directory, RunRecorder(directory.recording, scenario, run, mode=mode))

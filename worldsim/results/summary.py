@@ -1,13 +1,17 @@
-"""summary.json: what a run showed, from the judge, the radio's counters and the clock."""
+"""summary.json: what a run showed, from the judge, the radio's counters and the clock.
+
+To add a key: declare it in Summary, fill it in summarise.
+"""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import dataclass, field
 from math import isfinite
-from typing import Any
+from typing import Any, Literal, TypedDict
 
 from netem.messages import MediumCounters
 from worldsim.engine.step import SlotLoop
 from worldsim.judge.verdict import Expectation, Judge
+from worldsim.results.provenance import Provenance, provenance
 from worldsim.scenario.tables import Scenario
 
 SCHEMA = 1
@@ -21,79 +25,149 @@ FATES = (
     "duplicated",
     "corrupted",
 )
-INTERRUPTED = 130
-EXIT_STATUS = {"pass": 0, "fail": 1, "inconclusive": 3}
+TOO_LATE_FRACTION = 0.01
+"""From this share of late ticks on, the host is too slow for a verdict."""
+
+Mode = Literal["processes", "lockstep", "virtual"]
+Outcome = Literal["pass", "fail", "inconclusive"]
 
 
-def summarise(  # noqa: PLR0913 - a figure each, by name
-    scenario: Scenario,
-    loop: SlotLoop,
-    *,
-    mode: str,
-    medium_counters: MediumCounters | None,
-    late_tick_fraction: float | None,
-    real_time_factor: float | None,
-    duration_s: float,
-    interrupted: bool,
-    host_too_slow: bool,
-    failure: str | None = None,
-    ended_by: str = "interrupted",
-    refused: Mapping[str, int] | None = None,
-    delivery: dict[str, Any] | None = None,
-) -> dict[str, Any]:
-    """Return summary.json's content: plain values, None for what could not be measured.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FinishedRun:
+    """A run as its clock leaves it; None for what that clock cannot measure."""
 
-    mode: "processes", "lockstep" or "virtual". duration_s: how much was flown, in simulated time.
-    failure: what ended the run that should not have happened in it. ended_by: why it was cut off,
-    if it was. refused: messages that the world refused, by cause. delivery: how late frames came.
-    """
-    judge = loop.judge
-    rejected = _rejected(loop, medium_counters, refused)
-    expectations = judge.expectations()
-    invariants = judge.invariants()
-    cut_off = f"{ended_by} after {duration_s:.1f} s" if interrupted else None
-    doubt = cut_off or _too_slow(host_too_slow, late_tick_fraction)
-    outcome, reason = ("fail", failure) if failure else _outcome(expectations, invariants, doubt)
-    summary = {
+    mode: Mode
+    loop: SlotLoop
+    medium_counters: MediumCounters | None
+    late_tick_fraction: float | None
+    real_time_factor: float | None  # simulated seconds in a second of wall time
+    cut_off_by: str | None = None  # what ended the run before its time; None: it is complete
+    failure: str | None = None  # an error during the run
+    rejected_by_world: Mapping[str, int] = field(default_factory=dict)  # messages by cause
+    delivery: dict[str, Any] | None = None  # see ArrivalBook.summary
+
+    @property
+    def duration_s(self) -> float:
+        """How much was simulated [s]."""
+        return self.loop.world.time_s
+
+    @property
+    def host_too_slow(self) -> bool:
+        """Whether so many ticks were late that the run proves nothing."""
+        late = self.late_tick_fraction
+        return late is not None and late >= TOO_LATE_FRACTION
+
+
+class ExpectationRow(TypedDict):
+    """One expectation, in the unit of its name."""
+
+    name: str
+    wanted: Any
+    got: Any
+    held: bool
+
+
+class PhaseRow(TypedDict):
+    """How the team formed one formation."""
+
+    formation: str
+    from_s: float
+    converged: bool
+    converge_s: float | None  # from the phase's start
+    residual_m: float | None  # largest slot error at the last tick of the phase
+    queues_converge_s: dict[str, float | None]  # by queue name
+
+
+class RecoveryRow(TypedDict):
+    """One change of the team."""
+
+    t_s: float
+    kind: str
+    agents: list[int]
+    reformed_s: float | None  # from the change until the formation is whole again
+
+
+class Summary(Provenance):
+    """The content of summary.json; None for what was not measured."""
+
+    schema: int
+    scenario: str
+    seed: int
+    mode: Mode
+    agents: int  # at the start
+    duration_s: float  # simulated
+    outcome: Outcome
+    reason: str | None  # of an outcome that is not a pass
+    expectations: list[ExpectationRow]
+    min_separation_m: float | None  # centre to centre, swept between ticks
+    min_obstacle_distance_m: float | None  # vehicle centre to surface
+    phases: list[PhaseRow]  # one for each formation, in order
+    recoveries: list[RecoveryRow]
+    attitude_error_deg: float | None  # largest at the last tick
+    turns_over_limit_fraction: float | None  # of moving steps
+    packets: dict[str, int | None]  # by fate
+    rejected_by_cause: dict[str, dict[str, int]]  # messages, by component and cause
+    direct_links: dict[str, Any]  # of each agent: mean and most
+    bytes_per_s: dict[str, list[float | None]] | None  # by channel, of each agent
+    invariants: dict[str, dict[str, int]]  # ticks evaluated and violations
+    delivery: dict[str, Any] | None  # extra delay of frames
+    delivery_late_ms: dict[str, float] | None  # how late the radio's batches left
+    late_tick_fraction: float | None
+    real_time_factor: float | None
+    trace_sha256: str | None
+
+
+def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
+    """Return the content of summary.json as plain JSON values."""
+    judge, counters = run.loop.judge, run.medium_counters
+    rejected = _rejected(run)
+    expectations, invariants = judge.expectations(), judge.invariants()
+    outcome, reason = _outcome(run, expectations, invariants)
+    summary: Summary = {
         "schema": SCHEMA,
         "scenario": scenario.name,
         "seed": scenario.seed,
-        "mode": mode,
+        "mode": run.mode,
         "agents": scenario.fleet.agents,
-        "duration_s": duration_s,
+        "duration_s": run.duration_s,
         "outcome": outcome,
         "reason": reason,
-        "expectations": [_row(expectation) for expectation in expectations],
+        "expectations": [_expectation_row(expectation) for expectation in expectations],
         "min_separation_m": judge.min_separation_m,
         "min_obstacle_distance_m": judge.min_obstacle_distance_m,
-        "phases": _phases(judge),
-        "recoveries": [asdict(recovery) for recovery in judge.recoveries],
+        "phases": _phase_rows(judge),
+        "recoveries": _recovery_rows(judge),
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
-        "packets": _packets(medium_counters, rejected),
+        "packets": _packets(counters, rejected),
         "rejected_by_cause": rejected,
-        "direct_links": loop.radio_use.links(),
-        "bytes_per_s": loop.radio_use.bytes_per_s(medium_counters),
+        "direct_links": run.loop.radio_use.links(),
+        "bytes_per_s": run.loop.radio_use.bytes_per_s(counters),
         "invariants": invariants,
-        "delivery": delivery,
-        "delivery_late_ms": _delivery_late_ms(medium_counters),
-        "late_tick_fraction": late_tick_fraction,
-        "real_time_factor": real_time_factor,
-        "trace_sha256": None if mode == "processes" else loop.trace.sha256,
+        "delivery": run.delivery,
+        "delivery_late_ms": _delivery_late_ms(counters),
+        "late_tick_fraction": run.late_tick_fraction,
+        "real_time_factor": run.real_time_factor,
+        "trace_sha256": None if run.mode == "processes" else run.loop.trace.sha256,
+        **provenance(),
     }
-    return {key: _strict(value) for key, value in summary.items()}
+    plain: Summary = _finite(summary)
+    return plain
 
 
 def _outcome(
-    expectations: list[Expectation], invariants: dict[str, dict[str, int]], doubt: str | None
-) -> tuple[str, str | None]:
+    run: FinishedRun, expectations: list[Expectation], invariants: dict[str, dict[str, int]]
+) -> tuple[Outcome, str | None]:
     """Return the outcome and its reason.
 
-    A broken invariant is a failure whatever else happened: no slow host excuses a collision.
+    A violated invariant is a failure even on a slow host, and in a run that was cut off.
     """
-    broken = [name for name, counts in invariants.items() if counts["violations"]]
-    if broken:
-        return "fail", f"violated: {', '.join(broken)}"
+    if run.failure is not None:
+        return "fail", run.failure
+    violated = [name for name, counts in invariants.items() if counts["violations"]]
+    if violated:
+        return "fail", f"violated: {', '.join(violated)}"
+    doubt = _doubt(run)
     if doubt is not None:
         return "inconclusive", doubt
     unseen = [name for name, counts in invariants.items() if not counts["ticks"]]
@@ -101,47 +175,51 @@ def _outcome(
         return "fail", f"never evaluated: {', '.join(unseen)}"
     missed = [expectation.name for expectation in expectations if not expectation.held]
     if missed:
-        return "fail", f"not held: {', '.join(missed)}"
+        return "fail", f"not met: {', '.join(missed)}"
     return "pass", None
 
 
-def _too_slow(host_too_slow: bool, late: float | None) -> str | None:
-    if not host_too_slow:
+def _doubt(run: FinishedRun) -> str | None:
+    """Return why a run proves nothing, or None."""
+    if run.cut_off_by is not None:
+        return f"{run.cut_off_by} after {run.duration_s:.1f} s"
+    late = run.late_tick_fraction
+    if late is None or not run.host_too_slow:
         return None
-    share = f": {100 * late:.1f} % of ticks were late" if late is not None else ""
-    return f"the host was too slow{share}"
+    return f"the host was too slow: {100 * late:.1f} % of ticks were late"
 
 
-def _rejected(
-    loop: SlotLoop, medium_counters: MediumCounters | None, refused: Mapping[str, int] | None
-) -> dict[str, dict[str, int]]:
-    """Return who refused how many messages for which cause."""
-    by_medium = medium_counters.rejected if medium_counters is not None else {}
-    told = {"agents": loop.rejections.by_cause(), "netem": by_medium, "world": refused or {}}
-    return {who: dict(causes) for who, causes in told.items()}
+def _rejected(run: FinishedRun) -> dict[str, dict[str, int]]:
+    """Count rejected messages by the component that rejected them, and by cause."""
+    counters = run.medium_counters
+    return {
+        "agents": dict(run.loop.rejections.by_cause()),
+        "netem": dict(counters.rejected) if counters is not None else {},
+        "world": dict(run.rejected_by_world),
+    }
 
 
 def _packets(
-    medium_counters: MediumCounters | None, rejected: Mapping[str, Mapping[str, int]]
+    counters: MediumCounters | None, rejected: Mapping[str, Mapping[str, int]]
 ) -> dict[str, int | None]:
-    """Count packets: sent as frames, addressed and each fate once for each agent that may hear."""
+    """Count packets: ``sent`` frames; ``addressed`` and each fate once for each receiver."""
     names = ("sent", "addressed", *FATES, "in_flight")
-    if medium_counters is None:
+    if counters is None:
         return dict.fromkeys((*names, "rejected"))
-    counted = medium_counters.packets()
-    refused = sum(count for causes in rejected.values() for count in causes.values())
-    return {**{name: counted.get(name, 0) for name in names}, "rejected": refused}
+    counted = counters.packets()
+    total = sum(count for causes in rejected.values() for count in causes.values())
+    return {**{name: counted.get(name, 0) for name in names}, "rejected": total}
 
 
-def _delivery_late_ms(medium_counters: MediumCounters | None) -> dict[str, float] | None:
-    """How much later than due the radio's batches left; None in virtual time, where none can be."""
-    if medium_counters is None or medium_counters.late_s is None:
+def _delivery_late_ms(counters: MediumCounters | None) -> dict[str, float] | None:
+    """Return how much later than due batches left [ms]; None in virtual time: never late."""
+    if counters is None or counters.late_s is None:
         return None
-    median_s, worst_s = medium_counters.late_s
+    median_s, worst_s = counters.late_s
     return {"median": 1000.0 * median_s, "worst": 1000.0 * worst_s}
 
 
-def _phases(judge: Judge) -> list[dict[str, Any]]:
+def _phase_rows(judge: Judge) -> list[PhaseRow]:
     return [
         {
             "formation": phase.formation.name,
@@ -155,7 +233,19 @@ def _phases(judge: Judge) -> list[dict[str, Any]]:
     ]
 
 
-def _row(expectation: Expectation) -> dict[str, Any]:
+def _recovery_rows(judge: Judge) -> list[RecoveryRow]:
+    return [
+        {
+            "t_s": recovery.t_s,
+            "kind": recovery.kind,
+            "agents": recovery.agents,
+            "reformed_s": recovery.reformed_s,
+        }
+        for recovery in judge.recoveries
+    ]
+
+
+def _expectation_row(expectation: Expectation) -> ExpectationRow:
     return {
         "name": expectation.name,
         "wanted": expectation.wanted,
@@ -164,10 +254,10 @@ def _row(expectation: Expectation) -> dict[str, Any]:
     }
 
 
-def _strict(value: Any) -> Any:
-    """JSON knows no NaN and no infinity: what is not finite was not measured."""
+def _finite(value: Any) -> Any:
+    """Replace NaN and infinity by None: JSON has neither, and neither was measured."""
     if isinstance(value, float):
         return float(value) if isfinite(value) else None
     if isinstance(value, dict):
-        return {key: _strict(inner) for key, inner in value.items()}
-    return [_strict(inner) for inner in value] if isinstance(value, list | tuple) else value
+        return {key: _finite(inner) for key, inner in value.items()}
+    return [_finite(inner) for inner in value] if isinstance(value, list | tuple) else value

@@ -1,143 +1,156 @@
-"""What a run says in a terminal: one line while it flies, the verdict, the table over many."""
+"""The verdict in words: of one run, of many runs, and of a recording that was judged again."""
 
-import sys
+from collections.abc import Iterable
 from pathlib import Path
-from time import monotonic
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
+
+from worldsim.results.summary import ExpectationRow, Summary
 
 if TYPE_CHECKING:
     from worldsim.recording.verify import Verification
 
-Summary = dict[str, Any]
-
-QUIET_S = 2.0
-LINE_EVERY_S = 0.2
-LOG_EVERY_S = 5.0
-
-
-class ProgressLine:
-    """One line for what takes over two seconds; now and then a line where there is no terminal."""
-
-    def __init__(self, stream: TextIO | None = None) -> None:
-        self._stream = stream if stream is not None else sys.stderr
-        self._next_s = monotonic() + QUIET_S
-        self._shown = False
-
-    def tell(self, text: str) -> None:
-        """Show how far it is, if it is time to."""
-        if monotonic() < self._next_s:
-            return
-        alive = self._stream.isatty()
-        self._next_s = monotonic() + (LINE_EVERY_S if alive else LOG_EVERY_S)
-        self._stream.write(f"\r\x1b[K{text}" if alive else f"{text}\n")
-        self._stream.flush()
-        self._shown = alive
-
-    def clear(self) -> None:
-        """Take the line away."""
-        if self._shown:
-            self._stream.write("\r\x1b[K")
-            self._stream.flush()
+CONVERGE = "converge "
+"""An expectation's name begins so where it is about a formation; the formation's name follows."""
+MODE_WORDS = {"processes": "processes", "lockstep": "lockstep", "virtual": "virtual time"}
+CAUSE_WORDS = {"ahead": "early", "stale": "late", "incarnation": "of a process that was replaced"}
+"""Causes of rejection in words; the others are words already."""
 
 
 def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
-    """Return the verdict of one run: what was expected, what it showed, where to look."""
-    factor = summary["real_time_factor"]
-    pace = f", {factor:.3g} times real time" if factor is not None else ""
-    head = (
-        f"{summary['scenario']}, seed {summary['seed']}: {summary['agents']} agents,"
-        f" {summary['duration_s']:g} s{pace}"
-    )
-    rows = [_expectation(**row) for row in summary["expectations"]]
-    reason = f" ({summary['reason']})" if summary["reason"] else ""
-    place = f"{folder}/run.rrd" if recorded else f"{folder}/summary.json"
-    refused = _refused(summary["rejected_by_cause"])
-    told = [_aside(summary), *_delivery(summary["delivery"]), *refused]
-    return "\n".join([head, *rows, *told, f"{summary['outcome']}{reason}  {place}"])
+    """Return the verdict of one run: its expectations, what it showed, and where its files are."""
+    lines = [
+        _head(summary),
+        *(_expectation(row) for row in summary["expectations"]),
+        f"  {_accuracy(summary)}",
+        *_delivery(summary["delivery"]),
+        *_rejected(summary["rejected_by_cause"]),
+        _outcome(summary, folder / ("run.rrd" if recorded else "summary.json")),
+        *([f"view it: qswarm view {folder}"] if recorded else []),
+    ]
+    return "\n".join(lines)
 
 
-def table(overall: Summary, folder: Path) -> str:
-    """Return the table over many runs: a line for each, least, median and most of each scenario."""
+def table(overall: dict[str, Any], folder: Path) -> str:
+    """Return a row for each of many runs, and for each scenario minimum, median and maximum."""
     width = max((len(row["run"]) for row in overall["rows"]), default=3)
-    head = f"{'run':{width}}  separation   converge   residual  turns  outcome"
+    head = f"{'run':{width}}  separation  converged in  slot error  over turn limit  outcome"
     lines = [head, *(_run(row, width) for row in overall["rows"]), ""]
     for scenario in overall["scenarios"]:
         lines += _scenario(scenario)
-    reason = f" ({overall['reason']})" if overall["reason"] else ""
-    return "\n".join([*lines, f"{overall['outcome']}{reason}  {folder}/summary.json"])
+    return "\n".join([*lines, _outcome(overall, folder / "summary.json")])
 
 
 def verified(verification: "Verification") -> str:
-    """Return what a recording shows by itself, and whether the run's summary says the same."""
-    rows = [
-        _expectation(row.name, row.wanted, row.got, row.held) for row in verification.expectations
-    ]
+    """Return what a recording shows by itself, and whether summary.json says the same."""
+    rows: Iterable[ExpectationRow] = (
+        {"name": row.name, "wanted": row.wanted, "got": row.got, "held": row.held}
+        for row in verification.expectations
+    )
     cut = "" if verification.whole else f" of {verification.duration_s:g} s"
     agreement = [
-        f"  DIFFERS  {each.key}: {each.summary} in the summary, {each.recording} in the recording"
+        f"  DIFFERS  {each.key}: {each.summary} in summary.json, {each.recording} in the recording"
         for each in verification.differences
-    ] or ["  the summary agrees" if verification.summary else "  no summary to compare with"]
+    ] or ["  summary.json agrees" if verification.summary else "  no summary.json to compare with"]
     head = (
-        f"{verification.scenario}, from its recording alone:"
+        f"{verification.scenario}, judged from the recording alone:"
         f" {verification.ticks} ticks, {verification.until_s:g} s{cut}"
     )
-    outcome = "held" if verification.held else "NOT HELD"
-    return "\n".join([head, *rows, *agreement, f"{outcome}  {verification.run}"])
+    outcome = "met" if verification.held else "NOT MET"
+    return "\n".join([head, *map(_expectation, rows), *agreement, f"{outcome}  {verification.run}"])
 
 
-def _expectation(name: str, wanted: float | None, got: float | None, held: bool) -> str:
-    asked = f"wanted {wanted:g}" if wanted is not None else "wanted at all"
-    shown = f"{got:.3g}" if got is not None else "never"
-    return f"  {'held' if held else 'NOT HELD':9}{name}: {shown} ({asked})"
+def _head(summary: Summary) -> str:
+    factor = summary["real_time_factor"]
+    pace = f" at {factor:.3g} x real time" if factor is not None else ""
+    return (
+        f"{summary['scenario']}, seed {summary['seed']}, {MODE_WORDS[summary['mode']]}:"
+        f" {summary['agents']} agents, {summary['duration_s']:g} s simulated{pace}"
+    )
 
 
-def _refused(rejected: dict[str, dict[str, int]]) -> list[str]:
-    """Return who refused what in a line, or none where nothing was refused."""
-    told = [
-        f"{who} {', '.join(f'{count} {cause}' for cause, count in causes.items())}"
-        for who, causes in rejected.items()
-        if causes
-    ]
-    return [f"  refused: {'; '.join(told)}"] if told else []
+def _outcome(summary: Any, file: Path) -> str:
+    reason = f" ({summary['reason']})" if summary["reason"] else ""
+    return f"{summary['outcome']}{reason}  {file}"
+
+
+def _expectation(row: ExpectationRow) -> str:
+    return f"  {'met' if row['held'] else 'NOT MET':9}{_shown(row)}"
+
+
+def _shown(row: ExpectationRow) -> str:
+    """Return what a run showed of an expectation, beside what was required."""
+    name, got, wanted = row["name"], row["got"], row["wanted"]
+    limit = f" (limit {wanted:g} s)" if wanted is not None else ""
+    match name:
+        case "min_separation_m" | "min_obstacle_distance_m":
+            what = name.removesuffix("_m").replace("min_", "minimum ").replace("_", " ")
+            return f"{what}: {_figure(got, 'm', 3)} (required >= {wanted:g} m)"
+        case "reform_within_s":
+            if got is not None:
+                return f"formation restored within {got:.3g} s of each team change{limit}"
+            how = "no team change" if row["held"] else "formation not restored after a team change"
+            return f"{how}{limit}"
+        case _ if name.startswith(CONVERGE):
+            how = f"converged in {got:.3g} s" if got is not None else "did not converge"
+            return f"{name.removeprefix(CONVERGE)}: {how}{limit}"
+    return f"{name}: {got} (required {wanted})"
+
+
+def _accuracy(summary: Summary) -> str:
+    residual = summary["phases"][-1]["residual_m"]
+    turns = summary["turns_over_limit_fraction"]
+    return (
+        f"largest slot error at the end: {_figure(_mm(residual), 'mm', 2)};"
+        f" steps over the turn limit: {_percent(turns)}"
+    )
 
 
 def _delivery(delivery: dict[str, Any] | None) -> list[str]:
-    """Return how late frames were used in a line, or none where that was not measured."""
+    """Return a line on how much later than due frames were used; none if not measured."""
     if delivery is None:
         return []
-    late, within = delivery["excess_ms"], delivery["within_fraction"]
+    extra, within = delivery["excess_ms"], delivery["within_fraction"]
     return [
-        f"  frames used {late['p50']:.1f} ms (median), {late['p99']:.1f} ms (p99) after due,"
-        f" {_percent(within, 2)} within {delivery['bound_ms']:g} ms, a slot and a tick"
+        f"  extra delivery delay: median {extra['p50']:.1f} ms, 99th percentile"
+        f" {extra['p99']:.1f} ms; {_percent(within, 2)} of frames within"
+        f" {delivery['bound_ms']:g} ms (one slot and one tick)"
     ]
 
 
-def _aside(summary: Summary) -> str:
-    residual = summary["phases"][-1]["residual_m"]
-    turns = summary["turns_over_limit_fraction"]
-    return f"  residual {_figure(_mm(residual), 'mm', 2)}, turns over the limit {_percent(turns)}"
+def _rejected(rejected: dict[str, dict[str, int]]) -> list[str]:
+    """Return a line on rejected messages: how many by which component; none if there are none."""
+    parts = [
+        f"{_causes(causes)} (by {component})" for component, causes in rejected.items() if causes
+    ]
+    return [f"  rejected messages: {'; '.join(parts)}"] if parts else []
 
 
-def _run(row: Summary, width: int) -> str:
+def _causes(causes: dict[str, int]) -> str:
+    counts = ((count, CAUSE_WORDS.get(cause, cause)) for cause, count in causes.items())
+    return ", ".join(f"{count} {words}" for count, words in counts)
+
+
+def _run(row: dict[str, Any], width: int) -> str:
     reason = f" ({row['reason']})" if row["reason"] else ""
     return (
         f"{row['run']:{width}}  {_figure(row['min_separation_m'], 'm', 3):>10}"
-        f"  {_figure(row['converge_s'], 's', 2):>9}  {_figure(_mm(row['residual_m']), 'mm', 2):>9}"
-        f"  {_percent(row['turns_over_limit_fraction']):>5}  {row['outcome']}{reason}"
+        f"  {_figure(row['converge_s'], 's', 2):>12}"
+        f"  {_figure(_mm(row['residual_m']), 'mm', 2):>10}"
+        f"  {_percent(row['turns_over_limit_fraction']):>15}  {row['outcome']}{reason}"
     )
 
 
-def _scenario(scenario: Summary) -> list[str]:
+def _scenario(scenario: dict[str, Any]) -> list[str]:
     spreads = (
         ("separation", scenario["min_separation_m"], "m", 3),
-        ("converge", scenario["converge_s"], "s", 2),
+        ("converged in", scenario["converge_s"], "s", 2),
     )
     return [
-        f"{scenario['scenario']}: {scenario['pass']} of {scenario['runs']} passed",
+        f"{scenario['scenario']}: {scenario['pass']} of {scenario['runs']} runs passed",
         *(
-            f"  {name:10}  least {_figure(spread['min'], unit, digits)},"
+            f"  {name:12}  min {_figure(spread['min'], unit, digits)},"
             f" median {_figure(spread['median'], unit, digits)},"
-            f" most {_figure(spread['max'], unit, digits)} ({spread['measured']} runs)"
+            f" max {_figure(spread['max'], unit, digits)} ({spread['measured']} runs)"
             for name, spread, unit, digits in spreads
             if spread is not None
         ),
@@ -153,4 +166,4 @@ def _figure(value: float | None, unit: str, digits: int) -> str:
 
 
 def _percent(fraction: float | None, digits: int = 1) -> str:
-    return f"{100 * fraction:.{digits}f}%" if fraction is not None else "-"
+    return f"{100 * fraction:.{digits}f} %" if fraction is not None else "-"

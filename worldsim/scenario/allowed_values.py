@@ -1,4 +1,4 @@
-"""What a type allows, and what stood there instead, in words for people who write scenarios."""
+"""Error texts: what a type allows, and what was found instead."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -9,19 +9,19 @@ MAX_SHOWN = 60
 
 
 def allowed(kind: Any) -> str:
-    """Return in words what a type allows."""
+    """Return what a type allows, in words."""
     return allowed_by(inspect.type_info(kind))
 
 
 def tags(kind: Any) -> str:
-    """Return the kinds of table that a tagged union can be told by."""
+    """Return the tags by which the tables of a union are distinguished."""
     info = inspect.type_info(kind)
     options = info.types if isinstance(info, inspect.UnionType) else (info,)
     return " or ".join(_tags(options))
 
 
 def got(value: Any) -> str:
-    """Return in words what stood in the file, and why that may be wrong."""
+    """Return what was found in a file, in words."""
     if isinstance(value, bool):
         return f"got {str(value).lower()}"
     if isinstance(value, str):
@@ -34,7 +34,7 @@ def got(value: Any) -> str:
 
 
 def allowed_by(info: inspect.Type) -> str:
-    """Return in words what a type allows, as msgspec describes it."""
+    """Return what a type allows, in words, from msgspec's description of it."""
     match info:
         case inspect.Metadata(extra_json_schema={"description": str(words)}):
             return words
@@ -80,8 +80,8 @@ def _number(info: inspect.IntType | inspect.FloatType) -> str:
     if info.ge is not None and info.ge == info.le:
         return f"{info.ge:g}"
     bounds = (("from", info.ge), ("above", info.gt), ("up to", info.le), ("below", info.lt))
-    told = [f"{word} {_figure(bound)}" for word, bound in bounds if bound is not None]
-    return f"{words} {' and '.join(told)}".rstrip().replace(" and up to", " up to")
+    limits = [f"{word} {_figure(bound)}" for word, bound in bounds if bound is not None]
+    return f"{words} {' and '.join(limits)}".rstrip().replace(" and up to", " up to")
 
 
 def _figure(bound: float) -> str:
@@ -110,7 +110,7 @@ def _tags(options: Iterable[inspect.Type]) -> list[str]:
 
 
 def _tag_field(options: Iterable[inspect.Type]) -> str:
-    """Return the key by which the kinds of a table are told apart."""
+    """Return the key whose value selects one of the tables of a union."""
     return next(
         str(option.tag_field) for option in options if isinstance(option, inspect.StructType)
     )

@@ -1,7 +1,6 @@
-"""Plain data into typed tables; what does not fit is told by key, with what is allowed there.
+"""Plain data into typed tables; an error names the key, and what is allowed there.
 
-msgspec finds what is wrong and where; the words come from the types themselves, so a new key
-explains itself.
+msgspec finds the error and its place; the words come from the types, so a new key needs none.
 """
 
 import re
@@ -27,20 +26,19 @@ _FIELD = re.compile(
 
 
 class Spot(NamedTuple):
-    """A place in the data: its dotted key, what stands there, and the type wanted there."""
+    """A place in the data."""
 
-    key: str
-    value: Any
-    kind: Any
+    key: str  # dotted, from the root
+    value: Any  # the value found there
+    kind: Any  # the type required there
 
 
 def decode(data: Any, kind: type[T], file: str | Path) -> T:
     """Return ``data`` as the tables of ``kind``, or raise ScenarioError."""
     for key, number in _numbers(data, ""):
         if not isfinite(number):
-            raise ScenarioError(
-                file, key, f"{number} is no measure; finite numbers only (no limit: leave it out)"
-            )
+            detail = f"{number} is not allowed; give a finite number, or omit the key for no limit"
+            raise ScenarioError(file, key, detail)
     try:
         return msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
@@ -60,7 +58,7 @@ def _numbers(data: Any, key: str) -> Iterator[tuple[str, float]]:
 
 
 def _explained(message: str, root: Spot) -> tuple[str, str]:
-    """Return the key that msgspec's message is about, and what is wrong there."""
+    """Return the key that msgspec's message is about, and the error in words."""
     where = _WHERE.search(message)
     spot = _follow(where["path"] if where else "", root)
     if where and where["key"]:
@@ -70,7 +68,7 @@ def _explained(message: str, root: Spot) -> tuple[str, str]:
         return spot.key, f"{got(spot.value)}; allowed: {allowed(spot.kind)}"
     key = _joined(spot.key, field["field"])
     if field["what"] == "missing required":
-        return key, f"is missing; allowed: {_wanted(spot, field['field'])}"
+        return key, f"is missing; allowed: {_allowed_at(spot, field['field'])}"
     return key, _unknown(field["field"], [name.encode_name for name in _fields(spot)])
 
 
@@ -80,9 +78,9 @@ def _unknown(name: str, known: list[str]) -> str:
     return f"unknown key; {hint}allowed: {', '.join(known)}"
 
 
-def _wanted(spot: Spot, name: str) -> str:
-    chosen = {field.encode_name: field.type for field in _fields(spot)}
-    return allowed(chosen[name]) if name in chosen else tags(spot.kind)
+def _allowed_at(spot: Spot, name: str) -> str:
+    types_of = {field.encode_name: field.type for field in _fields(spot)}
+    return allowed(types_of[name]) if name in types_of else tags(spot.kind)
 
 
 def _fields(spot: Spot) -> tuple[Any, ...]:
@@ -98,7 +96,7 @@ def _follow(path: str, root: Spot) -> Spot:
 
 
 def _inside(spot: Spot, field: str | None, index: str | None) -> Spot:
-    """Take one step into the data: to a table's key, or to a place in a list or in a mapping."""
+    """Take one step into the data: to a key of a table or mapping, or an index of a list."""
     kind = _chosen(spot.kind, spot.value)
     if field is not None:
         known = {each.encode_name: each.type for each in _fields(spot)}
@@ -108,13 +106,13 @@ def _inside(spot: Spot, field: str | None, index: str | None) -> Spot:
     if index == "...":
         name = _misfit(spot.value, kinds[1])
         return Spot(_joined(spot.key, name), spot.value[name], kinds[1])
-    place = int(index or 0)
-    inner = kinds[0] if kinds[-1] is Ellipsis else kinds[place]
-    return Spot(f"{spot.key}[{place}]", spot.value[place], inner)
+    position = int(index or 0)
+    inner = kinds[0] if kinds[-1] is Ellipsis else kinds[position]
+    return Spot(f"{spot.key}[{position}]", spot.value[position], inner)
 
 
 def _misfit(mapping: dict[str, Any], kind: Any) -> str:
-    """Return the first key whose value does not fit: of a mapping msgspec does not say which."""
+    """Return the first key whose value does not fit; msgspec does not name a mapping's key."""
     for name, value in mapping.items():
         try:
             msgspec.convert(value, kind)

@@ -1,7 +1,7 @@
-"""Scenario files: TOML in, a typed and checked scenario out, or an error naming file and key.
+"""Scenario files: TOML in, a typed and checked scenario out, or an error with file and key.
 
-The format is in ``tables``, what must hold between keys in ``rules``. Paths are relative to the
-file that names them.
+``tables`` defines the format, ``rules`` the rules between keys. A path is relative to the file
+that contains it.
 """
 
 import re
@@ -24,78 +24,78 @@ _PLAIN_ARRAY = re.compile(r"\[\n((?: +[^\s\[\]{}][^\n]*,\n)+) *\]")
 
 
 def load(path: Path, overrides: Mapping[str, str] | None = None) -> Scenario:
-    """Return the scenario of a file, with dotted keys overridden, or raise ScenarioError."""
+    """Return a file's scenario, with the values of dotted keys overridden. Raises ScenarioError."""
     return parse(read(path), path, overrides)
 
 
 def parse(
     text: str, name: str | Path = "scenario.toml", overrides: Mapping[str, str] | None = None
 ) -> Scenario:
-    """Return the scenario of a TOML text, or raise ScenarioError.
+    """Return the scenario of a TOML text. Raises ScenarioError.
 
-    name: what errors call the text; paths within it are relative to the folder of that name.
+    name: the text's name in errors; paths in the text are relative to its folder.
     """
     overrides = overrides or {}
     try:
         data = tables(text, name)
         override(data, overrides, name)
-        whose = _place_formation(data, Path(name))
+        origin = _place_formation(data, Path(name))
         later = _place_events(data, Path(name))
         scenario = _with_field(decode(data, Scenario, name), name)
         check_rules(scenario, name)
-        _check_formation(scenario, Path(name), *whose)
+        _check_formation(scenario, Path(name), *origin)
         check_course(scenario, Path(name), later)
     except ScenarioError as error:
-        raise _told_as_override(error, overrides) from error
+        raise _marked_as_override(error, overrides) from error
     return scenario
 
 
 def dump(scenario: Scenario) -> str:
-    """Return a scenario as TOML with every default filled in; ``parse`` gives it back, equal."""
+    """Return a scenario as TOML with every default; ``parse`` of it returns an equal scenario."""
     return as_toml(msgspec.to_builtins(scenario))
 
 
 def as_toml(plain: Data) -> str:
-    """Return plain tables as people write them; what is None is left out."""
+    """Return plain tables as readable TOML; keys that are None are omitted."""
     return _PLAIN_ARRAY.sub(_on_one_line, tomli_w.dumps(_without_none(plain)))
 
 
 def formation_tables(path: Path) -> Data:
-    """Return the tables of a formation's file. Raises ScenarioError."""
+    """Return the checked tables of a formation file. Raises ScenarioError."""
     formation = tables(read(path), path)
     decode(formation, FormationSpec, path)
     return formation
 
 
 def _place_formation(data: Data, file: Path) -> Whose:
-    """Put what the formation's file holds in place of its name; return whose keys they are."""
+    """Replace a formation file's name by its content; return where the content's keys are."""
     table = data.get("formation")
     if not isinstance(table, dict) or "file" not in table:
         return Whose(file, "formation.")
     other = next((key for key in table if key != "file"), None)
     if other is not None:
-        raise ScenarioError(file, f"formation.{other}", "not beside file; one or the other")
+        raise ScenarioError(file, f"formation.{other}", "cannot be combined with file")
     if not isinstance(table["file"], str):
-        raise ScenarioError(file, "formation.file", "the path of a formation file, as text")
+        raise ScenarioError(file, "formation.file", "must be the path of a formation file, as text")
     path, data["formation"] = _formation_file(file, "formation.file", table["file"])
     return Whose(path, "")
 
 
 def _place_events(data: Data, file: Path) -> dict[int, Whose]:
-    """Put what formations' files hold in place of their names; return whose keys they are."""
+    """Replace formation files' names in events by their content; return where its keys are."""
     events = data.get("event")
-    whose = {}
+    origin = {}
     for index, event in enumerate(events if isinstance(events, list) else ()):
         named = event.get("formation") if isinstance(event, dict) else None
         if isinstance(named, str):
             key = f"event[{index}].formation"
             path, event["formation"] = _formation_file(file, key, named)
-            whose[index] = Whose(path, "")
-    return whose
+            origin[index] = Whose(path, "")
+    return origin
 
 
 def _formation_file(file: Path, key: str, named: str) -> tuple[Path, Data]:
-    """Return the path and the tables of the formation's file that a key names."""
+    """Return the path and the tables of the formation file that a key names."""
     path = file.parent / named
     if "\0" in named or not path.is_file():
         raise ScenarioError(file, key, f"no such file: {path}")
@@ -103,32 +103,32 @@ def _formation_file(file: Path, key: str, named: str) -> tuple[Path, Data]:
 
 
 def _with_field(scenario: Scenario, file: str | Path) -> Scenario:
-    """Return a scenario whose random field of obstacles, if it has one, is drawn."""
+    """Return a scenario with its random field of obstacles, if any, drawn."""
     field = scenario.obstacle_field
     if field is None:
         return scenario
-    found, broken = resolve_field(field, scenario.fleet.start, scenario.seed)
-    if broken is not None:
-        key, detail = broken
+    drawn, problem = resolve_field(field, scenario.fleet.start, scenario.seed)
+    if problem is not None:
+        key, detail = problem
         raise ScenarioError(file, f"obstacle_field.{key}", detail)
-    obstacles = (*scenario.obstacle, *found)
+    obstacles = (*scenario.obstacle, *drawn)
     return msgspec.structs.replace(scenario, obstacle=obstacles, obstacle_field=None)
 
 
-def _check_formation(scenario: Scenario, file: Path, whose: Path, prefix: str) -> None:
+def _check_formation(scenario: Scenario, file: Path, origin: Path, prefix: str) -> None:
     control = scenario.control
     try:
         formation = Formation(scenario.formation, control.spacing_m)
         formation.check(scenario.fleet.agents, scenario.min_slot_distance_m)
     except FormationError as error:
-        raise ScenarioError(whose, prefix + error.key, error.detail) from error
+        raise ScenarioError(origin, prefix + error.key, error.detail) from error
     tilted = tilt_problem(scenario, formation, scenario.fleet.agents)
     if tilted is not None:
         raise ScenarioError(file, *tilted)
 
 
-def _told_as_override(error: ScenarioError, overrides: Mapping[str, str]) -> ScenarioError:
-    """Say so if the key at fault was set on the command line: the file is not to blame."""
+def _marked_as_override(error: ScenarioError, overrides: Mapping[str, str]) -> ScenarioError:
+    """Return the error with a remark if its key was set on the command line, not in the file."""
     if any(error.key == key or error.key.startswith((f"{key}.", f"{key}[")) for key in overrides):
         return ScenarioError(
             error.file, error.key, f"{error.detail} (it was set on the command line)"
@@ -137,13 +137,13 @@ def _told_as_override(error: ScenarioError, overrides: Mapping[str, str]) -> Sce
 
 
 def _on_one_line(array: re.Match[str]) -> str:
-    """Write an array of numbers or names as people do."""
+    """Write an array of numbers or names on one line."""
     items = [line.strip(" ") for line in array[1].removesuffix(",\n").split("\n")]
     return f"[{' '.join(items)}]"
 
 
 def _without_none(value: Any) -> Any:
-    """TOML has no word for nothing: what is None is left out."""
+    """Omit keys that are None: TOML has no null."""
     if isinstance(value, dict):
         return {key: _without_none(inner) for key, inner in value.items() if inner is not None}
     return [_without_none(inner) for inner in value] if isinstance(value, list | tuple) else value

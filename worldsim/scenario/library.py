@@ -1,27 +1,89 @@
-"""The scenarios that come along with a checkout, each with its one line."""
+"""The library: the scenarios and formations that belong to qswarm, found by name.
+
+In a checkout they are in ``deploy``; a wheel holds a copy beside the code, in ``worldsim/library``.
+"""
 
 import os
+from collections.abc import Iterator
+from difflib import get_close_matches
 from pathlib import Path
 from typing import NamedTuple
 
 from worldsim.scenario.toml import ScenarioError, read
 
-FOLDER = Path(__file__).parents[2] / "deploy" / "scenarios"
+_PACKAGE = Path(__file__).resolve().parents[1]
+_IN_WHEEL = _PACKAGE / "library"
+LIBRARY = _IN_WHEEL if _IN_WHEEL.is_dir() else _PACKAGE.parent / "deploy"
+SCENARIOS = LIBRARY / "scenarios"
+FORMATIONS = LIBRARY / "formations"
+CLOSEST = 3
+"""How many names an error suggests at most."""
 
 
-class Piece(NamedTuple):
-    """A scenario of the gallery: its file, as seen from here, and what it shows."""
+class Entry(NamedTuple):
+    """A scenario of the library: its name, its file, and what it shows, in one line."""
 
+    name: str
     file: Path
     shows: str
 
 
-def gallery(folder: Path = FOLDER) -> list[Piece]:
-    """Return all scenarios that come along. Raises ScenarioError where there are none."""
-    files = sorted(folder.rglob("*.toml"))
+def scenarios(folder: Path = SCENARIOS) -> list[Entry]:
+    """Return the scenarios of the library by name. Raises ScenarioError if there are none."""
+    files = _files(folder)
     if not files:
-        raise ScenarioError(folder, "", "no scenarios here: the gallery belongs to a checkout")
-    return [Piece(Path(os.path.relpath(file)), _first_comment(read(file))) for file in files]
+        raise ScenarioError(folder, "", "the library's scenarios are missing; install qswarm again")
+    return [Entry(name, file, _first_comment(read(file))) for name, file in files.items()]
+
+
+def find_scenario(given: str) -> Path:
+    """Return the file of a scenario that is given by its path, or by its name in the library.
+
+    An existing file wins over a name. Raises ScenarioError for a name that does not exist.
+    """
+    return _find(given, SCENARIOS, "scenario", "qswarm run --list shows all")
+
+
+def find_formation(given: str) -> Path:
+    """Return the file of a formation that is given by its path, or by its name in the library."""
+    return _find(given, FORMATIONS, "formation", f"they are in {_shown(FORMATIONS)}")
+
+
+def _find(given: str, folder: Path, what: str, hint: str) -> Path:
+    path, files = Path(given), _files(folder)
+    if _readable(path):
+        return path
+    if given in files:
+        return _shown(files[given])
+    if path.name == given and path.suffix != ".toml":
+        close = ", ".join(_closest(given, files))
+        detail = f"no such file, and no such {what} in the library; closest: {close}; {hint}"
+        raise ScenarioError(given, "", detail)
+    if path.stem in files and not path.exists():
+        raise ScenarioError(path, "", f"no such file; the library has {path.stem!r}")
+    return path  # reading it fails with the reason
+
+
+def _readable(path: Path) -> bool:
+    try:
+        return path.exists() and not path.is_dir()
+    except OSError:
+        return True  # reading it fails with the reason
+
+
+def _closest(name: str, files: dict[str, Path]) -> Iterator[str]:
+    """Yield the names nearest to a name, most similar first, and never none."""
+    yield from get_close_matches(name, files, n=CLOSEST, cutoff=0.4) or list(files)[:CLOSEST]
+
+
+def _files(folder: Path) -> dict[str, Path]:
+    return {file.stem: file for file in sorted(folder.rglob("*.toml"))}
+
+
+def _shown(path: Path) -> Path:
+    """Return a path relative to the current folder if it is below it, for messages."""
+    relative = os.path.relpath(path)
+    return path if relative.startswith(os.pardir) else Path(relative)
 
 
 def _first_comment(text: str) -> str:

@@ -1,6 +1,6 @@
-"""The JSON Schema of a scenario file, for editors: what each key may hold by itself.
+"""The JSON Schema of a scenario file, for editors: the allowed values of each key by itself.
 
-A file may name a formation's file where a resolved scenario holds the formation.
+Where a resolved scenario holds a formation, a file may name a formation file instead.
 """
 
 from typing import Any
@@ -12,7 +12,7 @@ from worldsim.scenario.tables import Scenario
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 FORMATION_FILE = {
     "title": "FormationFile",
-    "description": "A formation in a file of its own, relative to this one.",
+    "description": "A formation file; its path is relative to this file.",
     "type": "object",
     "properties": {"file": {"type": "string"}},
     "required": ["file"],
@@ -21,7 +21,7 @@ FORMATION_FILE = {
 
 
 def schema() -> dict[str, Any]:
-    """Return the schema of a scenario file, under its published dialect."""
+    """Return the schema of a scenario file, in the dialect DIALECT."""
     (root,), tables = msgspec.json.schema_components([Scenario], ref_template="#/$defs/{name}")
     scenario = tables["Scenario"]
     inline = scenario["properties"]["formation"]
@@ -30,7 +30,7 @@ def schema() -> dict[str, Any]:
     later["formation"] = {"anyOf": [{"type": "string"}, later["formation"]]}
     return {
         "$schema": DIALECT,
-        "title": "A scenario of qswarm",
+        "title": "qswarm scenario",
         **root,
         "$defs": _portable({**tables, "FormationFile": FORMATION_FILE}),
     }

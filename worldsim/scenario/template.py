@@ -1,8 +1,7 @@
-"""A scenario to start from: every table and key, with what is allowed, written from the types.
+"""A scenario to start from: every table and key with its allowed values, generated from the types.
 
-What the example sets stands plainly; every other key stands behind a ``#``, with its default or,
-where it has none, an example. Prose begins with ``# ``, so that a key is taken in by taking the
-``#`` away.
+Keys that the example sets are active. Every other key is commented out by a ``#`` without a space,
+with its default value, or an example where it has no default. Prose begins with ``# ``.
 """
 
 import json
@@ -103,40 +102,40 @@ BRIEF: Mapping[str, tuple[str, ...]] = {
         "clear_of_start_m",
     ),
 }
-"""Tables that are told elsewhere: of these only some keys, for an example."""
+"""Of these tables, only some keys are shown, as an example."""
 
 HEAD = """\
 # {name}: what this scenario is for, in one line.
 #
-#     qswarm check {name}.toml     what is wrong with it, or all of it with its defaults
-#     qswarm sim {name}.toml       fly it in virtual time
-#     qswarm run {name}.toml       fly it with real processes
+#     qswarm check {name}.toml     validate it, and print it with all defaults
+#     qswarm sim {name}.toml       run it in virtual time
+#     qswarm run {name}.toml       run it with real processes
 #
-# Every number's unit is in its key. What is behind a '#' is not set: there stands its default, or
-# an example of what has none."""
+# The unit of a number is in its key. To set a key that is commented out, remove its '#'. Its value
+# here is the default, or an example where there is no default."""
 
 
 class Place(NamedTuple):
-    """A table's dotted name, what the example sets in it (None: nothing), and how it begins."""
+    """A table in the template."""
 
-    name: str
-    given: Given | None
-    brackets: str = "[{}]"
+    name: str  # dotted
+    given: Given | None  # the keys that the example sets; None: the example has no such table
+    brackets: str = "[{}]"  # of its header
 
     @property
-    def hidden(self) -> str:
-        """What stands before the lines of a table that the example does not have."""
+    def comment(self) -> str:
+        """The comment sign before the header of a table that the example does not have."""
         return "#" if self.given is None else ""
 
     def key(self, name: str) -> str:
-        """Return the dotted name of one of its keys."""
+        """Return the dotted name of a key of the table."""
         return f"{self.name}.{name}" if self.name else name
 
 
 def write(name: str) -> Path:
-    """Write a scenario of that name, NAME.toml, where there is no such file; return it.
+    """Write the template as NAME.toml in the current folder; return the file.
 
-    Raises ScenarioError for a name that a scenario cannot have, a file that exists, a full disk.
+    Raises ScenarioError for an invalid name, an existing file, or a failing disk.
     """
     file = Path(f"{name}.toml")
     decode(name, RunName, file)
@@ -151,7 +150,7 @@ def write(name: str) -> Path:
 
 
 def template(name: str) -> str:
-    """Return the text of a scenario file of that name: it loads, flies, and passes."""
+    """Return the text of the template; a scenario that runs and passes as it is."""
     info = inspect.type_info(Scenario)
     assert isinstance(info, inspect.StructType)
     lines = _keys(info, Place("", {**EXAMPLE, "name": name}))
@@ -159,7 +158,7 @@ def template(name: str) -> str:
 
 
 def _keys(info: inspect.StructType, place: Place) -> Iterator[str]:
-    """Return a table's keys, and after them the tables within it, as TOML wants it."""
+    """Return the lines of a table's keys and then those of its inner tables."""
     shown = BRIEF.get(place.name)
     fields = [field for field in info.fields if shown is None or field.encode_name in shown]
     for field in fields:
@@ -180,7 +179,7 @@ def _key(field: inspect.Field, place: Place) -> str:
 
 
 def _tables(field: inspect.Field, table: inspect.StructType, place: Place) -> Iterator[str]:
-    """Return a table in full; of several, the first, and of the others what the example sets."""
+    """Return the lines of a table; of several, all of the first and the set keys of the others."""
     name = place.key(field.encode_name)
     given = place.given.get(field.encode_name) if place.given is not None else None
     if not _is_list(field.type):
@@ -195,17 +194,17 @@ def _tables(field: inspect.Field, table: inspect.StructType, place: Place) -> It
 
 def _whole(table: inspect.StructType, place: Place) -> Iterator[str]:
     yield ""
-    yield from (f"# {line}".rstrip() for line in _told(table))
-    yield f"{place.hidden}{place.brackets.format(place.name)}"
+    yield from (f"# {line}".rstrip() for line in _description(table))
+    yield f"{place.comment}{place.brackets.format(place.name)}"
     yield from _keys(table, place)
 
 
-def _told(table: inspect.StructType) -> list[str]:
+def _description(table: inspect.StructType) -> list[str]:
     return cleandoc(table.cls.__doc__ or "").replace("``", "").splitlines()
 
 
 def _example(field: inspect.Field, name: str) -> Any:
-    """Return a key's default, or where it has none an example."""
+    """Return a key's default, or an example where it has none."""
     if name in EXAMPLES:
         return EXAMPLES[name]
     if field.default is not NODEFAULT and field.default is not None:
@@ -214,7 +213,7 @@ def _example(field: inspect.Field, name: str) -> Any:
 
 
 def _table_of(info: inspect.Type) -> inspect.StructType | None:
-    """Return the table that a type is, alone, optional or in a list; None for a plain value."""
+    """Return the table of a type: itself, optional or in a list; None for a plain value."""
     match info:
         case inspect.Metadata():
             return _table_of(info.type)

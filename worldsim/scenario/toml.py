@@ -1,4 +1,4 @@
-"""TOML files in, plain data out; what is wrong with one is told in one line that names the key."""
+"""TOML files in, plain data out; an error is one line that names file and key."""
 
 import tomllib
 from collections.abc import Mapping
@@ -11,7 +11,10 @@ Data = dict[str, Any]
 
 
 class ScenarioError(ValueError):
-    """Bad input, told in one line: the file, the key, what is wrong and what is allowed."""
+    """Bad input, in one line: the file, the key, what is wrong and what is allowed.
+
+    key: dotted; "" for the file as a whole.
+    """
 
     def __init__(self, file: str | Path, key: str, detail: str) -> None:
         self.file = file
@@ -50,19 +53,20 @@ def tables(text: str, file: str | Path) -> Data:
 
 
 def override(data: Data, overrides: Mapping[str, str], file: str | Path) -> None:
-    """Set dotted keys to values written as in TOML; a bare word is a text.
+    """Set dotted keys to values written as in TOML; a bare word is taken as text.
 
-    Raises ScenarioError where a key leads through something that is no table.
+    Raises ScenarioError for a key that leads through a value that is not a table.
     """
     for dotted, text in overrides.items():
         *path, last = dotted.split(".")
         if not all((*path, last)):
-            raise ScenarioError(file, dotted, "not a key; write it as table.key")
+            raise ScenarioError(file, dotted, "not a valid key; write it as table.key")
         table = data
         for depth, name in enumerate(path):
             table = table.setdefault(name, {})
             if not isinstance(table, dict):
-                raise ScenarioError(file, ".".join(path[: depth + 1]), "is no table to set keys in")
+                detail = "is not a table, so it has no keys to set"
+                raise ScenarioError(file, ".".join(path[: depth + 1]), detail)
         table[last] = _value(text)
 
 
@@ -75,5 +79,5 @@ def _value(text: str) -> Any:
 
 
 def _one_line(text: str) -> str:
-    """Keys, values and paths come from outside: none may break the line or steer a terminal."""
+    """Escape control characters: keys, values and paths come from outside."""
     return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)

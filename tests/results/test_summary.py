@@ -1,0 +1,143 @@
+"""summary.json: the keys of the contract, strict JSON, and an outcome with its reason."""
+
+import dataclasses
+import json
+from typing import Any
+
+import msgspec
+import pytest
+
+from netem.link import Cause
+from netem.messages import MediumCounters
+from tests.small_scenario import SMALL
+from worldsim.campaign.pool import finished
+from worldsim.engine.step import SlotLoop, world_of
+from worldsim.engine.virtual import fly
+from worldsim.results.exit_status import EXIT_STATUS
+from worldsim.results.provenance import provenance
+from worldsim.results.summary import FATES, FinishedRun, Summary, summarise
+from worldsim.scenario.file import parse
+
+KEYS = {
+    *("schema", "scenario", "seed", "mode", "agents", "duration_s", "outcome", "expectations"),
+    *("min_separation_m", "min_obstacle_distance_m", "phases", "turns_over_limit_fraction"),
+    *("packets", "invariants", "late_tick_fraction", "real_time_factor", "trace_sha256"),
+    *("version", "commit", "commit_dirty", "python", "packages", "host"),
+}
+SCENARIO = parse(SMALL, overrides={"netem.loss_percent": "30"})
+
+
+@pytest.fixture
+def run() -> FinishedRun:
+    return finished(fly(SCENARIO), SCENARIO)
+
+
+def summary(run: FinishedRun, **changes: Any) -> Summary:
+    return summarise(SCENARIO, dataclasses.replace(run, **changes))
+
+
+def counters(run: FinishedRun) -> MediumCounters:
+    assert run.medium_counters is not None
+    return run.medium_counters
+
+
+def test_it_has_every_key_of_the_contract(run: FinishedRun) -> None:
+    made = summary(run)
+    assert made.keys() >= KEYS
+    assert (made["outcome"], made["reason"]) == ("pass", None)
+    assert made["phases"][0].keys() == {
+        "formation",
+        "from_s",
+        "converged",
+        "converge_s",
+        "residual_m",
+        "queues_converge_s",
+    }
+    assert json.loads(json.dumps(made, allow_nan=False)) == made
+    assert {key: made[key] for key in provenance()} == provenance()  # type: ignore[literal-required]
+
+
+def test_every_fate_of_the_radio_is_counted() -> None:
+    assert {cause.name.lower() for cause in Cause} <= set(FATES)
+
+
+def test_packets_balance(run: FinishedRun) -> None:
+    packets = {name: count or 0 for name, count in summary(run)["packets"].items()}
+    assert packets["dropped_loss"] > 0
+    assert packets["sent"] == counters(run).sent > 0
+    assert packets["addressed"] == packets["sent"] * 1
+    assert packets["addressed"] == packets["in_flight"] + sum(packets[fate] for fate in FATES)
+
+
+def test_i8_is_evaluated_at_every_tick(run: FinishedRun) -> None:
+    assert summary(run)["invariants"]["I8"] == {"ticks": 5 * 20 + 1, "violations": 0}
+
+
+def test_a_packet_without_a_fate_violates_i8(run: FinishedRun) -> None:
+    lost = {"addressed": 5, "delivered": 3, "in_flight": 1}
+    loop = SlotLoop(SCENARIO, world_of(SCENARIO, 1), packets=lambda: lost)
+    loop.open()
+    made = summary(run, loop=loop)
+    assert made["invariants"]["I8"] == {"ticks": 1, "violations": 1}
+    assert (made["outcome"], made["reason"]) == ("fail", "violated: I8")
+
+
+def test_late_batches_of_the_radio_are_in_ms(run: FinishedRun) -> None:
+    assert summary(run)["delivery_late_ms"] is None
+    assert summary(run)["delivery"] is None
+    late = msgspec.structs.replace(counters(run), late_s=(0.0005, 0.25))
+    assert summary(run, medium_counters=late)["delivery_late_ms"] == {"median": 0.5, "worst": 250.0}
+
+
+def test_what_was_not_measured_is_null_and_no_pass(run: FinishedRun) -> None:
+    run.loop.judge.packet_ticks = 0
+    made = summary(run, medium_counters=None, real_time_factor=float("nan"), mode="processes")
+    assert set(made["packets"].values()) == {None}
+    assert made["real_time_factor"] is None
+    assert made["trace_sha256"] is None
+    assert (made["outcome"], made["reason"]) == ("fail", "never evaluated: I8")
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"cut_off_by": "interrupted"}, "interrupted after 5.0 s"),
+        ({"late_tick_fraction": 0.017}, "the host was too slow: 1.7 % of ticks were late"),
+        ({"cut_off_by": "interrupted", "medium_counters": None}, "interrupted after 5.0 s"),
+    ],
+)
+def test_a_doubtful_run_is_never_a_pass(
+    run: FinishedRun, changes: dict[str, Any], reason: str
+) -> None:
+    made = summary(run, **changes)
+    assert (made["outcome"], made["reason"]) == ("inconclusive", reason)
+    assert EXIT_STATUS[made["outcome"]] == 3
+
+
+@pytest.mark.parametrize("late", [None, 0.0, 0.0099])
+def test_few_late_ticks_leave_a_pass(run: FinishedRun, late: float | None) -> None:
+    assert summary(run, late_tick_fraction=late)["outcome"] == "pass"
+
+
+def test_a_slow_host_does_not_excuse_a_collision(run: FinishedRun) -> None:
+    run.loop.judge.safety_violations = 1
+    made = summary(run, late_tick_fraction=0.5, cut_off_by="interrupted")
+    assert (made["outcome"], made["reason"]) == ("fail", "violated: I1")
+
+
+def test_an_error_during_the_run_is_a_failure(run: FinishedRun) -> None:
+    made = summary(run, failure="agent-3 was killed by signal 9")
+    assert (made["outcome"], made["reason"]) == ("fail", "agent-3 was killed by signal 9")
+
+
+def test_an_expectation_that_is_not_met_fails() -> None:
+    strict = parse(SMALL, overrides={"expect.converge_within_s": "0.01"})
+    made = summarise(strict, finished(fly(strict), strict))
+    assert (made["outcome"], made["reason"]) == ("fail", "not met: converge line")
+
+
+def test_rejected_messages_are_counted_by_component_and_cause(run: FinishedRun) -> None:
+    by_medium = msgspec.structs.replace(counters(run), rejected={"stale": 2})
+    made = summary(run, medium_counters=by_medium, rejected_by_world={"stale": 3})
+    assert made["rejected_by_cause"] == {"agents": {}, "netem": {"stale": 2}, "world": {"stale": 3}}
+    assert made["packets"]["rejected"] == 5

@@ -1,0 +1,60 @@
+"""The commands that look at a run: ``verify`` and ``view`` its recording, ``ps`` its processes."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from worldsim.commands.options import RunFolder, complain, examples
+from worldsim.results.exit_status import FAIL, PASS
+
+commands = typer.Typer()
+
+
+@commands.command(epilog=examples("qswarm verify runs/wedge-9-20260102T030405Z"))
+def verify(run: RunFolder) -> int:
+    """Recompute the verdict of a run from its recording alone.
+
+    The figures are compared with summary.json; any difference is printed and fails.
+    """
+    from worldsim.recording.verify import verify as verify_run
+    from worldsim.results.verdict_text import verified
+
+    verification = verify_run(run)
+    if verification.problem is not None:
+        complain(verification.problem)
+    else:
+        print(verified(verification))
+    return verification.exit_status
+
+
+@commands.command(
+    epilog=examples("qswarm view runs/wedge-9-20260102T030405Z", "qswarm view runs/twenty --web")
+)
+def view(
+    runs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RUN", help="Run directories, directories of many runs, or recordings."
+        ),
+    ],
+    web: Annotated[
+        bool,
+        typer.Option("--web", help="Use a browser instead of a window; served on this host only."),
+    ] = False,
+) -> int:
+    """Open recordings in the rerun viewer."""
+    from worldsim.recording.viewer import recordings
+    from worldsim.recording.viewer import view as show
+
+    return PASS if show(recordings(runs), web) == 0 else FAIL
+
+
+@commands.command(epilog=examples("qswarm ps runs/wedge-9-20260102T030405Z"))
+def ps(run: RunFolder) -> int:
+    """List the processes of a run: name, pid, alive or gone."""
+    from worldsim.fleet.process_table import processes
+
+    for name, pid, alive in processes(run):
+        print(f"{name:12} {pid:>8}  {'alive' if alive else 'gone'}")
+    return PASS

@@ -1,0 +1,117 @@
+"""The commands that run scenarios: ``run`` with processes, ``sim`` in virtual time."""
+
+import os
+from math import isfinite
+from typing import Annotated
+
+import typer
+
+from worldsim.commands.options import (
+    Agents,
+    Duration,
+    List,
+    Lockstep,
+    NoRecording,
+    Out,
+    ScenarioFile,
+    ScenarioFiles,
+    Seed,
+    Settings,
+    Shards,
+    check_lockstep,
+    examples,
+    load_scenario,
+    overrides_of,
+    seeds_of,
+)
+
+commands = typer.Typer()
+
+
+@commands.command(
+    epilog=examples(
+        "qswarm run wedge-9",
+        "qswarm run wedge-9 --seed 7 --set netem.loss_percent=50",
+        "qswarm run my.toml --agents 20 --duration 40 --speed 2",
+        "qswarm run wedge-9 --lockstep",
+        "qswarm run --list",
+    )
+)
+def run(
+    scenario: ScenarioFile,
+    agents: Agents = None,
+    seed: Seed = None,
+    speed: Annotated[
+        float,
+        typer.Option(metavar="X", help="Simulated seconds in a second of wall time.", min=0.01),
+    ] = 1.0,
+    lockstep: Lockstep = False,
+    shards: Shards = 1,
+    duration: Duration = None,
+    settings: Settings = None,
+    out: Out = None,
+    no_recording: NoRecording = False,
+    listing: List = False,
+) -> int:
+    """Run a scenario with real processes that talk over Zenoh.
+
+    The processes are the emulated radio (netem), the world, and one for each agent.
+    """
+    from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
+    from worldsim.fleet.launcher import run as run_processes
+    from worldsim.fleet.process import RunOptions
+    from worldsim.results.run_folder import RunDirectory
+
+    if not isfinite(speed):
+        raise typer.BadParameter(f"{speed}; a number from 0.01", param_hint="--speed")
+    check_lockstep(lockstep, speed, shards)
+    overrides = overrides_of(settings, agents, seed, duration)
+    command_ticks = VIRTUAL_COMMAND_TICKS if lockstep else PROCESS_COMMAND_TICKS
+    loaded = load_scenario(scenario, overrides, command_ticks)
+    directory = RunDirectory.create(out, loaded)
+    terms = RunOptions(loaded.name, speed, not no_recording, lockstep, shards)
+    return run_processes(loaded, directory, terms)
+
+
+@commands.command(
+    epilog=examples(
+        "qswarm sim wedge-9",
+        "qswarm sim wedge-9 --seeds 0:20 --jobs 2 --out runs/twenty",
+        "qswarm sim my.toml --set netem.delay_ms=200 --no-recording",
+    )
+)
+def sim(
+    scenarios: ScenarioFiles,
+    agents: Agents = None,
+    seed: Seed = None,
+    seeds: Annotated[
+        str | None,
+        typer.Option(metavar="A:B", help="Run each seed from A up to, but not including, B."),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Number of parallel jobs.", show_default="all cores"),
+    ] = None,
+    duration: Duration = None,
+    settings: Settings = None,
+    out: Out = None,
+    no_recording: NoRecording = False,
+    listing: List = False,
+) -> int:
+    """Run scenarios in virtual time, as fast as the host allows.
+
+    The same agents, radio and world as in `qswarm run`, in one process; the result is repeatable.
+    """
+    from worldsim.campaign.virtual_runs import simulate_many, simulate_one
+    from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
+
+    if seed is not None and seeds is not None:
+        raise typer.BadParameter("cannot be combined with --seed", param_hint="--seeds")
+    loaded = [
+        load_scenario(given, overrides_of(settings, agents, each, duration), VIRTUAL_COMMAND_TICKS)
+        for given in scenarios
+        for each in (seeds_of(seeds) if seeds is not None else (seed,))
+    ]
+    if seeds is None and len(scenarios) == 1:
+        return simulate_one(loaded[0], out, not no_recording)
+    return simulate_many(loaded, out, not no_recording, jobs or len(os.sched_getaffinity(0)))

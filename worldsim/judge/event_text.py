@@ -1,0 +1,150 @@
+"""Run events in words: one sentence each, for the operator's terminal and for logs."""
+
+from collections.abc import Sequence
+from typing import assert_never
+
+from worldsim.judge.radio_events import radio_sentence
+from worldsim.judge.run_events import (
+    ConditionsChanged,
+    FormationGiven,
+    FrameGiven,
+    Jammed,
+    Joined,
+    Killed,
+    LateStart,
+    Left,
+    LossEvent,
+    MissionRunEvent,
+    Partitioned,
+    Paused,
+    PlannedEvent,
+    QueueChanged,
+    RadioRunEvent,
+    Restarted,
+    Resumed,
+    ReturnEvent,
+    RoleChanged,
+    RunEvent,
+    SensorChanged,
+    SlotChanged,
+)
+
+Queues = Sequence[str]
+WARNINGS = (Killed, Left, Paused, Partitioned, Jammed, LateStart)
+"""Events that a list of them shows as warnings."""
+
+
+def sentence(event: RunEvent, queues: Queues = ()) -> str:
+    """Return an event as a sentence without its time, such as "a3 takes slot 2 of queue Q3".
+
+    queues: the names of the formation's queues, in order. Slots are counted from 1 along a queue.
+    """
+    return _words(event, queues) + _origin(event)
+
+
+def _words(event: RunEvent, queues: Queues) -> str:
+    if isinstance(event, RadioRunEvent):
+        return radio_sentence(event)
+    match event:
+        case Killed() | Left() | Paused():
+            words = _lost(event)
+        case Restarted() | Joined() | Resumed():
+            words = _returned(event)
+        case SensorChanged(agent=agent, sensor=sensor, mode=mode):
+            words = f"sensors of a{agent} ({sensor}): {mode}"
+        case FormationGiven() | FrameGiven():
+            words = _mission(event)
+        case SlotChanged() | QueueChanged() | RoleChanged():
+            words = _place(event, queues)
+        case LateStart(agent=agent, detail=detail):
+            words = f"a{agent} starts late: {detail}"
+        case _:
+            assert_never(event)
+    return words
+
+
+def _lost(event: LossEvent) -> str:
+    if event.nobody is not None:
+        return f"{event.kind}: no agent matches {_list(event.nobody)}"
+    match event:
+        case Killed(planned=True):
+            return f"a{event.agent} is killed; its vehicle hovers"
+        case Killed():
+            return f"the process of a{event.agent} ended{_end(event)}; its vehicle hovers"
+        case Left():
+            return f"a{event.agent} leaves; its vehicle is removed"
+        case Paused():
+            return f"a{event.agent} is paused"
+    assert_never(event)
+
+
+def _end(event: Killed) -> str:
+    """Return how a process ended, where that is known."""
+    if event.signal is not None:
+        return f" by signal {event.signal}"
+    return f" with status {event.status}" if event.status is not None else ""
+
+
+def _returned(event: ReturnEvent) -> str:
+    match event:
+        case Resumed(nobody=None):
+            return f"a{event.agent} resumes"
+        case Resumed():
+            return f"resume: no agent matches {_list(event.nobody or ())}"
+        case Restarted(refused=None):
+            return f"a{event.agent} restarts (incarnation {event.incarnation})"
+        case Joined(refused=None):
+            return f"a{event.agent} joins"
+        case Restarted() | Joined():
+            return f"{event.kind} refused: {event.refused}"
+    assert_never(event)
+
+
+def _mission(event: MissionRunEvent) -> str:
+    to = f", given to a{event.agent}" if event.agent is not None else ""
+    match event:
+        case FormationGiven():
+            return f"new formation {event.formation!r}{to}"
+        case FrameGiven():
+            return f"new path of the target frame{to}"
+    assert_never(event)
+
+
+def _place(event: SlotChanged | QueueChanged | RoleChanged, queues: Queues) -> str:
+    agent = f"a{event.agent}"
+    match event:
+        case SlotChanged():
+            verb, claim = ("takes", event.place) if event.place else ("gives up", event.before)
+            return f"{agent} {verb} {_slot(claim, queues)}"
+        case QueueChanged(queue=int(queue)):
+            return f"{agent} enters {_queue(queue, queues)}"
+        case QueueChanged():
+            return f"{agent} leaves its queue"
+        case RoleChanged(role=role):
+            return f"{agent} becomes a {role} agent"
+    assert_never(event)
+
+
+def _slot(claim: tuple[int, int] | None, queues: Queues) -> str:
+    if claim is None:
+        return "no slot"
+    queue, rank = claim
+    return f"slot {rank + 1} of {_queue(queue, queues)}"
+
+
+def _queue(index: int, queues: Queues) -> str:
+    """Return a queue by its name; without names, by its number counted from 1."""
+    return f"queue {queues[index]}" if index < len(queues) else f"queue number {index + 1}"
+
+
+def _origin(event: RunEvent) -> str:
+    """Return whether the operator or the scenario's timeline asked for an event, if either did."""
+    if not isinstance(event, PlannedEvent | ConditionsChanged):
+        return ""
+    if event.by is not None:
+        return f" (by the {event.by})"
+    return " (scheduled)" if event.planned else " (unplanned)"
+
+
+def _list(values: Sequence[object]) -> str:
+    return ", ".join(map(str, values))

@@ -1,0 +1,17 @@
+"""The exit statuses of ``qswarm``: a contract with shell scripts and CI."""
+
+PASS = 0
+"""Every expectation is met."""
+FAIL = 1
+"""An expectation is not met, an invariant is violated, or the result cannot be written."""
+BAD_INPUT = 2
+"""The input is wrong; nothing was started and nothing overwritten."""
+INCONCLUSIVE = 3
+"""The host was too slow, or the run ended early: neither a pass nor a failure."""
+INTERRUPTED = 130
+"""Ctrl-C or SIGTERM."""
+OUTPUT_CLOSED = 141
+"""Nothing reads the output any more, as in `qswarm ... | head`."""
+
+EXIT_STATUS = {"pass": PASS, "fail": FAIL, "inconclusive": INCONCLUSIVE}
+"""The status for each outcome in summary.json."""

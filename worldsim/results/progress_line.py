@@ -1,0 +1,35 @@
+"""A progress line for work that takes over two seconds."""
+
+import sys
+from time import monotonic
+from typing import TextIO
+
+QUIET_S = 2.0
+"""Shorter work shows no progress."""
+LINE_EVERY_S = 0.2
+LOG_EVERY_S = 5.0
+
+
+class ProgressLine:
+    """A line that is updated in place on a terminal, and printed now and then elsewhere."""
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream = stream if stream is not None else sys.stderr
+        self._next_s = monotonic() + QUIET_S
+        self._shown = False
+
+    def update(self, text: str) -> None:
+        """Show how far the work is, unless it was shown a moment ago."""
+        if monotonic() < self._next_s:
+            return
+        terminal = self._stream.isatty()
+        self._next_s = monotonic() + (LINE_EVERY_S if terminal else LOG_EVERY_S)
+        self._stream.write(f"\r\x1b[K{text}" if terminal else f"{text}\n")
+        self._stream.flush()
+        self._shown = terminal
+
+    def clear(self) -> None:
+        """Remove the line from the terminal."""
+        if self._shown:
+            self._stream.write("\r\x1b[K")
+            self._stream.flush()
