@@ -5,7 +5,15 @@ import numpy as np
 from netem.messages import MediumCounters
 from worldsim.engine.counters import RadioUse
 
-SPOKEN = MediumCounters(0, 0, 0, {}, 0, {}, spoken_b=(100, 10, 400, 40, 0, 0))
+SPOKEN = MediumCounters(
+    slot=0,
+    sent=0,
+    addressed=0,
+    fates={},
+    in_flight=0,
+    rejected={},
+    sent_b=(100, 10, 400, 40, 0, 0),
+)
 
 
 def radio_use():

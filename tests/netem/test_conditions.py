@@ -91,7 +91,7 @@ def say(made, sent_s):
 def test_a_change_meets_later_frames_and_not_those_in_flight():
     made = radio(delay_ms=100.0)
     say(made, 0.0)
-    made.obey(begin(1, Conditions(loss_percent=100.0)))
+    made.apply(begin(1, Conditions(loss_percent=100.0)))
     say(made, 0.05)
     assert [len(made.collect(who, 1.0)) for who in (1, 2)] == [1, 1]
     assert made.counters(0).fates["dropped_loss"] == 2
@@ -100,9 +100,9 @@ def test_a_change_meets_later_frames_and_not_those_in_flight():
 def test_a_partition_cuts_later_frames_and_a_heal_ends_it():
     made = radio(delay_ms=100.0)
     say(made, 0.0)
-    made.obey(begin(1, Partition(((0, 1),))))
+    made.apply(begin(1, Partition(((0, 1),))))
     say(made, 0.05)
-    made.obey(end(1))
+    made.apply(end(1))
     say(made, 0.06)
     assert [len(made.collect(who, 1.0)) for who in (1, 2)] == [3, 2]
     fates = made.counters(0).fates

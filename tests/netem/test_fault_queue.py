@@ -19,7 +19,7 @@ HEALED = begin(3, Heal())
 def test_orders_wait_for_their_slot_and_come_once_in_turn() -> None:
     book = FaultQueue()
     for slot, order in ((8, CHANGED), (8, PARTED), (12, HEALED)):
-        book.take(msgspec.json.encode(FaultOrders(slot, (order,))))
+        book.put(msgspec.json.encode(FaultOrders(slot, (order,))))
     assert book.due(7) == []
     assert book.due(9) == [CHANGED, PARTED]
     assert book.due(9) == []
@@ -37,7 +37,7 @@ def test_orders_wait_for_their_slot_and_come_once_in_turn() -> None:
 )
 def test_what_is_no_order_is_refused(data: bytes) -> None:
     with pytest.raises(WireError, match="malformed"):
-        FaultQueue().take(data)
+        FaultQueue().put(data)
 
 
 def test_the_medium_obeys() -> None:
@@ -46,7 +46,7 @@ def test_the_medium_obeys() -> None:
 
     def fate(slot: int, *orders: FaultOrder) -> str:
         for order in orders:
-            medium.obey(order)
+            medium.apply(order)
         before = medium.counters(slot).fates
         medium.transmit(0, 0.0, Transmission(slot, 0, (Outgoing(0, b"x"),)))
         medium.collect(1, 1.0)

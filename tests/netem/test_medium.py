@@ -54,7 +54,7 @@ def test_bytes_are_counted_by_who_sent_them_and_on_which_channel():
     radio.transmit(1, 0.0, said(b"four", b"seven b"))
     radio.transmit(1, 0.5, said(b"far", channel=MULTIHOP, incarnation=1))
     radio.transmit(3, 0.5, said(b"near"))
-    assert radio.counters(0).spoken_b == (0, 0, 11, 3, 0, 0, 4, 0, 0, 0)
+    assert radio.counters(0).sent_b == (0, 0, 11, 3, 0, 0, 4, 0, 0, 0)
 
 
 agents = st.integers(0, AGENTS - 1)

@@ -49,14 +49,14 @@ class RadioUse:
 
         Payloads alone; None where the radio told of nothing.
         """
-        if medium_counters is None or not medium_counters.spoken_b:
+        if medium_counters is None or not medium_counters.sent_b:
             return None
         seconds = (self._awake_ticks / self._tick_hz).tolist()
         return {
             name: [
                 spoken / flown_s if flown_s else None
                 for spoken, flown_s in zip(
-                    medium_counters.spoken_b[channel :: len(CHANNELS)], seconds, strict=True
+                    medium_counters.sent_b[channel :: len(CHANNELS)], seconds, strict=True
                 )
             ]
             for channel, name in enumerate(CHANNELS)

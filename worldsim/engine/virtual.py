@@ -102,7 +102,7 @@ class VirtualFleet:
                 for agent, incarnation in incarnations.items():
                     self._agents[agent] = self._started(agent, incarnation)
             case FaultOrder():
-                self._medium.obey(operation)
+                self._medium.apply(operation)
             case PauseProcesses() | ResumeProcesses() | AdmitAgents():
                 pass  # whether an agent steps is the loop's
             case SetSensorMode() | GiveMission():

@@ -179,7 +179,13 @@ class FreeRunningFleet:
 
     def _send(self, opened: Opened) -> None:
         incarnations = tuple(self.loop.members.incarnations)
-        self._truth(pack(Truth(opened.slot, opened.time_s, opened.positions, incarnations)))
+        truth = Truth(
+            slot=opened.slot,
+            time_s=opened.time_s,
+            positions=opened.positions,
+            incarnations=incarnations,
+        )
+        self._truth(pack(truth))
         for agent, observation in opened.observations:
             self._observers[agent](encode(observation))
             self.lateness.observe(agent, opened.slot, self.loop.world.latest[agent])

@@ -12,7 +12,14 @@ from typing import assert_never
 from agent.codec import RejectedError, decode_command, encode
 from netem.delivery_log import Digest, joined_pages
 from netem.faults import FaultOrder
-from netem.messages import Done, MediumCounters, Truth, Turn, together, unpack_done
+from netem.messages import (
+    MediumCounters,
+    SlotInput,
+    SlotResult,
+    Truth,
+    merged,
+    unpack_slot_result,
+)
 from netem.wire.barrier import (
     ANSWER_TIMEOUT_S,
     LOCKSTEP_RING,
@@ -137,13 +144,13 @@ class LockstepFleet:
         self.loop.apply(operation, by)
 
     def _send(self, opened: Opened) -> None:
-        turn = Turn(
-            Truth(opened.slot, opened.time_s, opened.positions),
-            tuple(agent for agent, _ in opened.observations),
-            tuple(self.loop.members.incarnations),
-            self._actions.orders(),
+        slot_input = SlotInput(
+            truth=Truth(slot=opened.slot, time_s=opened.time_s, positions=opened.positions),
+            participants=tuple(agent for agent, _ in opened.observations),
+            incarnations=tuple(self.loop.members.incarnations),
+            orders=self._actions.orders(),
         )
-        self._truth(pack(turn))
+        self._truth(pack(slot_input))
         for agent, observation in opened.observations:
             self._observers[agent](encode(observation))
 
@@ -162,14 +169,14 @@ class LockstepFleet:
     def _await_mediums(self, slot: int) -> bytes:
         """Wait until all mediums are done with a slot; return the digest of all fates so far."""
         parts = [self._await_medium(shard, slot) for shard in range(len(self._done))]
-        self.medium_counters = together([part.medium_counters for part in parts])
+        self.medium_counters = merged([part.counters for part in parts])
         self._digest.update(joined_pages(dict(part.pages) for part in parts))
         return self._digest.value
 
-    def _await_medium(self, shard: int, slot: int) -> Done:
+    def _await_medium(self, shard: int, slot: int) -> SlotResult:
         what = f"{medium_name(shard)}'s answer of slot {slot}"
         try:
-            done = unpack_done(self._answer(self._done[shard], what))
+            done = unpack_slot_result(self._answer(self._done[shard], what))
         except WireError as error:
             raise LockstepError(f"{what}: {error}") from error
         check_slot(what, done.slot, slot)
