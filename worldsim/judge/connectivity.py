@@ -8,13 +8,11 @@ from functools import cache
 from math import comb, inf
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from netem.conditions import LinkModels, NetworkConditions
+from netem.conditions import NetworkConditions
 from netem.link import burst_variance_factor, mean_loss
-from netem.link_keys import Conditions
 from netem.random_draws import MAX_QUANTILE
 from netem.wire.channels import MULTIHOP
 from worldsim.judge.radio_events import order_of
@@ -84,8 +82,7 @@ class Connectivity:
 
     def _refresh(self) -> None:
         """Derive what follows from the conditions and partitions in force."""
-        conditions: Conditions = msgspec.structs.replace(self._network.conditions, link=())
-        model = LinkModels(conditions).of_channel(MULTIHOP)
+        model = self._network.models.of_channel(MULTIHOP)
         self.loss = mean_loss(model)
         self._stretch = max(1.0, burst_variance_factor(model))
         self._range_m = model.range_m
