@@ -25,7 +25,7 @@ SEEDS = range(3)
 class Watcher:
     """Keeps every tick."""
 
-    shows = True
+    records_ticks = True
 
     def __init__(self) -> None:
         self.ticks: list[Tick] = []
@@ -53,14 +53,14 @@ def nobody_met(flight: Flight) -> None:
     """No collision and no packet unaccounted for, whatever happened."""
     found = flight.loop.judge.invariants()
     for name in ("I1", "I8"):
-        assert found[name]["ticks"] == flight.loop.judge.ticks
-        assert found[name]["violations"] == 0
+        assert found[name].ticks == flight.loop.judge.ticks
+        assert found[name].violations == 0
 
 
 def violated(flight: Flight) -> list[str]:
     found = flight.loop.judge.invariants()
     assert {"I2", "I3", "I4", "I6", "I7"} <= set(found)
-    return [name for name, counts in found.items() if counts["violations"]]
+    return [name for name, counts in found.items() if counts.violations]
 
 
 def kinds(flight: Flight, *wanted: str) -> list[tuple[float, str, int | None]]:
@@ -123,7 +123,7 @@ def test_the_apex_leaves_and_has_a_successor(seed: int, radio: dict[str, str]) -
 def test_the_apex_leaves_where_four_of_five_frames_are_lost(seed: int) -> None:
     flight = flown(seed, 50, "at_s = 15, leave = ['vertex:V1']", **WORST)
     assert max(reformed_s(flight)) <= 25.0
-    assert flight.loop.judge.invariants()["I6"]["violations"] == 0
+    assert flight.loop.judge.invariants()["I6"].violations == 0
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -59,7 +59,7 @@ def test_every_formation_of_the_library_is_flown() -> None:
 def test_it_shows_what_it_says(name: str) -> None:
     judge = flown(name).loop.judge
     assert [each for each in judge.expectations() if not each.held] == []
-    assert all(row["ticks"] and not row["violations"] for row in judge.invariants().values())
+    assert all(row.ticks and not row.violations for row in judge.invariants().values())
 
 
 @pytest.mark.parametrize("name", ["figure-1a-12", "figure-1b-12"])

@@ -58,4 +58,4 @@ def test_who_has_reason_to_doubt_its_sensors_stands_and_nobody_is_hit(sensors, m
     assert np.linalg.norm(loop.world.vehicles.velocity[0]) == 0.0
     assert np.all(np.linalg.norm(loop.world.vehicles.velocity[1:], axis=1) > 0.1)
     assert [e.t_s for e in loop.events if e.kind == "sensor"] == [10.0]
-    assert loop.judge.invariants()["I1"]["violations"] == 0
+    assert loop.judge.invariants()["I1"].violations == 0

@@ -87,7 +87,7 @@ def wedge_without(place, seed, **overrides):
     fleet = VirtualFleet(load(WEDGE, {"seed": str(seed), "duration_s": "40", **overrides}))
     fly(fleet, 10.0)
     dead = [tuple(each.place) for each in told(fleet)].index(place)
-    fleet.loop.effects.exited(dead, signal=9, status=None)
+    fleet.loop.effects.record_exit(dead, signal=9, status=None)
     fly(fleet, 30.0)
     living = [agent for agent in range(9) if agent != dead]
     return fleet, living

@@ -31,8 +31,8 @@ def test_clean_radio(seed):
     assert max(command.telemetry.force for command in flight.loop.world.latest) < 1e-3
     assert judge.turns_over_limit_fraction <= 0.05
     checked = judge.invariants()["I1"]
-    assert checked["ticks"] == 401
-    assert checked["violations"] == 0
+    assert checked.ticks == 401
+    assert checked.violations == 0
     medium_counters = flight.medium_counters
     assert (
         medium_counters.addressed == sum(medium_counters.fates.values()) + medium_counters.in_flight
@@ -43,7 +43,7 @@ def test_clean_radio(seed):
 def test_half_of_all_frames_lost_and_late(seed):
     judge = flown(seed, **LOSSY).loop.judge
     assert [each.name for each in judge.expectations() if not each.held] == []
-    assert judge.invariants()["I1"]["violations"] == 0
+    assert judge.invariants()["I1"].violations == 0
 
 
 @pytest.mark.parametrize("seed", range(3))

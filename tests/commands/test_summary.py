@@ -1,6 +1,5 @@
 """summary.json: the keys of the contract, strict values, and an outcome with its reason."""
 
-import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -78,7 +77,7 @@ def test_a_packet_that_is_nowhere_violates_i8(small: Path) -> None:
     ticks = fleet.loop.judge.ticks
     for _ in range(12):
         fleet.slot()
-    assert fleet.loop.judge.invariants()["I8"]["violations"] == fleet.loop.judge.ticks - ticks
+    assert fleet.loop.judge.invariants()["I8"].violations == fleet.loop.judge.ticks - ticks
     told = summary(small, Flight(fleet.loop, fleet.medium_counters, 0, 1.0, 1.0))
     assert (told["outcome"], told["reason"]) == ("fail", "violated: I8")
 
@@ -92,7 +91,7 @@ def test_how_late_the_radio_was_is_told_in_ms(small: Path, flight: Flight) -> No
 
 
 def test_what_was_not_measured_is_null_and_no_pass(small: Path, flight: Flight) -> None:
-    flight.loop.judge.packet_ticks = 0
+    flight.loop.judge.invariants()["I8"].ticks = 0
     told = summary(
         small, flight, medium_counters=None, real_time_factor=float("nan"), mode="processes"
     )
@@ -122,12 +121,12 @@ def test_a_doubtful_run_is_never_a_pass(
 
 
 def test_no_slow_host_excuses_a_collision(small: Path, flight: Flight) -> None:
-    flight.loop.judge.safety_violations = 1
+    flight.loop.judge.invariants()["I1"].violations = 1
     told = summary(small, flight, host_too_slow=True, interrupted=True)
     assert (told["outcome"], told["reason"]) == ("fail", "violated: I1")
 
 
 def test_a_missed_expectation_fails(small: Path, flight: Flight) -> None:
-    late = dataclasses.replace(flight.loop.judge.expectations()[-1], held=False)
+    late = msgspec.structs.replace(flight.loop.judge.expectations()[-1], held=False)
     flight.loop.judge.expectations = lambda: [late]  # type: ignore[method-assign]
     assert summary(small, flight)["reason"] == f"not held: {late.name}"

@@ -45,7 +45,7 @@ def positions() -> Floats:
 def begun(
     members: Membership, number: int, fault: ProcessFault, claims: Claims = CLAIMS
 ) -> ProcessOperation:
-    return members.begun(number, fault, claims, positions(), 0.0)
+    return members.begin_operation(number, fault, claims, positions(), 0.0)
 
 
 def killed(members: Membership, *selectors: int | str) -> tuple[int, ...]:
@@ -83,16 +83,16 @@ def test_random_ones_belong_to_the_seed_and_the_event() -> None:
 def test_the_dead_are_not_struck_again_and_come_back_with_a_higher_incarnation() -> None:
     members = Membership(scenario())
     members.apply(begun(members, 4, Kill((2, 5))), 10.0)
-    assert not members.whole
+    assert not members.all_alive
     assert killed(members, 2, 5) == ()
-    back = members.ended(4, Kill((2, 5)), np.zeros((12, 3)), 20.0)
+    back = members.end_operation(4, Kill((2, 5)), np.zeros((12, 3)), 20.0)
     assert isinstance(back, StartProcesses)
     assert (back.incarnations, back.poses) == ({2: 1, 5: 1}, {})
     members.apply(back, 20.0)
     assert not members.alive[2]
     assert members.next_boot_s == 21.0
-    assert members.booted(20.9).agents == ()
-    members.apply(members.booted(21.0), 21.0)
+    assert members.admission(20.9).agents == ()
+    members.apply(members.admission(21.0), 21.0)
     assert members.alive[[2, 5]].all()
     assert members.incarnations[2] == 1
 
@@ -101,17 +101,17 @@ def test_a_paused_agent_is_alive_but_does_not_step_until_it_resumes() -> None:
     members = Membership(scenario())
     members.apply(begun(members, 0, Pause(("vertex:V1", 4))), 10.0)
     assert members.alive[[0, 4]].all()
-    assert not members.awake[[0, 4]].any()
-    assert members.first == 1
+    assert not members.running[[0, 4]].any()
+    assert members.first_running == 1
     assert killed(members, "vertex:V1") == ()  # a paused agent no longer holds its place
     assert killed(members, 4) == (4,)
     again = begun(members, 0, Pause((4,)))
     assert isinstance(again, PauseProcesses)
     assert again.agents == ()
     members.apply(begun(members, 1, Resume((4,))), 11.0)
-    assert members.ended(0, Pause((4,)), positions(), 12.0) == ResumeProcesses(0, (0,), ())
+    assert members.end_operation(0, Pause((4,)), positions(), 12.0) == ResumeProcesses(0, (0,), ())
     members.apply(begun(members, 2, Kill((0,))), 12.0)
-    assert members.ended(0, Pause((4,)), positions(), 12.0) == ResumeProcesses(0, (), ())
+    assert members.end_operation(0, Pause((4,)), positions(), 12.0) == ResumeProcesses(0, (), ())
 
 
 def test_joiners_get_the_next_ids_and_keep_clear_of_present_vehicles() -> None:
@@ -142,7 +142,7 @@ def test_an_agent_that_left_comes_back_clear_of_present_vehicles() -> None:
     assert members.state(2) is State.GONE
     position = np.zeros((12, 3)) + np.arange(12)[:, None]
     position[2] = np.nan
-    back = members.begun(7, Restart((2,)), NO_CLAIMS, position, 11.0)
+    back = members.begin_operation(7, Restart((2,)), NO_CLAIMS, position, 11.0)
     assert isinstance(back, StartProcesses)
     where = back.poses[2].position
     away = np.linalg.norm(np.delete(position, 2, axis=0) - where, axis=1)

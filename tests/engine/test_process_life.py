@@ -60,27 +60,27 @@ class Life:
         for agent, after in enumerate(states(self.members)):
             assert after is before[agent] or (before[agent], after) in AFTER
             assert self.members.alive[agent] == (after in ALIVE)
-            assert self.members.awake[agent] == (after is State.RUNNING)
-            assert self.members.has(agent, None) == (after in ALIVE | {State.BOOTING})
-        assert self.members.whole == bool(np.all(self.members.alive))
+            assert self.members.running[agent] == (after is State.RUNNING)
+            assert self.members.has_process(agent, None) == (after in ALIVE | {State.BOOTING})
+        assert self.members.all_alive == bool(np.all(self.members.alive))
 
     def _do(self, word: str, what: ProcessFault | int | None) -> None:
         members, number = self.members, len(self._begun)
         if word == "boot":
-            members.apply(members.booted(self._time_s), self._time_s)
+            members.apply(members.admission(self._time_s), self._time_s)
         elif word == "exit" and isinstance(what, int):
-            if members.has(what, None):
-                members.exited(what)
+            if members.has_process(what, None):
+                members.record_exit(what)
         elif word == "end" and isinstance(what, int):
             fault = self._begun.get(what)
-            operation = fault and members.ended(what, fault, positions(), self._time_s)
+            operation = fault and members.end_operation(what, fault, positions(), self._time_s)
             if operation:
                 members.apply(operation, self._time_s)
         elif isinstance(what, ProcessFault):
             self._joined += isinstance(what, Join)
             if self._joined <= 3 or not isinstance(what, Join):
                 self._begun[number] = what
-                operation = members.begun(number, what, CLAIMS, positions(), self._time_s)
+                operation = members.begin_operation(number, what, CLAIMS, positions(), self._time_s)
                 members.apply(operation, self._time_s)
 
 

@@ -106,4 +106,4 @@ def test_a_corrupt_frame_is_rejected_and_counted_and_the_team_converges() -> Non
     assert counters.corrupted > 0.25 * counters.fates["delivered"]
     assert counters.corrupted <= flight.rejected <= counters.corrupted + counters.duplicated
     assert flight.loop.judge.phases[-1].converge_s is not None
-    assert flight.loop.judge.invariants()["I8"]["violations"] == 0
+    assert flight.loop.judge.invariants()["I8"].violations == 0

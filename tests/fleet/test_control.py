@@ -162,7 +162,7 @@ def test_what_cannot_be_is_refused_and_changes_nothing(asked: dict[str, Any], re
     assert len(operated.loop.events) == before
     assert operated.ask() == radio
     assert radio.faults == ()
-    assert operated.loop.members.awake.all()
+    assert operated.loop.members.running.all()
 
 
 def test_an_older_version_is_refused() -> None:

@@ -40,9 +40,9 @@ def judged(ticks: list[Tick], *events: RunEvent) -> dict[str, tuple[int, int]]:
     waiting = list(events)
     for tick in ticks:
         while waiting and waiting[0].t_s <= tick.time_s:
-            judge.note(waiting.pop(0))
+            judge.handle_event(waiting.pop(0))
         judge.see(tick)
-    return {name: (row["ticks"], row["violations"]) for name, row in judge.invariants().items()}
+    return {name: (row.ticks, row.violations) for name, row in judge.invariants().items()}
 
 
 def claimed(ticks: list[Tick], agent: int, place: tuple[int, int], from_s: float) -> list[Tick]:
@@ -63,8 +63,8 @@ def test_how_long_it_takes_until_a_team_must_have_settled(
     loss_percent: float, horizon_s: float
 ) -> None:
     reach = Connectivity(wedge(AGENTS))
-    reach.note(changed(1, Conditions(loss_percent=loss_percent)))
-    settled_s = reach.detection_s(2) + 2.0 * reach.everybody_s(AGENTS, 2)
+    reach.handle_event(changed(1, Conditions(loss_percent=loss_percent)))
+    settled_s = reach.detection_s(2) + 2.0 * reach.dissemination_s(AGENTS, 2)
     assert settled_s == pytest.approx(horizon_s, abs=0.6)
 
 
@@ -78,16 +78,16 @@ def test_components_follow_range_and_partition() -> None:
     line = replace(tick, position=np.array([[k, 0, 0] for k in (0, 1, 2, 9)], dtype=np.float32))
     reach = Connectivity(wedge(4))
     assert reach.components(line).members() == [[0, 1, 2, 3]]
-    reach.note(changed(1, Conditions(range_m=1.5)))
+    reach.handle_event(changed(1, Conditions(range_m=1.5)))
     assert reach.components(line).members() == [[0, 1, 2], [3]]
     assert reach.components(line).hops == 2
-    reach.note(
+    reach.handle_event(
         Partitioned(
             t_s=0.0, agent=None, planned=True, number=2, groups=((1,),), parted="clean", bridge=()
         )
     )
     assert reach.components(line).members() == [[0], [1], [2], [3]]
-    reach.note(HEALED)
+    reach.handle_event(HEALED)
     assert reach.components(line).hops == 2
 
 

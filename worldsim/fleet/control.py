@@ -113,9 +113,9 @@ class Control:
             formation=effects.missions.formation,
             frame=effects.missions.frame,
             partitioned=effects.network.partitioned,
-            known=members.known,
-            living=frozenset(np.flatnonzero(members.awake).tolist()),
-            room=self._scenario.rows - members.known - self._timeline.joiners,
+            known=members.id_count,
+            living=frozenset(np.flatnonzero(members.running).tolist()),
+            room=self._scenario.rows - members.id_count - self._timeline.joiners,
         )
 
     def _operation(self, step: Step, request: Request) -> Operation:
@@ -141,9 +141,9 @@ class Control:
                 raise RequestError(f"{event.kind}: only a mission goes to an agent")
             return
         members, newest = self._loop.members, self._loop.effects.missions.newest
-        if request.to is not None and not 0 <= request.to < members.known:
-            raise RequestError(f"to: no agent {request.to}; 0 to {members.known - 1}")
-        if request.to is not None and not members.awake[request.to]:
+        if request.to is not None and not 0 <= request.to < members.id_count:
+            raise RequestError(f"to: no agent {request.to}; 0 to {members.id_count - 1}")
+        if request.to is not None and not members.running[request.to]:
             state = members.state(request.to).value
             raise RequestError(f"to: agent {request.to} is not running ({state})")
         if request.version is not None and not newest < request.version < MAX_VERSION:

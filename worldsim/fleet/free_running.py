@@ -28,7 +28,7 @@ from worldsim.engine.operations import (
     StartProcesses,
 )
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS
-from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
+from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
 from worldsim.fleet.control import Control, Reception
 from worldsim.fleet.delivery_latency import DeliveryLatency, LatencyCollector
 from worldsim.fleet.ipc import AgentProcess
@@ -177,7 +177,7 @@ class FreeRunningFleet:
             detail = "its process is not up by the end of boot_s"
             self.loop.emit(LateStart(t_s=t_s, agent=agent, detail=detail))
 
-    def _send(self, opened: Opened) -> None:
+    def _send(self, opened: OpenSlot) -> None:
         incarnations = tuple(self.loop.members.incarnations)
         truth = Truth(
             slot=opened.slot,
@@ -192,7 +192,7 @@ class FreeRunningFleet:
 
     def _accept_command(self, agent: int, data: bytes) -> None:
         """Take a command; one of an agent that is not running any more has no effect."""
-        if not self.loop.members.awake[agent]:
+        if not self.loop.members.running[agent]:
             return
         try:
             command = decode_command(data)
@@ -200,7 +200,7 @@ class FreeRunningFleet:
             self._rejected[error.cause] += 1
             return
         if command.incarnation == self.loop.members.incarnations[agent]:
-            self.loop.obey(agent, command, data)
+            self.loop.apply_command(agent, command, data)
         else:
             self._rejected["incarnation"] += 1
 
@@ -220,8 +220,8 @@ class FreeRunningFleet:
 
     def _handle_exits(self) -> None:
         for agent, incarnation, (number, status) in self._launcher.agent_exits():
-            if self.loop.members.has(agent, incarnation):
-                self.loop.effects.exited(agent, number, status)
+            if self.loop.members.has_process(agent, incarnation):
+                self.loop.effects.record_exit(agent, number, status)
 
     def _packets(self) -> Packets:
         return self.medium_counters.packets() if self.medium_counters is not None else {}

@@ -43,7 +43,7 @@ from worldsim.engine.operations import (
     StartProcesses,
 )
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
-from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
+from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
 from worldsim.fleet.control import Control, Reception
 from worldsim.fleet.ipc import AgentProcess, ProcessAction, names_of
 from worldsim.fleet.launcher_link import LauncherLink
@@ -143,7 +143,7 @@ class LockstepFleet:
         self._actions.carry_out(operation, self.loop.members.incarnations)
         self.loop.apply(operation, by)
 
-    def _send(self, opened: Opened) -> None:
+    def _send(self, opened: OpenSlot) -> None:
         slot_input = SlotInput(
             truth=Truth(slot=opened.slot, time_s=opened.time_s, positions=opened.positions),
             participants=tuple(agent for agent, _ in opened.observations),
@@ -164,7 +164,7 @@ class LockstepFleet:
         check_slot(what, command.slot, slot)
         if command.incarnation != self.loop.members.incarnations[agent]:
             raise LockstepError(f"{what} is of its incarnation {command.incarnation}")
-        self.loop.obey(agent, command, data)
+        self.loop.apply_command(agent, command, data)
 
     def _await_mediums(self, slot: int) -> bytes:
         """Wait until all mediums are done with a slot; return the digest of all fates so far."""
@@ -199,7 +199,7 @@ class LockstepFleet:
     def _check_exits(self) -> None:
         """Raise LockstepError when the process of a running or booting agent has ended."""
         for each in self._launcher.agent_exits():
-            if self.loop.members.has(each.agent, each.incarnation):
+            if self.loop.members.has_process(each.agent, each.incarnation):
                 raise LockstepError(str(each))
 
     def _launcher_failure(self) -> str | None:

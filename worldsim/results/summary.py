@@ -1,12 +1,14 @@
 """summary.json: what a run showed, from the judge, the radio's counters and the clock."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
+import msgspec
+
 from netem.messages import MediumCounters
 from worldsim.engine.step import SlotLoop
+from worldsim.judge.invariants import InvariantTally
 from worldsim.judge.verdict import Expectation, Judge
 from worldsim.scenario.tables import Scenario
 
@@ -63,11 +65,11 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
         "duration_s": duration_s,
         "outcome": outcome,
         "reason": reason,
-        "expectations": [_row(expectation) for expectation in expectations],
+        "expectations": expectations,
         "min_separation_m": judge.min_separation_m,
         "min_obstacle_distance_m": judge.min_obstacle_distance_m,
         "phases": _phases(judge),
-        "recoveries": [asdict(recovery) for recovery in judge.recoveries],
+        "recoveries": judge.recoveries,
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "packets": _packets(medium_counters, rejected),
@@ -85,18 +87,18 @@ def summarise(  # noqa: PLR0913 - a figure each, by name
 
 
 def _outcome(
-    expectations: list[Expectation], invariants: dict[str, dict[str, int]], doubt: str | None
+    expectations: list[Expectation], invariants: dict[str, InvariantTally], doubt: str | None
 ) -> tuple[str, str | None]:
     """Return the outcome and its reason.
 
     A broken invariant is a failure whatever else happened: no slow host excuses a collision.
     """
-    broken = [name for name, counts in invariants.items() if counts["violations"]]
+    broken = [name for name, tally in invariants.items() if tally.violations]
     if broken:
         return "fail", f"violated: {', '.join(broken)}"
     if doubt is not None:
         return "inconclusive", doubt
-    unseen = [name for name, counts in invariants.items() if not counts["ticks"]]
+    unseen = [name for name, tally in invariants.items() if not tally.ticks]
     if unseen:
         return "fail", f"never evaluated: {', '.join(unseen)}"
     missed = [expectation.name for expectation in expectations if not expectation.held]
@@ -155,19 +157,12 @@ def _phases(judge: Judge) -> list[dict[str, Any]]:
     ]
 
 
-def _row(expectation: Expectation) -> dict[str, Any]:
-    return {
-        "name": expectation.name,
-        "wanted": expectation.wanted,
-        "got": expectation.got,
-        "held": expectation.held,
-    }
-
-
 def _strict(value: Any) -> Any:
     """JSON knows no NaN and no infinity: what is not finite was not measured."""
     if isinstance(value, float):
         return float(value) if isfinite(value) else None
+    if isinstance(value, msgspec.Struct):
+        return _strict(msgspec.structs.asdict(value))
     if isinstance(value, dict):
         return {key: _strict(inner) for key, inner in value.items()}
     return [_strict(inner) for inner in value] if isinstance(value, list | tuple) else value

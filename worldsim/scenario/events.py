@@ -16,9 +16,9 @@ from worldsim.scenario.faults import (
     ProcessFault,
     Restart,
     Resume,
-    Selectors,
     SensorFault,
 )
+from worldsim.scenario.selectors import Selectors
 from worldsim.scenario.target_frame import FrameChange, Time
 
 
