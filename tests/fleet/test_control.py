@@ -123,7 +123,7 @@ REFUSED = [
     ({"kill": [9]}, "kill[0]: no agent 9; 0 to 8"),
     ({"kill": ["vertex:V9"]}, "kill[0]: no vertex 'V9'"),
     ({"restart": [3]}, "restart: no agent to restart"),
-    ({"resume": ["all"]}, "resume: no agent that ['all'] selects can do that now"),
+    ({"resume": ["all"]}, "resume: no agent in ['all'] can do that now"),
     ({"join": 1}, "join: 1; fleet.spare leaves room for 0"),
     ({"heal": True}, "heal: no partition to heal"),
     ({"jam": {"centre_m": [0, 0, 0], "radius_m": -1}}, "jam.radius_m: got -1"),
@@ -131,9 +131,9 @@ REFUSED = [
     ({"netem": {}}, "netem: no key to set"),
     ({"netem": {"rate_kbit": 1e-300}}, "netem.rate_kbit: got 1e-300; allowed: a number from 0.001"),
     ({"flap": {"period_s": 1e-300}}, "flap.period_s: got 1e-300; allowed: a number from 0.05"),
-    ({"netem": {"loss_percent": nan}}, "netem.loss_percent: nothing, or a number that is not"),
-    ({"netem": {"loss_percent": 5}, "for_s": nan}, "for_s: nothing, or a number that is not"),
-    ({"jam": {"centre_m": [0, inf, 0], "radius_m": 1}}, "jam.centre_m[1]: nothing, or a number"),
+    ({"netem": {"loss_percent": nan}}, "netem.loss_percent: null or not finite"),
+    ({"netem": {"loss_percent": 5}, "for_s": nan}, "for_s: null or not finite"),
+    ({"jam": {"centre_m": [0, inf, 0], "radius_m": 1}}, "jam.centre_m[1]: null or not finite"),
     ({"netem": {"distribution": "poisson"}}, "netem.distribution: "),
     ({"netem": {"gemodel": {"p_percent": 5, "r_percent": 500}}}, "netem.gemodel.r_percent: got 5"),
     ({"partition": [[0, 1], [1]]}, "partition[1]: agent 1 is named twice"),
@@ -144,7 +144,7 @@ REFUSED = [
     ({"formation": {**LINES, "vertices": {"V1": [0, 0, 0]}}}, "formation."),
     ({"frame": {"yaw_deg": 9}, "to": 9}, "to: no agent 9; 0 to 8"),
     ({"frame": {"yaw_deg": 9}, "version": 0}, "version: 0; above 0"),
-    ({"kill": [1], "to": 2}, "kill: only a mission goes to an agent"),
+    ({"kill": [1], "to": 2}, "kill: to and version go with a mission only"),
     ({"kill": [1], "leave": [2]}, "leave: not beside kill"),
     ({"heal": True, "for_s": 3}, "for_s: heal is not undone"),
     ({"explode": True}, "explode: unknown key"),
@@ -168,7 +168,7 @@ def test_what_cannot_be_is_refused_and_changes_nothing(asked: dict[str, Any], re
 def test_an_older_version_is_refused() -> None:
     operated = Operated(8.0)
     operated.ask(to=4, version=3, formation=LINES)
-    with pytest.raises(RequestError, match="version: 3; above 3, which flies already"):
+    with pytest.raises(RequestError, match="version: 3; above 3 is allowed"):
         operated.ask(to=4, version=3, frame={"yaw_deg": 90})
     operated.ask(kill=[4])
     with pytest.raises(RequestError, match=r"to: agent 4 is not running \(dead\)"):

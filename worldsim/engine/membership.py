@@ -41,10 +41,9 @@ from worldsim.scenario.faults import (
 )
 from worldsim.scenario.selectors import Selectors
 from worldsim.scenario.tables import Scenario
+from worldsim.scenario.timeline import SLACK_S
 from worldsim.truth.start_positions import StartError
 from worldsim.truth.vehicle import Floats
-
-SLACK_S = 1e-9
 
 
 class Membership:

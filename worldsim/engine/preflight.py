@@ -8,7 +8,7 @@ from pathlib import Path
 
 from agent.controller import ControllerError
 from agent.controller import load as load_controller
-from worldsim.scenario.events import ON_PROCESSES
+from worldsim.scenario.faults import ProcessFault
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.rules import speed_problem
 from worldsim.scenario.tables import Scenario
@@ -41,7 +41,7 @@ def admit(scenario: Scenario, file: str | Path, command_ticks: int, by_hand: boo
 def _launcher(scenario: Scenario) -> Problem | None:
     """Return a problem for the first event that needs a launcher."""
     for index, event in enumerate(scenario.event):
-        if event.kind in ON_PROCESSES:
+        if isinstance(event.action, ProcessFault):
             return Problem(
                 f"event[{index}].{event.kind}",
                 "needs the launcher (qswarm run): processes started by hand are ended by hand",

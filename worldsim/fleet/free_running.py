@@ -29,7 +29,7 @@ from worldsim.engine.operations import (
 )
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS
 from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
-from worldsim.fleet.control import Control, Reception
+from worldsim.fleet.control import Control, ControlServer
 from worldsim.fleet.delivery_latency import DeliveryLatency, LatencyCollector
 from worldsim.fleet.ipc import AgentProcess
 from worldsim.fleet.launcher_link import LauncherLink
@@ -72,7 +72,9 @@ class FreeRunningFleet:
         self._launcher = launcher
         self._startup = startup
         self._actions = ProcessActions(bus, startup, launcher, scenario.fleet.boot_s / speed)
-        self._reception = Reception(bus, Control(scenario, self.loop, launcher.controls_processes))
+        self._control_server = ControlServer(
+            bus, Control(scenario, self.loop, launcher.controls_processes)
+        )
         self.begun = self._landed = False
         self._rejected: Counter[str] = Counter()
         self._pacer = Pacer(1.0 / (scenario.slot_hz * speed))
@@ -146,7 +148,7 @@ class FreeRunningFleet:
         self._startup.answer_setup_requests()
         for operation in self.loop.due():
             self._carry_out(operation)
-        self._reception.attend(self._carry_out)
+        self._control_server.answer_waiting(self._carry_out)
         self._send(self.loop.open())
         self._handle_exits()
         while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not should_stop():

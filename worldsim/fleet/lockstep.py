@@ -44,7 +44,7 @@ from worldsim.engine.operations import (
 )
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
 from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
-from worldsim.fleet.control import Control, Reception
+from worldsim.fleet.control import Control, ControlServer
 from worldsim.fleet.ipc import AgentProcess, ProcessAction, names_of
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.progress import ProgressReporter, StallReporter
@@ -85,7 +85,9 @@ class LockstepFleet:
         self._launcher = launcher
         self._should_stop: Callable[[], bool] = lambda: False
         self._actions = AwaitedActions(startup, launcher, self._check_exits, self._stopped)
-        self._reception = Reception(bus, Control(scenario, self.loop, launcher.controls_processes))
+        self._control_server = ControlServer(
+            bus, Control(scenario, self.loop, launcher.controls_processes)
+        )
         self._progress_reporter = ProgressReporter(scenario.duration_s, self.loop, launcher)
         self._digest = Digest()
         self._truth = bus.publisher("truth", lockstep=True)
@@ -130,7 +132,7 @@ class LockstepFleet:
     def _slot(self) -> None:
         for operation in self.loop.due():
             self._carry_out(operation)
-        self._reception.attend(self._carry_out)
+        self._control_server.answer_waiting(self._carry_out)
         self._check_exits()
         opened = self.loop.open()
         self._send(opened)
