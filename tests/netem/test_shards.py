@@ -11,7 +11,7 @@ from netem.link_keys import Conditions, DirectedLink, GilbertElliott, LinkKeys, 
 from netem.medium import Medium
 from netem.messages import MediumSetup
 from netem.wire.frame import Outgoing, Transmission
-from tests.netem.ordering import begin, end
+from tests.netem.fault_orders import begin, end
 
 AGENTS = 6
 SLOT_S = 0.0125
