@@ -7,7 +7,7 @@ began, and a link is cut where any fault cuts it. Faults end by their number, in
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple, TypeVar, assert_never
+from typing import NamedTuple, TypeVar, assert_never
 
 import msgspec
 
@@ -17,6 +17,7 @@ from netem.link_keys import RATE_KEYS, Conditions, LinkKeys
 from netem.wire.channels import CHANNELS
 
 _Keys = TypeVar("_Keys", bound=LinkKeys)
+NO_KEYS = LinkKeys()
 UNNAMED = -1
 """The group of all agents that a partition does not name."""
 
@@ -221,17 +222,15 @@ def _is_within(jam: Jam, position: Position) -> bool:
 
 def _over(table: _Keys, change: LinkKeys) -> _Keys:
     """Return a table with the link keys that a change sets."""
-    return msgspec.structs.replace(table, **_set_keys(change))
+    keys = {key: getattr(change, key) for key in LinkKeys.__struct_fields__}
+    return msgspec.structs.replace(
+        table, **{key: value for key, value in keys.items() if value is not None}
+    )
 
 
-def _set_keys(table: LinkKeys) -> dict[str, Any]:
-    """Return the link keys that a table sets; values of several types, by key."""
-    values = ((key, getattr(table, key)) for key in LinkKeys.__struct_fields__)
-    return {key: value for key, value in values if value is not None}
-
-
-def _merged(both: LinkKeys, channel: LinkKeys, link: LinkKeys = LinkKeys()) -> LinkModel:  # noqa: B008
+def _merged(both: LinkKeys, channel: LinkKeys, link: LinkKeys = NO_KEYS) -> LinkModel:
     """Return the model of a link from its tables: later tables override earlier ones."""
     own_rate = any(getattr(link, key) is not None for key in RATE_KEYS)
-    keys = _set_keys(both) | _set_keys(channel) | _set_keys(link)
+    table = _over(_over(both, channel), link)
+    keys = {key: getattr(table, key) for key in LinkKeys.__struct_fields__}
     return LinkModel(**keys, own_rate=own_rate)

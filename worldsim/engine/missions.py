@@ -1,6 +1,6 @@
 """Missions for the team: each is given to one agent, which spreads it by radio."""
 
-from typing import assert_never
+from typing import Literal, assert_never
 
 from agent.codec import encode_formation
 from agent.comms.mission import KEYS_PER_VERSION
@@ -40,10 +40,10 @@ class Missions:
         match change:
             case FormationSpec():
                 self.formation = change
-                return GiveMission("formation", self.formation, path_of(self.frame))
+                return self._given("formation")
             case FrameChange():
                 self.frame = changed_frame(self.frame, change, at_s)
-                return GiveMission("frame", self.formation, path_of(self.frame))
+                return self._given("frame")
         assert_never(change)
 
     def issue(self, mission: GiveMission) -> int:
@@ -51,7 +51,8 @@ class Missions:
         self._issued = mission.version or self.newest + 1
         self.to = mission.to
         key = self._issued * KEYS_PER_VERSION
-        self.pending = Mission(key, mission.path, encode_formation(mission.formation))
+        formation = encode_formation(mission.formation)
+        self.pending = Mission(key=key, frame=mission.path, formation=formation)
         return key
 
     def report(self, agent: int, key: int) -> None:
@@ -59,3 +60,6 @@ class Missions:
         self._flown[agent] = key
         if self.pending is not None and key >= self.pending.key:
             self.pending = None
+
+    def _given(self, kind: Literal["formation", "frame"]) -> GiveMission:
+        return GiveMission(kind=kind, formation=self.formation, path=path_of(self.frame))

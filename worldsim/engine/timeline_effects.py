@@ -150,7 +150,7 @@ class TimelineEffects:
 
     def _fault_order(self, step: Step, fault: RadioFault) -> FaultOrder | None:
         event = None if step.ends else RadioEvent.of(fault)
-        order = FaultOrder(step.number, step.at_s, event)
+        order = FaultOrder(number=step.number, at_s=step.at_s, event=event)
         return None if step.ends and not self.network.ends(order) else order
 
     def _process_operation(self, step: Step, fault: ProcessFault) -> Operation | None:

@@ -3,7 +3,7 @@
 ``kind`` is the event's key. The judge, the recorder and readers of a run get the same events.
 """
 
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import msgspec
 
@@ -229,9 +229,9 @@ RunEvent = (
 )
 
 
-def as_row(event: RunEvent) -> dict[str, Any]:
+def as_row(event: RunEvent) -> dict[str, object]:
     """Return an event as a row of events.jsonl: ``t_s``, ``kind``, ``agent``, then its own keys."""
-    row: dict[str, Any] = msgspec.to_builtins(event)
+    row: dict[str, object] = msgspec.to_builtins(event)
     first = {key: row.pop(key) for key in ("t_s", "kind", "agent")}
     return first | row
 
