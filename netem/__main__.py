@@ -6,10 +6,10 @@ import sys
 from netem.process import run
 
 DESCRIPTION = """\
-The radio between the agents, and the Zenoh router that all processes of a run connect to.
+The emulated radio between the agents, and the Zenoh router that all processes of a run connect to.
 
-It serves the first run whose world asks for it, refuses any other, and ends with that run.
-What the radio is like (range, delay, loss) comes from the world's scenario."""
+It serves the first run whose world asks for it, refuses all others, and ends with that run.
+The conditions of the radio (range, delay, loss) come from the world's scenario."""
 
 EPILOG = """\
 a fleet by hand, each in its own shell:
@@ -20,11 +20,11 @@ a fleet by hand, each in its own shell:
       python -m agent --id $i --run mine --connect tcp/127.0.0.1:7447 &
   done
 
-exit status: 0 the run ended or SIGTERM came; 1 the world went silent; 2 it could not listen"""
+exit status: 0 the run ended or SIGTERM arrived; 1 the world is gone; 2 it could not listen"""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Serve as the command line says; return the exit status."""
+    """Serve by the command line; return the exit status."""
     parser = argparse.ArgumentParser(
         prog="python -m netem",
         description=DESCRIPTION,
@@ -35,7 +35,7 @@ def main(arguments: list[str] | None = None) -> int:
         "--listen",
         required=True,
         metavar="ENDPOINT",
-        help="where to listen, on loopback: tcp/127.0.0.1:7447, unixsock-stream//run/qswarm.sock",
+        help="endpoint on loopback: tcp/127.0.0.1:7447, unixsock-stream//run/qswarm.sock",
     )
     return run(parser.parse_args(arguments).listen)
 

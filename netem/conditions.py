@@ -1,31 +1,31 @@
-"""What is in force on the radio: link conditions and faults, as they begin and end.
+"""The link conditions and radio faults in force.
 
-:class:`NetworkConditions` is the only holder of it: the medium asks it for each frame, the judge
-for connectivity, the world for what an operator is shown. Faults in force together compose:
-conditions lie over each other in the order of their beginning, and a frame is cut where any fault
-cuts it. Each fault ends by its number, in any order.
+:class:`NetworkConditions` is their only holder: the medium uses it for each frame, the judge for
+connectivity, the link check for the models of a scenario, the operator's control for its report.
+Faults that are in force together compose: changes of conditions apply in the order in which they
+began, and a link is cut where any fault cuts it. Faults end by their number, in any order.
 """
 
 from collections.abc import Mapping
-from itertools import chain
-from typing import Any, NamedTuple, TypeVar, assert_never
+from typing import NamedTuple, TypeVar, assert_never
 
 import msgspec
 
 from netem.faults import FaultOrder, Flap, Heal, Jam, LastingFault, Partition, Position
 from netem.link import LinkModel
-from netem.link_keys import RATE_KEYS, Conditions, DirectedLink, LinkKeys
+from netem.link_keys import RATE_KEYS, Conditions, LinkKeys
 from netem.wire.channels import CHANNELS
 
 _Keys = TypeVar("_Keys", bound=LinkKeys)
+NO_KEYS = LinkKeys()
 UNNAMED = -1
-"""The group of the agents that a partition does not name."""
+"""The group of all agents that a partition does not name."""
 
 
 class LinkModels:
     """The model of each directed link on each channel under given conditions.
 
-    A link's own table wins over its channel's, and that over the one for both channels.
+    The link's own table overrides its channel's table, which overrides the table of both channels.
     """
 
     def __init__(self, conditions: Conditions) -> None:
@@ -42,11 +42,11 @@ class LinkModels:
                 self._reach_m[channel, link.source] = max(before_m, own.reach_m)
 
     def of_channel(self, channel: int) -> LinkModel:
-        """Return the model that holds on a channel where no link has its own."""
+        """Return the model of a channel's links that have no table of their own."""
         return self._channels[channel]
 
     def common(self, channel: int, source: int) -> LinkModel | None:
-        """Return the one model of all links from a source, or None where one has its own."""
+        """Return the model that all links from a source share; None where a link has its own."""
         return self._channels[channel] if (channel, source) not in self._reach_m else None
 
     def of_link(self, channel: int, source: int, destination: int) -> LinkModel:
@@ -54,12 +54,12 @@ class LinkModels:
         return self._links.get((channel, source, destination), self._channels[channel])
 
     def reach_m(self, channel: int, source: int) -> float:
-        """Return the distance [m] beyond which no agent hears a source on a channel."""
+        """Return the distance [m] beyond which no agent receives a source on a channel."""
         return self._reach_m.get((channel, source), self._channels[channel].reach_m)
 
 
 class PartitionCut:
-    """Which directed links one partition cuts."""
+    """The directed links that one partition cuts."""
 
     def __init__(self, partition: Partition) -> None:
         groups = partition.groups
@@ -70,7 +70,7 @@ class PartitionCut:
         self._bridge = frozenset(partition.bridge)
 
     def cuts(self, source: int, destination: int) -> bool:
-        """Return whether the destination does not hear the source."""
+        """Return whether the link from source to destination is cut."""
         group = self._group_of.get(source, UNNAMED)
         if group == self._group_of.get(destination, UNNAMED):
             return self._cuts_within(source, destination, group)
@@ -79,8 +79,8 @@ class PartitionCut:
     def _cuts_within(self, source: int, destination: int, group: int) -> bool:
         if self._kind != "ring" or group == UNNAMED:
             return False
-        apart = (self._rank[source] - self._rank[destination]) % self._sizes[group]
-        return apart not in (1, self._sizes[group] - 1)
+        distance = (self._rank[source] - self._rank[destination]) % self._sizes[group]
+        return distance not in (1, self._sizes[group] - 1)
 
     def _cuts_between(self, source: int, destination: int, group: int) -> bool:
         match self._kind:
@@ -94,15 +94,15 @@ class PartitionCut:
 
 
 class InForce(NamedTuple):
-    """A fault in force, and since when."""
+    """A fault in force."""
 
     since_s: float
-    """[s; simulated time]"""
+    """When it began [s; simulated time]."""
     fault: LastingFault
 
 
 class NetworkConditions:
-    """Link models and faults in force; a frame is judged by what holds when it is sent."""
+    """The conditions in force, from a run's base conditions and the faults begun and not ended."""
 
     def __init__(self, base: Conditions) -> None:
         self._base = base
@@ -110,15 +110,17 @@ class NetworkConditions:
         self._partitions: list[PartitionCut] = []
         self._jams: list[Jam] = []
         self._flaps: list[tuple[float, Flap]] = []
+        """With the start of each [s; simulated time]."""
         self.conditions = base
-        """The base under all changes in force."""
+        """The base conditions with all changes in force."""
         self.models = LinkModels(base)
+        """The link models under these conditions."""
         self.obstructed = False
         """Whether any partition, jam or flap is in force."""
 
     @property
     def in_force(self) -> Mapping[int, InForce]:
-        """The faults in force by number, in the order of their beginning."""
+        """The faults in force by number, in the order in which they began."""
         return self._in_force
 
     @property
@@ -128,28 +130,31 @@ class NetworkConditions:
 
     @property
     def flapping(self) -> bool:
-        """Whether any links flap."""
+        """Whether a flap is in force."""
         return bool(self._flaps)
 
     def apply(self, order: FaultOrder) -> None:
-        """Begin or end a fault. An end of what is not in force changes nothing."""
+        """Begin or end a fault. The end of a fault that is not in force changes nothing."""
         fault = order.fault
-        if fault is None:
-            self._in_force.pop(order.number, None)
-        elif isinstance(fault, Heal):
-            self._end_partitions()
-        else:
-            self._in_force[order.number] = InForce(order.at_s, fault)
+        match fault:
+            case None:
+                self._in_force.pop(order.number, None)
+            case Heal():
+                self._end_partitions()
+            case Conditions() | Partition() | Jam() | Flap():
+                self._in_force[order.number] = InForce(order.at_s, fault)
+            case _:
+                assert_never(fault)
         self._refresh()
 
     def ends(self, order: FaultOrder) -> bool:
-        """Return whether an order would end anything that is in force."""
+        """Return whether an order ends a fault that is in force."""
         if isinstance(order.fault, Heal):
             return self.partitioned
         return order.fault is None and order.number in self._in_force
 
     def partitions(self, source: int, destination: int) -> bool:
-        """Return whether a partition keeps a destination from hearing a source."""
+        """Return whether a partition cuts a directed link."""
         return any(partition.cuts(source, destination) for partition in self._partitions)
 
     def cuts(self, source: int, destination: int, now_s: float) -> bool:
@@ -162,40 +167,40 @@ class NetworkConditions:
             if not flap.links or (source, destination) in flap.links
         )
 
-    def jammed(self, where: Position) -> bool:
-        """Return whether a radio at a point [m; world frame] is within a jam."""
-        return any(_is_within(jam, where) for jam in self._jams)
+    def jammed(self, position: Position) -> bool:
+        """Return whether a radio at a position [m; world frame] is in a jam's sphere."""
+        return any(_is_within(jam, position) for jam in self._jams)
 
     def _end_partitions(self) -> None:
         self._in_force = {
-            number: held
-            for number, held in self._in_force.items()
-            if not isinstance(held.fault, Partition)
+            number: each
+            for number, each in self._in_force.items()
+            if not isinstance(each.fault, Partition)
         }
 
     def _refresh(self) -> None:
-        """Sort what is in force by its effect."""
+        """Derive the effects of the faults in force."""
         self._partitions, self._jams, self._flaps = [], [], []
         conditions = self._base
-        for held in self._in_force.values():
-            match held.fault:
+        for since_s, fault in self._in_force.values():
+            match fault:
                 case Conditions():
-                    conditions = overlaid(conditions, held.fault)
+                    conditions = overlaid(conditions, fault)
                 case Partition():
-                    self._partitions.append(PartitionCut(held.fault))
+                    self._partitions.append(PartitionCut(fault))
                 case Jam():
-                    self._jams.append(held.fault)
+                    self._jams.append(fault)
                 case Flap():
-                    self._flaps.append((held.since_s, held.fault))
+                    self._flaps.append((since_s, fault))
                 case _:
-                    assert_never(held.fault)
+                    assert_never(fault)
         if conditions != self.conditions:
             self.conditions, self.models = conditions, LinkModels(conditions)
         self.obstructed = bool(self._partitions or self._jams or self._flaps)
 
 
 def overlaid(conditions: Conditions, change: Conditions) -> Conditions:
-    """Return conditions with a change over them, table by table and key by key."""
+    """Return conditions with the keys that a change sets, table by table."""
     links = {(link.source, link.to): link for link in conditions.link}
     for link in change.link:
         ends = (link.source, link.to)
@@ -210,24 +215,22 @@ def _is_down(flap: Flap, since_s: float, now_s: float) -> bool:
     return (now_s - since_s) % flap.period_s < 0.5 * flap.period_s
 
 
-def _is_within(jam: Jam, where: Position) -> bool:
-    dx, dy, dz = (a - b for a, b in zip(where, jam.centre_m, strict=True))
+def _is_within(jam: Jam, position: Position) -> bool:
+    dx, dy, dz = (a - b for a, b in zip(position, jam.centre_m, strict=True))
     return dx * dx + dy * dy + dz * dz <= jam.radius_m * jam.radius_m
 
 
 def _over(table: _Keys, change: LinkKeys) -> _Keys:
-    """Return a table with the link keys that a change gives."""
-    return msgspec.structs.replace(table, **_given(change))
-
-
-def _given(table: LinkKeys) -> dict[str, Any]:
-    values = ((key, getattr(table, key)) for key in LinkKeys.__struct_fields__)
-    return {key: value for key, value in values if value is not None}
-
-
-def _merged(*tables: LinkKeys | Conditions | DirectedLink) -> LinkModel:
-    own_rate = (
-        any(getattr(tables[2], key) is not None for key in RATE_KEYS) if tables[2:] else False
+    """Return a table with the link keys that a change sets."""
+    keys = {key: getattr(change, key) for key in LinkKeys.__struct_fields__}
+    return msgspec.structs.replace(
+        table, **{key: value for key, value in keys.items() if value is not None}
     )
-    given = dict(chain.from_iterable(_given(table).items() for table in tables))
-    return LinkModel(**given, own_rate=own_rate)
+
+
+def _merged(both: LinkKeys, channel: LinkKeys, link: LinkKeys = NO_KEYS) -> LinkModel:
+    """Return the model of a link from its tables: later tables override earlier ones."""
+    own_rate = any(getattr(link, key) is not None for key in RATE_KEYS)
+    table = _over(_over(both, channel), link)
+    keys = {key: getattr(table, key) for key in LinkKeys.__struct_fields__}
+    return LinkModel(**keys, own_rate=own_rate)

@@ -1,4 +1,4 @@
-"""The world's orders to the medium, kept until the slot before which they are to be carried out."""
+"""Fault orders from the world, queued until the slot before which they apply."""
 
 from collections import deque
 
@@ -10,13 +10,13 @@ from netem.wire.frame import WireError
 
 
 class FaultQueue:
-    """FaultOrders that have come, in the order in which they came."""
+    """Fault orders in the order of their arrival."""
 
     def __init__(self) -> None:
         self._waiting: deque[FaultOrders] = deque()
 
-    def take(self, data: bytes) -> None:
-        """Note what the world sent, or raise WireError."""
+    def put(self, data: bytes) -> None:
+        """Queue an encoded FaultOrders. Raises WireError where it is oversize or malformed."""
         if len(data) > MAX_ORDERS_B:
             raise WireError(f"oversize: {len(data)} B where {MAX_ORDERS_B} B are allowed")
         try:
@@ -25,8 +25,8 @@ class FaultQueue:
             raise WireError(f"malformed FaultOrders: {error}") from error
 
     def due(self, slot: int) -> list[FaultOrder]:
-        """Return, and forget, what is to be done before a slot is played."""
-        found: list[FaultOrder] = []
+        """Remove and return the orders that apply before a slot or before an earlier one."""
+        due: list[FaultOrder] = []
         while self._waiting and self._waiting[0].slot <= slot:
-            found.extend(self._waiting.popleft().orders)
-        return found
+            due.extend(self._waiting.popleft().orders)
+        return due

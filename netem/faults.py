@@ -1,8 +1,8 @@
-"""Radio faults: everything that can be done to the radio while it runs.
+"""Radio faults: every change to the radio that an event can make.
 
-These are the only types for them. A scenario's event decodes into them, the medium and the judge
-apply them (``netem.conditions``), and events.jsonl reports them. A new kind is a type here, a key
-of :class:`RadioEvent`, and its effect in ``NetworkConditions``.
+These are the only types of them. A scenario's event decodes into one, the medium and the judge
+apply it (``netem.conditions``), and events.jsonl reports it. A new kind is a type here, a key of
+:class:`RadioEvent`, and its effect in ``NetworkConditions``.
 """
 
 from typing import Annotated, Literal, assert_never
@@ -18,23 +18,24 @@ Position = tuple[Metres, Metres, Metres]
 """A point [m; world frame]."""
 
 FlapPeriod = Annotated[float, Meta(ge=0.05, le=86_400)]
-"""[s]; a faster flap would fall between two slots."""
+"""[s]; a shorter period could fall between two slots."""
 Group = Annotated[tuple[AgentId, ...], Meta(min_length=1, max_length=1000)]
 Groups = Annotated[tuple[Group, ...], Meta(min_length=1, max_length=1000)]
 PartitionKind = Literal["clean", "one_way", "bridge", "ring"]
 
 
 class Partition(Table, frozen=True):
-    """Groups of agents that do not hear each other; unnamed agents form one more group.
+    """Groups of agents between which links are cut; unnamed agents form one more group.
 
-    clean: a group hears only itself. one_way: a group hears all, and only itself hears it.
-    bridge: clean, but the agents of ``bridge`` (in no group) hear all and are heard by all. ring:
-    in a group each agent hears its two neighbours in the list; the ends are neighbours too.
+    clean: all links between groups are cut. one_way: only links out of a named group are cut.
+    bridge: clean, but links from and to the agents of ``bridge`` stay. ring: clean, and within a
+    named group only the links between neighbours in the list stay; its ends are neighbours.
     """
 
     groups: Groups
     kind: PartitionKind = "clean"
     bridge: Annotated[tuple[AgentId, ...], Meta(max_length=1000)] = ()
+    """Agents of no group, with kind "bridge" only."""
 
 
 class Jam(Table, frozen=True):
@@ -46,7 +47,7 @@ class Jam(Table, frozen=True):
 
 
 class Flap(Table, frozen=True):
-    """Links that go down and up: down for the first half of each period, from the fault's start."""
+    """Links that are down for the first half of each period, counted from the fault's start."""
 
     period_s: FlapPeriod
     links: Annotated[tuple[tuple[AgentId, AgentId], ...], Meta(max_length=10_000)] = ()
@@ -58,25 +59,24 @@ class Heal(msgspec.Struct, frozen=True):
 
 
 LastingFault = Conditions | Partition | Jam | Flap
-"""A fault that is in force until it ends. Conditions are the link keys that change."""
+"""A fault that stays in force until it ends. Conditions are the link keys that change."""
 RadioFault = LastingFault | Heal
-"""What one event does to the radio."""
+"""The effect of one event on the radio."""
 
 
 class RadioEvent(
     msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True
 ):
-    """One radio fault under its key, as a scenario and an order name it; one key is set.
-
-    partition: groups alone are a clean partition. heal ends every partition. netem: the keys of
-    [netem] that change.
-    """
+    """One radio fault under its key, as in a scenario's event; exactly one key is set."""
 
     partition: Groups | Partition | None = None
+    """Groups alone are a clean partition."""
     heal: bool | None = None
+    """Ends every partition."""
     jam: Jam | None = None
     flap: Flap | None = None
     netem: Conditions | None = None
+    """The keys of [netem] that change."""
 
     @staticmethod
     def of(fault: RadioFault) -> "RadioEvent":
@@ -96,7 +96,7 @@ class RadioEvent(
 
     @property
     def radio_fault(self) -> RadioFault | None:
-        """The fault that is given; None where no key of the radio is set."""
+        """The fault whose key is set; None where there is none."""
         if self.partition is not None and not isinstance(self.partition, Partition):
             return Partition(groups=self.partition)
         if self.heal:
@@ -105,16 +105,16 @@ class RadioEvent(
 
 
 class FaultOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Begin a radio fault, or end the one of that number."""
+    """Begins a radio fault, or ends the fault of a number."""
 
     number: Count
     """Identifies the fault among those in force."""
     at_s: Annotated[float, Meta(ge=0, le=1e9)]
-    """When it begins or ends [s; simulated time]."""
+    """When the fault begins or ends [s; simulated time]."""
     event: RadioEvent | None = None
     """The fault that begins; None: the fault of that number ends."""
 
     @property
     def fault(self) -> RadioFault | None:
-        """The fault that begins; None for an end."""
+        """The fault that begins; None where one ends."""
         return self.event.radio_fault if self.event is not None else None

@@ -1,11 +1,11 @@
-"""The medium in lockstep: each slot once, whole, and not before everybody who steps has spoken."""
+"""The medium in lockstep: it plays a slot when the transmissions of all its participants are in."""
 
 from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
 from netem.medium import Medium
-from netem.messages import Done, MediumSetup, Turn, unpack_turn
+from netem.messages import MediumSetup, SlotInput, SlotResult, unpack_slot_input
 from netem.wire.barrier import LOCKSTEP_RING, LockstepError, await_message, check_slot
 from netem.wire.bus import Bus
 from netem.wire.frame import (
@@ -19,18 +19,20 @@ from netem.wire.frame import (
 )
 
 
-class Waiting(NamedTuple):
-    """What waits for one agent that has not stepped since: the newest batches, encoded."""
+class PendingBatches(NamedTuple):
+    """The newest batches for one agent since its last step."""
 
     incarnation: int
+    """The incarnation of the agent that the batches are for."""
     batches: deque[bytes]
+    """Encoded, oldest first."""
 
 
 class LockstepMedium:
-    """Plays the slots of one run as the world opens them, for some of the receivers or for all.
+    """Plays the slots of one run in lockstep, as one shard of the medium.
 
-    Batches go out when their slot is opened, for by then it is known who steps in it: to somebody
-    who is paused nothing is sent, so that nothing is left lying in his way.
+    Batches leave when their slot is opened, since only then its participants are known. A paused
+    agent is sent nothing, so that no stale batch waits for it when it resumes.
     """
 
     def __init__(
@@ -42,78 +44,84 @@ class LockstepMedium:
         self._slot = 0
         self._medium = Medium(setup, setup.receivers)
         self._own = frozenset(agents if setup.receivers is None else setup.receivers)
-        self._waiting = {agent: Waiting(0, deque(maxlen=BATCH_RING)) for agent in agents}
+        self._pending = {agent: PendingBatches(0, deque(maxlen=BATCH_RING)) for agent in agents}
         self._senders = [bus.subscriber("tx", agent, LOCKSTEP_RING) for agent in agents]
         self._receivers = [bus.publisher("rx", agent, lockstep=True) for agent in agents]
-        self._done = bus.publisher("done", shard, lockstep=True)
+        self._report = bus.publisher("done", shard, lockstep=True)
 
-    def hear(self, truths: list[bytes]) -> None:
+    def play(self, inputs: list[bytes]) -> None:
         """Play the slots that the world opened.
 
-        Raises LockstepError when somebody does not answer, or out of turn; RunOverError when the
-        run ends meanwhile.
+        Raises LockstepError when an agent's transmission is missing or of another slot,
+        RunOverError when the run ends meanwhile.
         """
-        for opened in truths:
-            self._play(opened)
+        for data in inputs:
+            self._play(self._slot_input(data))
 
     def report(self) -> None:
-        """Say nothing at the end: each slot's counters have been told."""
+        """Do nothing at the end of the run: every slot's result held the counters."""
 
-    def _play(self, opened: bytes) -> None:
-        turn = self._turn(opened)
-        for order in turn.orders:
-            self._medium.obey(order)
-        self._medium.place(turn.truth.positions)
-        self._hand_out(turn)
-        for sender in turn.participants:
-            self._transmit(sender, turn)
-        self._collect(turn)
+    def _play(self, slot_input: SlotInput) -> None:
+        for order in slot_input.orders:
+            self._medium.apply(order)
+        self._medium.place(slot_input.truth.positions)
+        self._send_batches(slot_input)
+        for sender in slot_input.participants:
+            self._transmit(sender, slot_input)
+        self._queue_batches(slot_input)
         pages = tuple(self._medium.pages().items())
         self._slot += 1
-        self._done(pack(Done(turn.truth.slot, pages, self._medium.counters(self._slot))))
+        counters = self._medium.counters(self._slot)
+        self._report(pack(SlotResult(slot=slot_input.truth.slot, pages=pages, counters=counters)))
 
-    def _turn(self, opened: bytes) -> Turn:
+    def _slot_input(self, data: bytes) -> SlotInput:
         try:
-            turn = unpack_turn(opened)
+            slot_input = unpack_slot_input(data)
         except WireError as error:
             raise LockstepError(f"the world's truth: {error}") from error
-        check_slot("the world's truth", turn.truth.slot, self._slot)
-        rows = {len(turn.truth.positions), len(turn.incarnations), self._setup.agents}
-        if len(rows) > 1 or any(who >= self._setup.agents for who in turn.participants):
+        check_slot("the world's truth", slot_input.truth.slot, self._slot)
+        rows = {len(slot_input.truth.positions), len(slot_input.incarnations), self._setup.agents}
+        if len(rows) > 1 or max(slot_input.participants, default=0) >= self._setup.agents:
             raise LockstepError(f"the world's truth is not of {self._setup.agents} agents")
-        return turn
+        return slot_input
 
-    def _hand_out(self, turn: Turn) -> None:
-        """Send what waits to those who step; who is gone, or is another by now, gets nothing."""
+    def _send_batches(self, slot_input: SlotInput) -> None:
+        """Send their pending batches to the participants.
+
+        Batches for an agent that is gone, or for an earlier incarnation of it, are dropped.
+        """
+        truth = slot_input.truth
         for agent in self._own:
-            incarnation, here = turn.incarnations[agent], turn.truth.positions[agent]
-            if here is None or incarnation != self._waiting[agent].incarnation:
-                self._waiting[agent] = Waiting(incarnation, deque(maxlen=BATCH_RING))
-        for agent in turn.participants:
+            incarnation = slot_input.incarnations[agent]
+            gone = truth.positions[agent] is None
+            if gone or incarnation != self._pending[agent].incarnation:
+                self._pending[agent] = PendingBatches(incarnation, deque(maxlen=BATCH_RING))
+        for agent in slot_input.participants:
             if agent in self._own:
-                batches = self._waiting[agent].batches
-                self._receivers[agent](pack(Inbox(turn.truth.slot, tuple(batches))))
+                batches = self._pending[agent].batches
+                self._receivers[agent](pack(Inbox(truth.slot, tuple(batches))))
                 batches.clear()
 
-    def _transmit(self, sender: int, turn: Turn) -> None:
-        slot = turn.truth.slot
+    def _transmit(self, sender: int, slot_input: SlotInput) -> None:
+        """Wait for a participant's transmission, and send its frames."""
+        slot = slot_input.truth.slot
         what = f"agent-{sender}'s transmission of slot {slot}"
-        transmission = _read(what, await_message(self._senders[sender], what, self._unwanted))
+        transmission = _unpacked(what, await_message(self._senders[sender], what, self._unwanted))
         check_slot(what, transmission.slot, slot)
-        if transmission.incarnation != turn.incarnations[sender]:
+        if transmission.incarnation != slot_input.incarnations[sender]:
             raise LockstepError(f"{what} is of its incarnation {transmission.incarnation}")
-        self._medium.transmit(sender, turn.truth.time_s, transmission)
+        self._medium.transmit(sender, slot_input.truth.time_s, transmission)
 
-    def _collect(self, turn: Turn) -> None:
-        """Put by what is due in the next slot for those who may step in it."""
-        slot, step = turn.truth.slot + 1, self._setup.slots_per_tick
+    def _queue_batches(self, slot_input: SlotInput) -> None:
+        """Queue the frames due in the next slot for the agents of its group."""
+        slot, step = slot_input.truth.slot + 1, self._setup.slots_per_tick
         for agent in range(slot % step, self._setup.agents, step):
-            if agent in self._own and turn.truth.positions[agent] is not None:
+            if agent in self._own and slot_input.truth.positions[agent] is not None:
                 frames = self._medium.collect(agent, slot / self._setup.slot_hz)
-                self._waiting[agent].batches.append(pack(Batch(slot, frames)))
+                self._pending[agent].batches.append(pack(Batch(slot, frames)))
 
 
-def _read(what: str, data: bytes) -> Transmission:
+def _unpacked(what: str, data: bytes) -> Transmission:
     try:
         return unpack_transmission(data)
     except WireError as error:

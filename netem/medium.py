@@ -1,9 +1,9 @@
-"""The radio medium: every frame in flight, and what became of every frame.
+"""The radio medium: the frames in flight, and the fate of every frame.
 
-A pure state machine. Time enters with the true positions (``place``); each transmission is judged
-once, link by link, when it is sent; ``collect`` hands a receiver what came due. The order of
-deliveries is canonical, (due, source, incarnation, channel, count, copy), so it does not depend on
-the order in which transmissions arrived.
+A pure state machine; time is an argument. ``transmit`` decides the fate of a frame on each link
+when it is sent, and ``collect`` returns the frames that are due at a receiver. Deliveries are in
+canonical order, (due, source, incarnation, channel, count, copy), so the result does not depend on
+the order in which transmissions arrive.
 """
 
 from bisect import bisect_right
@@ -25,7 +25,7 @@ from netem.link import (
     Sending,
     Verdict,
 )
-from netem.messages import MediumCounters, MediumSetup, packets_of
+from netem.messages import MediumCounters, MediumSetup
 from netem.range_index import InRange, RangeIndex
 from netem.rate_queue import RateQueue
 from netem.wire.channels import CHANNELS, MAX_PAYLOAD_B
@@ -41,20 +41,21 @@ from netem.wire.frame import (
 DELIVERED = Cause.DELIVERED
 FATES = tuple(cause.name.lower() for cause in Cause)
 SURELY_FIT = (MAX_BATCH_B - BATCH_HEAD_B) // (FRAME_HEAD_B + MAX_PAYLOAD_B)
-"""So many frames fit one batch however long they are."""
+"""This many frames fit one batch, whatever their payloads."""
 _InFlight = tuple[float, int, int, int, int, int, Frame]
+"""A frame in a receiver's queue: due time [s], source, incarnation, channel, count, copy, frame."""
 
 
 class Medium:
-    """Frames between agents under a seed and conditions.
+    """The radio between all agents.
 
-    receivers: those whom this medium delivers to, all when left out; several mediums that share
-    them out, and all hear of every transmission, decide together what one would.
+    receivers: the agents that this medium delivers to; None: all. Shards that divide the receivers
+    and get every transmission decide together what one medium decides.
 
-    Conservation, at every moment: ``addressed`` (frames sent, times the other agents, whether they
-    are there or not, and each duplicate once more) equals the sum of all fates plus what is in
-    flight. A frame for a radio that is not there is out of range; what is in flight to one that
-    goes is dropped by the medium.
+    Conservation law: ``addressed`` (frames sent, times the other agents, present or not, plus one
+    for each duplicate) always equals the sum of all fates plus the frames in flight. A frame to an
+    absent radio counts as out of range; frames in flight to a radio that disappears are dropped by
+    the medium.
     """
 
     def __init__(self, setup: MediumSetup, receivers: Iterable[int] | None = None) -> None:
@@ -69,31 +70,31 @@ class Medium:
         self._rate_queues: dict[tuple[int, int], RateQueue] = {}
         self._fates = [0] * len(Cause)
         self._delivery_log = DeliveryLog(setup.agents)
-        self._spoken_b = [0] * (len(CHANNELS) * setup.agents)
+        self._sent_b = [0] * (len(CHANNELS) * setup.agents)
         self.sent = self.addressed = self.in_flight = self.duplicated = self.corrupted = 0
 
     def place(self, positions: tuple[Position | None, ...]) -> None:
-        """Take the true positions, row i = agent i [m; world frame]; None where no radio is."""
+        """Set the positions, row i = agent i [m; world frame]; None where there is no radio."""
         self._range_index.place(positions)
         if None in positions:
-            for receiver, where in enumerate(positions):
-                if where is None and self._queues[receiver]:
+            for receiver, position in enumerate(positions):
+                if position is None and self._queues[receiver]:
                     self.discard(receiver)
 
-    def obey(self, order: FaultOrder) -> None:
-        """Begin or end a fault, between slots: it meets later frames, not those in flight."""
+    def apply(self, order: FaultOrder) -> None:
+        """Begin or end a fault, between slots; frames that are in flight are not affected."""
         self._conditions.apply(order)
 
     def transmit(self, source: int, sent_s: float, transmission: Transmission) -> None:
-        """Judge one agent's frames of one slot, sent at ``sent_s`` [s], on every link."""
+        """Send one agent's frames of one slot at ``sent_s`` [s]: decide their fate on each link."""
         for outgoing in transmission.frames:
             count_key = (source, transmission.incarnation, outgoing.channel)
             count = self._counts.get(count_key, 0)
             self._counts[count_key] = count + 1
             self.sent += 1
-            self._spoken_b[len(CHANNELS) * source + outgoing.channel] += len(outgoing.payload)
+            self._sent_b[len(CHANNELS) * source + outgoing.channel] += len(outgoing.payload)
             self.addressed += self._others[source]
-            self._spread(
+            self._send(
                 Frame(source, transmission.incarnation, outgoing.channel, count, outgoing.payload),
                 sent_s,
             )
@@ -101,16 +102,16 @@ class Medium:
     def collect(
         self, receiver: int, now_s: float, due_s: list[float] | None = None
     ) -> tuple[Frame, ...]:
-        """Return, and forget, the frames that came due for one receiver by ``now_s`` [s].
+        """Remove and return the frames that are due at a receiver by ``now_s`` [s].
 
-        No more than fit one batch: what is over stays in flight, and comes first the next time.
-        due_s: a list to which is added when each of them was due [s].
+        At most one batch; further frames stay in flight and come first the next time. due_s: a list
+        to which the due time [s] of each returned frame is appended.
         """
         queue = self._queues[receiver]
         queue.sort()
         count = bisect_right(queue, (now_s, inf))
         if count > SURELY_FIT:
-            count = _fitting(queue[:count])
+            count = _count_fitting(queue[:count])
         taken = queue[:count]
         del queue[:count]
         if due_s is not None:
@@ -120,69 +121,74 @@ class Medium:
         return tuple([entry[-1] for entry in taken])
 
     def discard(self, receiver: int) -> None:
-        """Drop what is in flight to a receiver that is no longer there."""
+        """Drop the frames in flight to a receiver that has disappeared."""
         lost = len(self._queues[receiver])
         self._queues[receiver].clear()
         self.in_flight -= lost
         self._fates[Cause.DROPPED_MEDIUM] += lost
 
     def digest(self) -> bytes:
-        """Return a hash over every verdict so far; asked at the end of each slot, it is one."""
+        """End the slot in the delivery log; return the hash over all verdicts of the run.
+
+        The hash depends on where slots end: call this once at the end of each slot.
+        """
         return self._delivery_log.digest()
 
     def pages(self) -> Mapping[int, bytes]:
-        """Return, at the end of a slot, what a shard noted in it; see ``joined_pages``."""
+        """End the slot in the delivery log; return its pages, see ``delivery_log.joined_pages``."""
         return self._delivery_log.take_pages()
 
     def packets(self) -> dict[str, int]:
-        """Return the counters of packets under their names in summary.json."""
-        fates = dict(zip(FATES, self._fates, strict=True))
-        return packets_of(
-            self.sent, self.addressed, fates, self.duplicated, self.corrupted, self.in_flight
-        )
+        """Return the packet counters under their keys of summary.json."""
+        return self._counters(0).packets()
 
     def counters(self, slot: int) -> MediumCounters:
-        """Return the counters as they stand."""
+        """Return the counters before a slot. Ends the slot in the delivery log, as digest does."""
+        return msgspec.structs.replace(self._counters(slot), digest=self.digest())
+
+    def _counters(self, slot: int) -> MediumCounters:
         return MediumCounters(
-            slot,
-            self.sent,
-            self.addressed,
-            dict(zip(FATES, self._fates, strict=True)),
-            self.in_flight,
-            {},
-            self.digest(),
+            slot=slot,
+            sent=self.sent,
+            addressed=self.addressed,
+            fates=dict(zip(FATES, self._fates, strict=True)),
+            in_flight=self.in_flight,
+            rejected={},
             duplicated=self.duplicated,
             corrupted=self.corrupted,
-            spoken_b=tuple(self._spoken_b),
+            sent_b=tuple(self._sent_b),
         )
 
-    def _spread(self, frame: Frame, sent_s: float) -> None:
-        """Judge one frame on its link to every other agent, in order of their ids."""
+    def _send(self, frame: Frame, sent_s: float) -> None:
+        """Decide the fate of one frame on its link to every other agent, in ascending order."""
         source, channel, models = frame.source, frame.channel, self._conditions.models
         key = (source, frame.incarnation, channel, frame.count)
         sending = Sending(frame, key, sent_s, 0.0)
-        sender = models.of_channel(channel)
-        if sender.rate_kbit < inf:
-            waited_s = self._queued(sending, sender)
+        model = models.of_channel(channel)
+        if model.rate_kbit < inf:
+            waited_s = self._enter_rate_queue(sending, model)
             if waited_s is None:
                 return
             sending = Sending(frame, key, sent_s, waited_s)
         near = self._range_index.in_range(source, models.reach_m(channel, source))
         self._fates[Cause.DROPPED_RANGE] += self._others[source] - len(near)
-        alike = models.common(channel, source)
-        if alike is None or not alike.plain or self._conditions.obstructed:
-            self._cross(sending, near)
-        elif alike.draws:
-            self._cross_plain(sending, near, alike)
+        common = models.common(channel, source)
+        if common is None or not common.plain or self._conditions.obstructed:
+            self._decide_each(sending, near)
+        elif common.draws:
+            self._decide_plain(sending, near, common)
         else:
-            self._cross_clean(sending, near, sending.waited_s + alike.clean.delay_s)
+            self._deliver_all(sending, near, sending.waited_s + common.clean.delay_s)
 
-    def _queued(self, sending: Sending, sender: LinkModel) -> float | None:
-        """Return how long the sender's channel takes [s]; None, and noted, where it is full."""
+    def _enter_rate_queue(self, sending: Sending, model: LinkModel) -> float | None:
+        """Return the delay in the queue of the sender's channel [s].
+
+        Where the queue is full, drop the frame and return None.
+        """
         source, _, channel, _ = sending.key
-        air = self._rate_queues.setdefault((source, channel), RateQueue())
-        size_b = len(sending.frame.payload) + sender.rate_overhead_b
-        waited_s = air.enter(sending.sent_s, size_b, sender.rate_kbit, sender.limit)
+        queue = self._rate_queues.setdefault((source, channel), RateQueue())
+        size_b = len(sending.frame.payload) + model.rate_overhead_b
+        waited_s = queue.enter(sending.sent_s, size_b, model.rate_kbit, model.limit)
         if waited_s is None:
             self._fates[Cause.DROPPED_QUEUE] += self._others[source]
             if source in self._own:
@@ -191,60 +197,61 @@ class Medium:
                 )
         return waited_s
 
-    def _cross_clean(self, sending: Sending, near: InRange, delay_s: float) -> None:
-        """Deliver a frame to all who are near, after the same delay [s]."""
+    def _deliver_all(self, sending: Sending, near: InRange, delay_s: float) -> None:
+        """Deliver a frame to all receivers in range, after the same delay [s]."""
         frame, key, sent_s = sending.frame, sending.key, sending.sent_s
-        noted = HEAD(*key) + FATE(0, DELIVERED, delay_s, -1.0)
+        log_entry = HEAD(*key) + FATE(0, DELIVERED, delay_s, -1.0)
         entry = (sent_s + delay_s, *key, 0, frame)
         queues, pages = self._queues, self._delivery_log.pages
         for receiver, _ in near:
             queues[receiver].append(entry)
-            pages[receiver] += noted
+            pages[receiver] += log_entry
         self.in_flight += len(near)
 
-    def _cross_plain(self, sending: Sending, near: InRange, link: LinkModel) -> None:
-        """Judge a frame on links that are all alike, and no more than late and lossy."""
+    def _decide_plain(self, sending: Sending, near: InRange, link: LinkModel) -> None:
+        """Decide the fate of a frame on links of one model that has only loss and jitter."""
         frame, key, sent_s = sending.frame, sending.key, sending.sent_s
         head, queues, pages = HEAD(*key), self._queues, self._delivery_log.pages
-        lost = self._fates
-        across = 0
+        fates, delivered = self._fates, 0
         for (receiver, _), fate in zip(near, self._links.plain(link, sending, near), strict=True):
             pages[receiver] += head + FATE(0, fate.cause, fate.delay_s, fate.flipped_at)
             if fate.cause:
-                lost[fate.cause] += 1
+                fates[fate.cause] += 1
             else:
                 queues[receiver].append((sent_s + fate.delay_s, *key, 0, frame))
-                across += 1
-        self.in_flight += across
+                delivered += 1
+        self.in_flight += delivered
 
-    def _cross(self, sending: Sending, near: InRange) -> None:
-        """Judge a frame on each link to those in reach."""
+    def _decide_each(self, sending: Sending, near: InRange) -> None:
+        """Decide the fate of a frame on each link by itself: models may differ, faults may cut."""
         source, _, channel, _ = sending.key
         head, links, models = HEAD(*sending.key), self._links, self._conditions.models
         obstructed = self._conditions.obstructed
         for receiver, distance_m in near:
             link = models.of_link(channel, source, receiver)
             if obstructed and self._is_cut(source, receiver, sending.sent_s):
-                self._note(sending, head, receiver, LOST_TO_PARTITION)
+                self._record(sending, head, receiver, LOST_TO_PARTITION)
             elif link.plain:
                 fates = links.plain(link, sending, [(receiver, distance_m)])
-                self._note(sending, head, receiver, fates[0])
+                self._record(sending, head, receiver, fates[0])
             else:
-                self._note_all(
+                self._record_all(
                     sending, head, receiver, links.full(link, sending, receiver, distance_m)
                 )
 
-    def _note_all(self, sending: Sending, head: bytes, receiver: int, fates: list[Verdict]) -> None:
-        """Enter the verdicts on a frame and on its copy, which counts as one more sent."""
+    def _record_all(
+        self, sending: Sending, head: bytes, receiver: int, fates: list[Verdict]
+    ) -> None:
+        """Record the verdicts on a frame and on its duplicate; a duplicate adds to addressed."""
         for copy, fate in enumerate(fates):
-            self._note(sending, head, receiver, fate, copy)
+            self._record(sending, head, receiver, fate, copy)
         self.addressed += len(fates) - 1
         self.duplicated += len(fates) - 1
 
-    def _note(
+    def _record(
         self, sending: Sending, head: bytes, receiver: int, fate: Verdict, copy: int = 0
     ) -> None:
-        """Enter a verdict in the books, and a frame that gets across in its receiver's queue."""
+        """Log and count a verdict; put a delivered frame into its receiver's queue."""
         delay_s, turned = fate.delay_s, fate.flipped_at
         self._delivery_log.pages[receiver] += head + FATE(copy, fate.cause, delay_s, turned)
         if fate.cause:
@@ -252,21 +259,21 @@ class Medium:
             return
         frame = sending.frame
         if turned >= 0.0 and frame.payload:
-            frame = _turned(frame, turned)
+            frame = _with_flipped_bit(frame, turned)
             self.corrupted += 1
         self._queues[receiver].append((sending.sent_s + delay_s, *sending.key, copy, frame))
         self.in_flight += 1
 
     def _is_cut(self, source: int, receiver: int, now_s: float) -> bool:
-        """Return whether a fault keeps two radios apart at a time [s]."""
+        """Return whether a partition, a flap or a jam cuts a directed link at a time [s]."""
         ends = (self._range_index.positions[source], self._range_index.positions[receiver])
         return self._conditions.cuts(source, receiver, now_s) or any(
-            where is not None and self._conditions.jammed(where) for where in ends
+            position is not None and self._conditions.jammed(position) for position in ends
         )
 
 
-def _fitting(due: Sequence[_InFlight]) -> int:
-    """Return how many of the frames that are due fit one batch, the first ones first."""
+def _count_fitting(due: Sequence[_InFlight]) -> int:
+    """Return how many of the frames that are due, from the first on, fit one batch."""
     room_b = MAX_BATCH_B - BATCH_HEAD_B
     for count, entry in enumerate(due[:MAX_FRAMES]):
         room_b -= FRAME_HEAD_B + len(entry[-1].payload)
@@ -275,8 +282,8 @@ def _fitting(due: Sequence[_InFlight]) -> int:
     return min(len(due), MAX_FRAMES)
 
 
-def _turned(frame: Frame, share: float) -> Frame:
-    """Return a frame with the bit turned that stands at a share of its payload, in [0, 1)."""
+def _with_flipped_bit(frame: Frame, share: float) -> Frame:
+    """Return a frame with one bit flipped, at a share of its payload's length in [0, 1)."""
     payload = bytearray(frame.payload)
     bit = int(share * 8 * len(payload))
     payload[bit // 8] ^= 1 << bit % 8

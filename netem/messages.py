@@ -1,6 +1,10 @@
-"""What the world tells the medium: the conditions, each slot the true positions, and orders."""
+"""Messages between the world and the medium: setup, true positions, faults, counters.
 
-from collections.abc import Mapping, Sequence
+Structs marked ``array_like`` are encoded as msgpack arrays, so the order of their fields is the
+wire format.
+"""
+
+from collections.abc import Sequence
 from typing import Annotated
 
 import msgspec
@@ -13,143 +17,141 @@ from netem.wire.frame import AgentId, Count, unpack_typed
 MAX_TRUTH_B = 256 * 1024
 MAX_CONDITIONS_B = 1024 * 1024
 MAX_ORDERS_B = 1024 * 1024
-MAX_TURN_B = MAX_TRUTH_B + MAX_ORDERS_B
-MAX_DONE_B = 4 * 1024 * 1024
+MAX_SLOT_INPUT_B = MAX_TRUTH_B + MAX_ORDERS_B
+MAX_SLOT_RESULT_B = 4 * 1024 * 1024
 
 
 class FaultOrders(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """FaultOrders to carry out, one after the other, before a slot."""
+    """Fault orders that the medium applies, in this order, before a slot."""
 
     slot: Count
     orders: tuple[FaultOrder, ...]
 
 
 class MediumSetup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """All that a medium needs to begin; ``speed``: simulated seconds in one of the wall clock.
-
-    receivers: those whom this one of several mediums delivers to; None: all.
-    """
+    """Everything that a medium needs before its first slot."""
 
     seed: Count
     agents: Annotated[int, Meta(ge=1, lt=2**16)]
+    """Number of agents, those that join later included; their ids are 0 to agents - 1."""
     slots_per_tick: Annotated[int, Meta(ge=1, le=64)]
     slot_hz: Annotated[float, Meta(gt=0, le=1e5)]
+    """Slots per simulated second."""
     conditions: Conditions
+    """Link conditions at the start of the run."""
     speed: Annotated[float, Meta(gt=0, le=1e4)] = 1.0
+    """Simulated seconds per second of wall time."""
     lockstep: bool = False
     receivers: tuple[AgentId, ...] | None = None
+    """The agents that this shard of the medium delivers to; None: all."""
 
 
-class Truth(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
-    """Where the vehicles truly are at the start of a slot.
-
-    positions: row i = agent i [m; world frame], None where no radio is: the agent has no vehicle in
-    the world, or its process is gone. incarnations: likewise, which of its processes an agent is;
-    free-running (a turn of lockstep has them besides).
-    """
+class Truth(
+    msgspec.Struct, frozen=True, kw_only=True, array_like=True, gc=False, forbid_unknown_fields=True
+):
+    """True positions at the start of a slot."""
 
     slot: Count
     time_s: Annotated[float, Meta(ge=0, le=1e9)]
+    """[s; simulated time]"""
     positions: tuple[Position | None, ...]
+    """Row i = agent i [m; world frame]; None where the agent has no vehicle or no process."""
     incarnations: tuple[Count, ...] = ()
+    """Row i = agent i's current incarnation; empty in lockstep, where SlotInput holds them."""
 
 
 class MediumCounters(
-    msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True
+    msgspec.Struct, frozen=True, kw_only=True, array_like=True, gc=False, forbid_unknown_fields=True
 ):
-    """What the medium reports: how many frames met which fate so far, and a digest of all fates.
+    """The medium's counters since the start of the run.
 
-    addressed: frames sent, times the other agents, and each duplicate once more; it equals the sum
-    of fates and in_flight. duplicated, corrupted: how many were copies, or had a bit turned.
-    late_s: how much later than their due time batches left, free-running [s]: median and worst.
-    spoken_b: payload bytes that each agent sent, channel by channel, agent after agent.
+    ``addressed`` equals the sum of ``fates`` plus ``in_flight``.
     """
 
     slot: Count
+    """The next slot to play."""
     sent: Count
+    """Frames."""
     addressed: Count
+    """Frames, times the other agents, and each duplicate once more."""
     fates: dict[str, Count]
+    """Copies of frames by what became of them."""
     in_flight: Count
     rejected: dict[str, Count]
+    """Messages from agents and the world that were refused, by cause."""
     digest: bytes = b""
+    """Hash over all verdicts of the run."""
     late_s: tuple[float, float] | None = None
+    """Delay of batches after their due time, free-running: median, worst [s; simulated time]."""
     duplicated: Count = 0
     corrupted: Count = 0
-    spoken_b: tuple[Count, ...] = ()
+    """Delivered frames with a flipped bit."""
+    sent_b: tuple[Count, ...] = ()
+    """Payload bytes that each agent sent on each channel, channels of one agent side by side."""
 
     def packets(self) -> dict[str, int]:
-        """Return the counters under their names in summary.json, fates between the others."""
-        return packets_of(
-            self.sent, self.addressed, self.fates, self.duplicated, self.corrupted, self.in_flight
-        )
+        """Return the packet counters under their keys of summary.json."""
+        return {
+            "sent": self.sent,
+            "addressed": self.addressed,
+            **self.fates,
+            "duplicated": self.duplicated,
+            "corrupted": self.corrupted,
+            "in_flight": self.in_flight,
+        }
 
 
-def packets_of(
-    sent: int,
-    addressed: int,
-    fates: Mapping[str, int],
-    duplicated: int,
-    corrupted: int,
-    in_flight: int,
-) -> dict[str, int]:
-    """Return counters under their names in summary.json, fates between the others."""
-    return {
-        "sent": sent,
-        "addressed": addressed,
-        **fates,
-        "duplicated": duplicated,
-        "corrupted": corrupted,
-        "in_flight": in_flight,
-    }
-
-
-class Turn(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
-    """All that the medium needs to play one slot in lockstep.
-
-    participants: who steps in it, ids ascending; incarnations: everybody's, row i = agent i.
-    orders: what is to be carried out before it.
-    """
+class SlotInput(
+    msgspec.Struct, frozen=True, kw_only=True, array_like=True, gc=False, forbid_unknown_fields=True
+):
+    """Everything that the medium needs to play one slot in lockstep."""
 
     truth: Truth
     participants: tuple[AgentId, ...]
+    """The agents that step in the slot, in ascending order."""
     incarnations: tuple[Count, ...]
+    """Row i = agent i's current incarnation."""
     orders: tuple[FaultOrder, ...] = ()
+    """Applied before the slot."""
 
 
-class Done(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
-    """A slot that one of several mediums has played: its pages by receiver, and its counters."""
+class SlotResult(
+    msgspec.Struct, frozen=True, kw_only=True, array_like=True, gc=False, forbid_unknown_fields=True
+):
+    """What one shard of the medium reports of a slot that it has played in lockstep."""
 
     slot: Count
     pages: tuple[tuple[AgentId, bytes], ...]
-    medium_counters: MediumCounters
+    """The slot's page of the delivery log of each receiver; empty pages are left out."""
+    counters: MediumCounters
 
 
-_turn = msgspec.msgpack.Decoder(Turn).decode
-_done = msgspec.msgpack.Decoder(Done).decode
+_slot_input = msgspec.msgpack.Decoder(SlotInput).decode
+_slot_result = msgspec.msgpack.Decoder(SlotResult).decode
 
 
-def unpack_turn(data: bytes) -> Turn:
-    """Decode what the world sends in lockstep, or raise WireError."""
-    return unpack_typed(data, _turn, MAX_TURN_B)
+def unpack_slot_input(data: bytes) -> SlotInput:
+    """Decode a slot's input in lockstep, or raise WireError."""
+    return unpack_typed(data, _slot_input, MAX_SLOT_INPUT_B)
 
 
-def unpack_done(data: bytes) -> Done:
-    """Decode what a medium answers in lockstep, or raise WireError."""
-    return unpack_typed(data, _done, MAX_DONE_B)
+def unpack_slot_result(data: bytes) -> SlotResult:
+    """Decode a slot's result in lockstep, or raise WireError."""
+    return unpack_typed(data, _slot_result, MAX_SLOT_RESULT_B)
 
 
-def together(parts: Sequence[MediumCounters]) -> MediumCounters:
-    """Return what one medium would have counted where several share the receivers out."""
-    first = parts[0]
-    if len(parts) == 1:
+def merged(shards: Sequence[MediumCounters]) -> MediumCounters:
+    """Return the counters of one medium for those of the shards that divide its receivers."""
+    first = shards[0]
+    if len(shards) == 1:
         return first
-    causes = {cause for part in parts for cause in part.rejected}
+    causes = {cause for shard in shards for cause in shard.rejected}
     return msgspec.structs.replace(
         first,
-        addressed=sum(part.addressed for part in parts),
-        fates={fate: sum(part.fates[fate] for part in parts) for fate in first.fates},
-        in_flight=sum(part.in_flight for part in parts),
-        rejected={c: sum(part.rejected.get(c, 0) for part in parts) for c in sorted(causes)},
-        duplicated=sum(part.duplicated for part in parts),
-        corrupted=sum(part.corrupted for part in parts),
+        addressed=sum(shard.addressed for shard in shards),
+        fates={fate: sum(shard.fates[fate] for shard in shards) for fate in first.fates},
+        in_flight=sum(shard.in_flight for shard in shards),
+        rejected={c: sum(shard.rejected.get(c, 0) for shard in shards) for c in sorted(causes)},
+        duplicated=sum(shard.duplicated for shard in shards),
+        corrupted=sum(shard.corrupted for shard in shards),
     )

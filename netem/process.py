@@ -1,7 +1,7 @@
 """The medium as a process: this host's Zenoh router, and the radio between the agents of one run.
 
-The world conducts. Several of them may share the agents out by receiver; then one is the router,
-and the others are its clients.
+The world decides when a slot is played. Several processes may divide the receivers as shards of the
+medium; shard 0 is the router, and the others are its clients.
 """
 
 import sys
@@ -22,17 +22,19 @@ from netem.wire.shutdown import RunEnd, StopRequest
 
 WAIT_S = 0.2
 SILENCE_S = 30.0
+"""The world counts as gone after so long without a message [s]."""
 TRUTH_RING = 16
+MAX_QUERIES = 16
 
 
 class SilenceError(RuntimeError):
-    """The world has said nothing for so long that it must be gone."""
+    """No message from the world has arrived for SILENCE_S."""
 
 
 class SetupServer:
-    """Gives the medium to the run that asks first, and refuses every other.
+    """Accepts the setup of the first run that asks, and refuses every other run.
 
-    shard: which of several mediums it is; 0 is the router's own.
+    shard: this process's number among the shards of the medium; 0 is the router.
     """
 
     def __init__(self, session: zenoh.Session, shard: int = 0) -> None:
@@ -40,34 +42,37 @@ class SetupServer:
         self.run: str | None = None
         self.setup: MediumSetup | None = None
         key = Keys.any_run("shard", shard) if shard else Keys.any_run("medium")
-        self._questions: Handler[zenoh.Query] = session.declare_queryable(key, RingChannel(16))
+        self._queries: Handler[zenoh.Query] = session.declare_queryable(
+            key, RingChannel(MAX_QUERIES)
+        )
 
     def wait(self, timeout_s: float) -> None:
-        """Answer the next question that comes within ``timeout_s`` [s]."""
-        query = receive(self._questions, timeout_s)
+        """Answer the next query that arrives within ``timeout_s`` [s]."""
+        query = receive(self._queries, timeout_s)
         if query is not None:
             self._answer(query)
 
-    def attend(self) -> None:
-        """Answer the questions that are there."""
-        for query in drain(self._questions, 16):
+    def answer_waiting(self) -> None:
+        """Answer the queries that have arrived."""
+        for query in drain(self._queries, MAX_QUERIES):
             self._answer(query)
 
     def _answer(self, query: zenoh.Query) -> None:
         with query:
-            reason = self._refusal(query)
-            if reason is None:
+            refusal = self._accept(query)
+            if refusal is None:
                 query.reply(query.key_expr, b"")
             else:
-                query.reply_err(reason)
+                query.reply_err(refusal)
 
-    def _refusal(self, query: zenoh.Query) -> str | None:
+    def _accept(self, query: zenoh.Query) -> str | None:
+        """Take a run's setup; return why it is refused, or None where it is accepted."""
         run = Keys.run_of(str(query.key_expr))
         if self.run not in (None, run):
             return f"this medium serves run {self.run!r} already; a second run needs its own netem"
         payload = query.payload.to_bytes() if query.payload is not None else b""
         if len(payload) > MAX_CONDITIONS_B:
-            return f"{len(payload)} B of conditions where {MAX_CONDITIONS_B} B are allowed"
+            return f"conditions: {len(payload)} B; at most {MAX_CONDITIONS_B} B are allowed"
         try:
             setup = msgspec.json.decode(payload, type=MediumSetup)
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
@@ -80,28 +85,34 @@ class SetupServer:
 def run(
     endpoint: str, shard: int = 0, patient: bool = False, guard: AccessControl | None = None
 ) -> int:
-    """Serve at an endpoint, and say in one line what stood in its way; return the exit status."""
+    """Serve at an endpoint; print an error as one line. Return the exit status."""
     try:
         return serve(endpoint, shard, patient, guard)
-    except (AccessError, SessionError, SilenceError, LockstepError) as error:
-        print(f"{medium_name(shard)}: {error}", file=sys.stderr)
-        return 2 if isinstance(error, AccessError | SessionError) else 1
+    except (AccessError, SessionError) as error:
+        return _failed(shard, error, 2)
+    except (SilenceError, LockstepError) as error:
+        return _failed(shard, error, 1)
+
+
+def _failed(shard: int, error: Exception, status: int) -> int:
+    print(f"{medium_name(shard)}: {error}", file=sys.stderr)
+    return status
 
 
 def serve(
     endpoint: str, shard: int = 0, patient: bool = False, guard: AccessControl | None = None
 ) -> int:
-    """Be the medium of the first run that asks; return 0 at its end.
+    """Serve as the medium of the first run that asks; return 0 at its end.
 
-    Shard 0 is the router at the endpoint, too; the others connect to it. patient: whether who is
-    silent for long is still there. guard: who may do what. Raises SessionError when it cannot
-    listen or connect there, AccessError when it has no password, SilenceError when the world is
-    gone, LockstepError when somebody speaks out of turn.
+    Shard 0 listens as the router at the endpoint; the others connect to it. patient: keep silent
+    peers connected for longer. guard: the access rules of the router. Raises SessionError when it
+    cannot listen or connect, AccessError without a password, SilenceError when the world is gone,
+    LockstepError when a message is missing or of another slot.
     """
     with _opened(endpoint, shard, patient, guard) as session:
         stop = StopRequest()
-        at = "is connected to" if shard else "listens at"
-        print(f"{medium_name(shard)} {at} {endpoint}, for one run", flush=True)
+        state = "is connected to" if shard else "listens at"
+        print(f"{medium_name(shard)} {state} {endpoint}, for one run", flush=True)
         server = SetupServer(session, shard)
         while server.run is None and not stop.requested:
             server.wait(WAIT_S)
@@ -123,37 +134,37 @@ def _serve_run(bus: Bus, server: SetupServer, setup: MediumSetup, stop: StopRequ
         f"{name} serves run {server.run!r} of {setup.agents} agents, seed {setup.seed}", flush=True
     )
     truths, ending = bus.subscriber("truth", size=TRUTH_RING), RunEnd(bus.subscriber("over"), stop)
-    radio = (
+    medium = (
         LockstepMedium(bus, setup, server.shard, ending)
         if setup.lockstep
         else FreeRunningMedium(bus, setup)
     )
     bus.declare_alive(name)
     try:
-        _play(radio, truths, server, ending)
+        _play(medium, truths, server, ending)
     except RunOverError:
         print(f"{name}: the run is over, within a slot", flush=True)
     else:
-        radio.report()
+        medium.report()
         print(f"{name}: the run is over", flush=True)
 
 
 def _play(
-    radio: LockstepMedium | FreeRunningMedium,
+    medium: LockstepMedium | FreeRunningMedium,
     truths: Subscriber,
     server: SetupServer,
     ending: RunEnd,
 ) -> None:
-    """Play slots until the run is over; what came before its end is played still."""
+    """Play slots until the run is over, those that arrived before its end included."""
     silent_s = 0.0
     ended = False
     while not ended:
-        server.attend()
+        server.answer_waiting()
         ended = ending()
         first = truths.wait(WAIT_S) if not ended else None
-        radio.hear(([first] if first is not None else []) + truths.drain(TRUTH_RING))
+        medium.play(([first] if first is not None else []) + truths.drain(TRUTH_RING))
         silent_s = 0.0 if first is not None else silent_s + WAIT_S
         if silent_s > SILENCE_S:
             raise SilenceError(
-                f"the world of run {server.run!r} has been silent for {SILENCE_S:g} s"
+                f"no message from the world of run {server.run!r} for {SILENCE_S:g} s"
             )

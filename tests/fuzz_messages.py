@@ -28,7 +28,7 @@ from agent.codec import (
 from agent.core import Agent
 from agent.messages import Observation
 from netem.fault_queue import FaultQueue
-from netem.messages import Done, Truth, Turn, unpack_done, unpack_turn
+from netem.messages import SlotInput, SlotResult, Truth, unpack_slot_input, unpack_slot_result
 from netem.wire.frame import (
     Batch,
     Delivery,
@@ -137,8 +137,12 @@ def _targets(
     batch = pack(Batch(3, heard))
     tally = LatencyHistogram(0.0125)
     tally.add(heard, tuple(range(len(heard))), 0)
-    turn = Turn(Truth(3, 0.0375, positions), (3, 7), (0,) * len(positions))
-    done = Done(3, ((1, b"page"),), fleet.medium_counters)
+    slot_input = SlotInput(
+        truth=Truth(slot=3, time_s=0.0375, positions=positions),
+        participants=(3, 7),
+        incarnations=(0,) * len(positions),
+    )
+    slot_result = SlotResult(slot=3, pages=((1, b"page"),), counters=fleet.medium_counters)
     return [
         Target("observation", decode_observation, [encode(each) for _, each in observations]),
         Target("command", decode_command, [encode(outbox.command) for outbox in outboxes]),
@@ -149,9 +153,9 @@ def _targets(
         Target("delivery", unpack_delivery, [pack(Delivery(3, heard, tuple(range(len(heard)))))]),
         Target("arrivals", unpack_report, [pack(tally.report(0))]),
         Target("inbox", unpack_inbox, [pack(Inbox(3, (batch,)))]),
-        Target("turn", unpack_turn, [pack(turn)]),
-        Target("done", unpack_done, [pack(done)]),
-        Target("orders", lambda data: FaultQueue().take(data), [ORDERS]),
+        Target("slot input", unpack_slot_input, [pack(slot_input)]),
+        Target("slot result", unpack_slot_result, [pack(slot_result)]),
+        Target("orders", lambda data: FaultQueue().put(data), [ORDERS]),
         Target("request", _request, [REQUEST]),
     ]
 

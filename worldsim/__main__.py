@@ -19,15 +19,15 @@ from worldsim.scenario.toml import ScenarioError
 MAX_SPEED = 1000.0
 
 DESCRIPTION = """\
-The world of a fleet whose processes are started by hand: it owns the truth, conducts time, judges
+The world of a fleet whose processes are started by hand: it owns the truth, advances time, judges
 and records.
 
-It waits until netem and all agents of the scenario are there, flies the scenario, and writes
-recording, events and summary into DIR. `qswarm run` does all of this with one command."""
+It waits until netem and all agents of the scenario are up, runs the scenario, and writes the
+recording, the events and the summary into DIR. `qswarm run` does all of this with one command."""
 
 EPILOG = """\
-exit status: 0 the expectations held; 1 they did not; 2 bad input, or somebody did not come;
-3 inconclusive: the host was too slow, or the flight was interrupted"""
+exit status: 0 the expectations are met; 1 they are not; 2 bad input, or a process did not start;
+3 inconclusive: the host was too slow, or the run was interrupted"""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -40,20 +40,26 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("scenario", metavar="SCENARIO", help="a scenario file (TOML), or a scenario of the library")
     add("--connect", required=True, metavar="ENDPOINT", help="the router: tcp/127.0.0.1:7447")
-    add("--out", required=True, type=Path, metavar="DIR", help="the run's folder; must not exist")
+    add("--out", required=True, type=Path, metavar="DIR", help="output directory (must not exist)")
     add(
         "--run",
         type=_run_name,
         metavar="NAME",
-        help="its name (the scenario's)",
+        help="the run's name (default: the scenario's)",
     )
-    add("--speed", type=_speed, default=1.0, metavar="X", help="simulated s in one s (1)")
+    add(
+        "--speed",
+        type=_speed,
+        default=1.0,
+        metavar="X",
+        help="simulated seconds per second (default: 1)",
+    )
     add("--no-recording", action="store_true", help="write no run.rrd")
     return parser
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Conduct a run as the command line says; return the exit status."""
+    """Run the world by the command line; return the exit status."""
     options = _parser().parse_args(arguments)
     try:
         file = find_scenario(options.scenario)
@@ -72,7 +78,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _directory(options: argparse.Namespace, scenario: Scenario) -> RunDirectory:
-    """Make the run's folder, with the endpoint in it. Raises RunDirectoryError."""
+    """Create the run's folder, with the endpoint in it. Raises RunDirectoryError."""
     directory = RunDirectory.create(options.out, scenario)
     table = ProcessTable(directory.path, options.run or scenario.name, options.connect)
     table.add("world", os.getpid())
@@ -90,7 +96,7 @@ def _run_name(text: str) -> str:
 def _speed(text: str) -> float:
     speed = float(text)
     if not 0.0 < speed <= MAX_SPEED:
-        raise argparse.ArgumentTypeError(f"{text}: above 0, at most {MAX_SPEED:g} is allowed")
+        raise argparse.ArgumentTypeError(f"{text}; above 0, up to {MAX_SPEED:g} is allowed")
     return speed
 
 

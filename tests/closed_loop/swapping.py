@@ -1,4 +1,4 @@
-"""The Q-structure without choice: each agent takes the place of its number, and keeps it."""
+"""The Q-structure with fixed places: each agent takes the place of its id, and keeps it."""
 
 from agent.config import AgentSetup
 from agent.controller import Senses
@@ -7,7 +7,7 @@ from agent.guidance.target_on_queue import OwnTarget
 
 
 class ByNumber:
-    """Agent k wants the k-th place of the formation, whoever is nearer."""
+    """Agent k takes the k-th place of the formation."""
 
     def __init__(self, own_id: int) -> None:
         self._own_id = own_id
@@ -15,14 +15,14 @@ class ByNumber:
         self.blocked = ()
 
     def select(self, senses: Senses) -> OwnTarget:
-        """Return the place of one's number among two."""
+        """Return the target of this agent in a team of two."""
         layout = senses.mission.formation.layout(2)
         place = layout.places[self._own_id]
         return OwnTarget(place, layout.slots[place], vertex=True)
 
 
 class Swapping(QStructure):
-    """Flies to the place of its number."""
+    """Flies to the place of its id."""
 
     def __init__(self, setup: AgentSetup) -> None:
         super().__init__(setup)

@@ -1,4 +1,4 @@
-"""What holds agents by symmetry is passed: two that must swap, and a ball dead ahead (E23)."""
+"""Symmetric deadlocks are resolved: two agents that must swap, and an obstacle ahead (E23)."""
 
 from pathlib import Path
 
@@ -40,7 +40,7 @@ STARTS = {
 
 @pytest.mark.parametrize("kind", ["kinematic", "accelerating", "forward"])
 @pytest.mark.parametrize("starts", STARTS.values(), ids=STARTS.keys())
-def test_two_that_must_swap_pass_each_other(starts: list[list[float]], kind: str) -> None:
+def test_two_agents_that_must_swap_pass_each_other(starts: list[list[float]], kind: str) -> None:
     judge = fly(parse(SWAP.format(starts=starts, kind=kind))).loop.judge
     assert judge.phases[0].converge_s is not None
     assert judge.phases[0].converge_s <= WITHIN_S
@@ -50,7 +50,7 @@ def test_two_that_must_swap_pass_each_other(starts: list[list[float]], kind: str
 
 @pytest.mark.parametrize("avoidance", ["constellation", "direct", "none"])
 @pytest.mark.parametrize("off_m", [0.0, 1e-6, 1e-3])
-def test_a_ball_dead_ahead_is_passed(off_m: float, avoidance: str) -> None:
+def test_a_sphere_straight_ahead_is_passed(off_m: float, avoidance: str) -> None:
     ball = f"[{{ shape = 'sphere', centre_m = [3, {off_m}, 0], radius_m = 0.5 }}]"
     judge = fly(load(HEAD_ON, {"obstacle": ball, "control.avoidance": avoidance})).loop.judge
     assert judge.phases[0].converge_s is not None

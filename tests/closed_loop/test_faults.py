@@ -1,4 +1,4 @@
-"""The timeline in the air: missions, departures, arrivals, partitions; for a few seeds each."""
+"""The timeline in flight: missions, losses, joins, partitions; for a few seeds each."""
 
 from collections import Counter
 from pathlib import Path
@@ -22,10 +22,10 @@ WORST = {"netem.loss_percent": "80", "netem.delay_ms": "500"}
 SEEDS = range(3)
 
 
-class Watcher:
-    """Keeps every tick."""
+class TickList:
+    """Records every tick."""
 
-    shows = True
+    records_ticks = True
 
     def __init__(self) -> None:
         self.ticks: list[Tick] = []
@@ -34,33 +34,33 @@ class Watcher:
         self.ticks.append(tick)
 
     def event(self, event: RunEvent) -> None:
-        """Events are kept by the loop itself."""
+        """The loop keeps the events itself."""
 
 
 def scenario(seed: int, duration_s: float, *events: str, **overrides: str) -> Scenario:
-    told = f"[{', '.join(f'{{ {event} }}' for event in events)}]"
-    told_s = str(duration_s)
-    return load(WEDGE, {"seed": str(seed), "duration_s": told_s, "event": told, **overrides})
+    timeline = f"[{', '.join(f'{{ {event} }}' for event in events)}]"
+    flown_s = str(duration_s)
+    return load(WEDGE, {"seed": str(seed), "duration_s": flown_s, "event": timeline, **overrides})
 
 
 def flown(seed: int, duration_s: float, *events: str, **overrides: str) -> Flight:
     flight = fly(scenario(seed, duration_s, *events, **overrides))
-    nobody_met(flight)
+    check_safety(flight)
     return flight
 
 
-def nobody_met(flight: Flight) -> None:
-    """No collision and no packet unaccounted for, whatever happened."""
+def check_safety(flight: Flight) -> None:
+    """Check that no vehicles collided and that every packet is accounted for."""
     found = flight.loop.judge.invariants()
     for name in ("I1", "I8"):
-        assert found[name]["ticks"] == flight.loop.judge.ticks
-        assert found[name]["violations"] == 0
+        assert found[name].ticks == flight.loop.judge.ticks
+        assert found[name].violations == 0
 
 
 def violated(flight: Flight) -> list[str]:
     found = flight.loop.judge.invariants()
     assert {"I2", "I3", "I4", "I6", "I7"} <= set(found)
-    return [name for name, counts in found.items() if counts["violations"]]
+    return [name for name, tally in found.items() if tally.violations]
 
 
 def kinds(flight: Flight, *wanted: str) -> list[tuple[float, str, int | None]]:
@@ -69,9 +69,9 @@ def kinds(flight: Flight, *wanted: str) -> list[tuple[float, str, int | None]]:
 
 
 def reformed_s(flight: Flight) -> list[float]:
-    took = [recovery.reformed_s for recovery in flight.loop.judge.recoveries]
-    assert None not in took
-    return [each for each in took if each is not None]
+    times_s = [recovery.reformed_s for recovery in flight.loop.judge.recoveries]
+    assert None not in times_s
+    return [each for each in times_s if each is not None]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -95,7 +95,7 @@ def test_six_agents_switch_between_three_formations(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_frame_turned_by_90_degrees_takes_the_team_along(seed: int) -> None:
+def test_the_team_follows_a_frame_that_turns_by_90_degrees(seed: int) -> None:
     flight = flown(seed, 40, "at_s = 15, frame = { yaw_deg = 90, waypoints_m = [[1, 0, 0.5]] }")
     before, after = flight.loop.judge.phases
     assert before.formation.name == after.formation.name
@@ -108,7 +108,9 @@ def test_a_frame_turned_by_90_degrees_takes_the_team_along(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("radio", [{}, BAD], ids=["clean", "half lost"])
-def test_the_apex_leaves_and_has_a_successor(seed: int, radio: dict[str, str]) -> None:
+def test_another_agent_takes_the_apex_when_its_agent_leaves(
+    seed: int, radio: dict[str, str]
+) -> None:
     flight = flown(seed, 60, "at_s = 15, leave = ['vertex:V1']", **radio)
     ((t_s, _, gone),) = kinds(flight, "leave")
     assert t_s == 15.0
@@ -120,14 +122,14 @@ def test_the_apex_leaves_and_has_a_successor(seed: int, radio: dict[str, str]) -
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_apex_leaves_where_four_of_five_frames_are_lost(seed: int) -> None:
+def test_the_apex_agent_leaves_under_80_percent_loss(seed: int) -> None:
     flight = flown(seed, 50, "at_s = 15, leave = ['vertex:V1']", **WORST)
     assert max(reformed_s(flight)) <= 25.0
-    assert flight.loop.judge.invariants()["I6"]["violations"] == 0
+    assert flight.loop.judge.invariants()["I6"].violations == 0
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_apex_dies_and_hovers_in_its_slot(seed: int) -> None:
+def test_the_apex_agent_dies_and_its_vehicle_hovers_in_its_slot(seed: int) -> None:
     flight = flown(seed, 45, "at_s = 15, kill = ['vertex:V1']")
     ((_, _, dead),) = kinds(flight, "kill")
     assert dead is not None
@@ -146,8 +148,8 @@ def test_a_team_grows_and_shrinks(seed: int) -> None:
 
 
 @pytest.mark.parametrize(("seed", "loss"), [(0, "0"), (1, "20")])
-def test_both_sides_of_a_partition_have_a_whole_formation(seed: int, loss: str) -> None:
-    """Each leads its own; the other's vehicles are bodies that hover in slots (E18)."""
+def test_both_sides_of_a_partition_form_a_complete_formation(seed: int, loss: str) -> None:
+    """Each side has its own vertex agents; vehicles of the other side block slots (E18)."""
     apart = Random(seed).sample(range(9), 3 + seed)
     events = [f"at_s = 15, for_s = 60, partition = [{apart}]"]
     flight = flown(seed, 165, *events, **{"netem.loss_percent": loss})
@@ -158,7 +160,7 @@ def test_both_sides_of_a_partition_have_a_whole_formation(seed: int, loss: str) 
 
 
 @pytest.mark.parametrize("loss", ["0", "20"])
-def test_a_partition_cuts_and_a_heal_joins(loss: str) -> None:
+def test_a_partition_splits_the_team_and_a_heal_merges_it(loss: str) -> None:
     events = ["at_s = 15, for_s = 20, partition = [[0, 1, 2, 3]]"]
     flight = flown(1, 60, *events, **{"netem.loss_percent": loss})
     assert kinds(flight, "partition", "heal") == [(15.0, "partition", None), (35.0, "heal", None)]
@@ -175,25 +177,25 @@ def test_conditions_change_for_a_while() -> None:
     assert len(kinds(flight, "netem")) == 2
 
 
-def test_rows_are_empty_before_a_join_and_a_body_waits_for_its_first_step() -> None:
-    watcher = Watcher()
-    fly(scenario(1, 12, "at_s = 5, join = 1", "at_s = 9, leave = [9]"), watcher)
-    there = {tick.time_s: not np.isnan(tick.position[9, 0]) for tick in watcher.ticks}
-    alive = {tick.time_s: bool(tick.alive[9]) for tick in watcher.ticks}
+def test_a_row_is_empty_before_its_join_and_the_vehicle_hovers_until_the_first_step() -> None:
+    recorder = TickList()
+    fly(scenario(1, 12, "at_s = 5, join = 1", "at_s = 9, leave = [9]"), recorder)
+    there = {tick.time_s: not np.isnan(tick.position[9, 0]) for tick in recorder.ticks}
+    alive = {tick.time_s: bool(tick.alive[9]) for tick in recorder.ticks}
     assert [t_s for t_s in there if there[t_s]] == [t_s for t_s in there if 5.0 <= t_s < 9.0]
     assert [t_s for t_s in alive if alive[t_s]] == [t_s for t_s in alive if 6.0 <= t_s < 9.0]
-    still = [tick.position[9] for tick in watcher.ticks if 5.0 <= tick.time_s <= 6.0]
+    still = [tick.position[9] for tick in recorder.ticks if 5.0 <= tick.time_s <= 6.0]
     assert np.ptp(still, axis=0).max() == 0.0
 
 
-def test_the_dead_come_back_with_a_higher_incarnation() -> None:
+def test_dead_agents_restart_with_a_higher_incarnation() -> None:
     flight = flown(1, 30, "at_s = 15, for_s = 3, kill = ['all']")
     assert [t_s for t_s, _, _ in kinds(flight, "kill")] == [15.0] * 9
     assert [t_s for t_s, _, _ in kinds(flight, "restart")] == [18.0] * 9
     assert {command.incarnation for command in flight.loop.world.latest if command} == {1}
 
 
-def test_an_order_outlives_the_agent_that_it_was_for() -> None:
+def test_a_mission_survives_the_loss_of_the_agents_that_got_it() -> None:
     flight = flown(
         1,
         30,
@@ -217,21 +219,21 @@ def test_the_same_seed_has_the_same_faults_and_the_same_trace() -> None:
     assert first.loop.trace.sha256 == again.loop.trace.sha256
     assert first.loop.events == again.loop.events
     assert first.loop.trace.sha256 != other.loop.trace.sha256
-    struck = [kinds(flight, "kill", "join", "leave") for flight in (first, other)]
-    assert len(struck[0]) == 5
-    assert struck[0] != struck[1]
+    changes = [kinds(flight, "kill", "join", "leave") for flight in (first, other)]
+    assert len(changes[0]) == 5
+    assert changes[0] != changes[1]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_apex_is_paused_hovers_and_takes_its_part_again(seed: int) -> None:
+def test_the_paused_apex_agent_hovers_and_rejoins_the_team(seed: int) -> None:
     flight = flown(seed, 45, "at_s = 12, pause = ['vertex:V1'], for_s = 15")
     (paused,) = kinds(flight, "pause")
     assert kinds(flight, "resume") == [(27.0, "resume", paused[2])]
-    assert all(took <= 10.0 for took in reformed_s(flight))
+    assert all(time_s <= 10.0 for time_s in reformed_s(flight))
     assert violated(flight) == []
 
 
-def test_a_blink_of_a_process_changes_no_role() -> None:
+def test_a_pause_of_100_ms_changes_no_place_and_no_role() -> None:
     flight = flown(0, 25, "at_s = 12, pause = ['vertex:V1', 2], for_s = 0.1")
     assert kinds(flight, "slot", "role") == [
         each for each in kinds(flight, "slot", "role") if each[0] < 12.0

@@ -1,4 +1,4 @@
-"""The gallery: every scenario is sound, and the small ones show in virtual time what they say."""
+"""The library: every scenario can be flown, and the small ones meet their expectations."""
 
 from collections import Counter
 from functools import cache
@@ -17,7 +17,7 @@ from worldsim.scenario.tables import Scenario
 DEPLOY = Path(__file__).parents[2] / "deploy"
 GALLERY = {file.stem: file for file in sorted((DEPLOY / "scenarios").glob("*.toml"))}
 LARGE = 13
-"""From so many agents on, a flight takes too long for a test."""
+"""From this number of agents on, a run takes too long for a test."""
 
 
 def scenario(name: str) -> Scenario:
@@ -43,7 +43,7 @@ SMALL = [name for name in GALLERY if scenario(name).fleet.agents < LARGE and nam
 
 
 @pytest.mark.parametrize("name", GALLERY)
-def test_a_scenario_is_admitted_and_says_what_it_shows(name: str) -> None:
+def test_a_scenario_passes_the_preflight_and_has_a_description(name: str) -> None:
     admit(scenario(name), GALLERY[name], PROCESS_COMMAND_TICKS)
     first = GALLERY[name].read_text().splitlines()[0]
     assert first.startswith("# ")
@@ -56,14 +56,14 @@ def test_every_formation_of_the_library_is_flown() -> None:
 
 
 @pytest.mark.parametrize("name", SMALL)
-def test_it_shows_what_it_says(name: str) -> None:
+def test_a_scenario_meets_its_expectations(name: str) -> None:
     judge = flown(name).loop.judge
     assert [each for each in judge.expectations() if not each.held] == []
-    assert all(row["ticks"] and not row["violations"] for row in judge.invariants().values())
+    assert all(row.ticks and not row.violations for row in judge.invariants().values())
 
 
 @pytest.mark.parametrize("name", ["figure-1a-12", "figure-1b-12"])
-def test_each_queue_of_fig_1_has_the_members_that_its_capacity_says(name: str) -> None:
+def test_each_queue_of_fig_1_has_the_members_of_its_capacity(name: str) -> None:
     team = formation(name)
     held = places(name)
     assert sorted(held) == sorted(team.layout(12).places)
@@ -71,7 +71,7 @@ def test_each_queue_of_fig_1_has_the_members_that_its_capacity_says(name: str) -
     assert tuple(own[queue] for queue in range(len(team.queues))) == team.divide(12)
 
 
-def test_on_the_oriented_curve_everybody_takes_the_attitude_of_its_slot() -> None:
+def test_on_the_oriented_curve_every_agent_takes_the_attitude_of_its_slot() -> None:
     missed_deg = flown("oriented-curve-10").loop.judge.attitude_error_deg
     assert missed_deg is not None
     assert missed_deg < 2.0
@@ -87,7 +87,7 @@ def test_slots_of_the_oriented_curve_are_1_m_apart_along_it() -> None:
     assert along_m == pytest.approx(range(10), abs=0.001)
 
 
-def test_a_flock_settles_with_nearest_neighbours_about_spacing_m_apart() -> None:
+def test_a_flock_settles_at_about_spacing_m_between_neighbours() -> None:
     spacing_m = scenario("flocking-9").control.spacing_m
     position = flown("flocking-9").loop.world.vehicles.position.tolist()
     for agent, here in enumerate(position):

@@ -1,4 +1,4 @@
-"""A formation under way: slots are held while the frame moves, and won back behind obstacles."""
+"""A moving formation: slots are held while the frame moves, and regained behind obstacles."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from worldsim.scenario.file import load
 DEPLOY = Path(__file__).parents[2] / "deploy" / "scenarios"
 STARTS_S, TURNS_S = 10.0, 21.5
 SETTLED_S = 3.0
-"""After the frame's start, until a slot error counts."""
+"""Slot errors count from this time after the frame's start on [s]."""
 
 
 @pytest.mark.parametrize("change", ["", "'path'"])
@@ -38,7 +38,7 @@ def test_a_moving_slot_is_held(change):
 
 @pytest.mark.parametrize("mode", ["constellation", "direct", "none"])
 @pytest.mark.parametrize("seed", range(2))
-def test_the_wedge_passes_the_field_and_closes_again(seed, mode):
+def test_the_wedge_passes_a_field_of_obstacles_and_reforms(seed, mode):
     scenario = load(DEPLOY / "field-6.toml", {"seed": str(seed), "control.avoidance": mode})
     judge = fly(scenario).loop.judge
     assert [each.name for each in judge.expectations() if not each.held] == []
@@ -50,7 +50,7 @@ def test_the_wedge_passes_the_field_and_closes_again(seed, mode):
 
 @pytest.mark.parametrize("mode", ["stuck", "silent", "wrong"])
 @pytest.mark.parametrize("sensors", ["['proximity']", "['laser', 'sonar']"])
-def test_who_has_reason_to_doubt_its_sensors_stands_and_nobody_is_hit(sensors, mode):
+def test_an_agent_with_implausible_sensors_stops_and_no_vehicle_collides(sensors, mode):
     fault = f"[{{ at_s = 10, sensor = {{ agents = [0], mode = '{mode}' }} }}]"
     changes = {"event": fault, "vehicle.sensors": sensors, "duration_s": "20"}
     noise = {"sensor.proximity.noise_m": "0.02"}
@@ -58,4 +58,4 @@ def test_who_has_reason_to_doubt_its_sensors_stands_and_nobody_is_hit(sensors, m
     assert np.linalg.norm(loop.world.vehicles.velocity[0]) == 0.0
     assert np.all(np.linalg.norm(loop.world.vehicles.velocity[1:], axis=1) > 0.1)
     assert [e.t_s for e in loop.events if e.kind == "sensor"] == [10.0]
-    assert loop.judge.invariants()["I1"]["violations"] == 0
+    assert loop.judge.invariants()["I1"].violations == 0

@@ -1,4 +1,4 @@
-"""Tiers, and slots that a dead body blocks: what agents make of what they hear and sense."""
+"""Roles and tiers in a line, and slots that a dead agent's vehicle blocks."""
 
 from pathlib import Path
 
@@ -34,7 +34,7 @@ def line(xs, range_m):
     )
 
 
-def told(fleet):
+def telemetry_of(fleet):
     return [command.telemetry for command in fleet.loop.world.latest]
 
 
@@ -43,26 +43,26 @@ def fly(fleet, seconds):
         fleet.slot()
 
 
-def test_remark_5_a_line_whose_radio_reaches_the_next_only():
+def test_remark_5_a_line_with_a_radio_range_of_one_spacing():
     fleet = line(range(8), 1.0 + 1e-6)
     fly(fleet, 5.0)
-    settled = [(each.tier, each.parent, each.role) for each in told(fleet)]
+    settled = [(each.tier, each.parent, each.role) for each in telemetry_of(fleet)]
     assert [tier for tier, _, _ in settled] == list(range(8))
     assert [parent for _, parent, _ in settled] == list(range(-1, 7))
     assert [role for _, _, role in settled] == [VERTEX, *[SUB_VERTEX] * 6, MEMBER]
     flips = 0
     for _ in range(60 * 20):
         fly(fleet, 0.05)
-        now = [(each.tier, each.parent, each.role) for each in told(fleet)]
+        now = [(each.tier, each.parent, each.role) for each in telemetry_of(fleet)]
         flips += now != settled
     assert flips == 0
 
 
 def test_fig_4_five_agents_on_one_queue():
-    """r1 is heard by r2 and r3, r4 by r3, r5 by r4: r3 and r4 are sub-vertices of tiers 1 and 2."""
+    """r2 and r3 hear r1, r3 hears r4, r4 hears r5: r3 and r4 are sub-vertices of tiers 1 and 2."""
     fleet = line((0.0, 0.9, 1.8, 3.2, 4.6), 1.9)
     fly(fleet, 1.5)
-    assert [(each.tier, each.parent, each.role) for each in told(fleet)] == [
+    assert [(each.tier, each.parent, each.role) for each in telemetry_of(fleet)] == [
         (0, -1, VERTEX),
         (1, 0, MEMBER),
         (1, 0, SUB_VERTEX),
@@ -71,23 +71,23 @@ def test_fig_4_five_agents_on_one_queue():
     ]
 
 
-def test_who_hears_nobody_makes_for_the_vertex():
+def test_an_agent_that_hears_no_other_flies_to_the_vertex():
     fleet = line((0.0, 1.0, 30.0), 2.5)
     fly(fleet, 0.3)
-    assert [each.role for each in told(fleet)] == [DISTRESS] * 3, "they listen first"
+    assert [each.role for each in telemetry_of(fleet)] == [DISTRESS] * 3, "all listen first"
     fly(fleet, 1.2)
-    assert [each.role for each in told(fleet)] == [VERTEX, MEMBER, DISTRESS], "beacons may be late"
+    assert [each.role for each in telemetry_of(fleet)] == [VERTEX, MEMBER, DISTRESS], "late beacons"
     fly(fleet, 0.8)
-    assert [each.role for each in told(fleet)] == [VERTEX, MEMBER, VERTEX]
-    assert told(fleet)[2].target == (0.0, 0.0, 0.0), "in its own world it is the vertex agent"
+    assert [each.role for each in telemetry_of(fleet)] == [VERTEX, MEMBER, VERTEX]
+    assert telemetry_of(fleet)[2].target == (0.0, 0.0, 0.0), "it is the vertex agent by itself"
 
 
 def wedge_without(place, seed, **overrides):
-    """Fly the wedge; at 10 s the agent in a place dies, and its vehicle hovers there."""
+    """Fly the wedge; at 10 s the agent in a place dies. Return the fleet and the other agents."""
     fleet = VirtualFleet(load(WEDGE, {"seed": str(seed), "duration_s": "40", **overrides}))
     fly(fleet, 10.0)
-    dead = [tuple(each.place) for each in told(fleet)].index(place)
-    fleet.loop.effects.exited(dead, signal=9, status=None)
+    dead = [tuple(each.place) for each in telemetry_of(fleet)].index(place)
+    fleet.loop.effects.record_exit(dead, signal=9, status=None)
     fly(fleet, 30.0)
     living = [agent for agent in range(9) if agent != dead]
     return fleet, living
@@ -95,10 +95,10 @@ def wedge_without(place, seed, **overrides):
 
 @pytest.mark.parametrize("lossy", [False, True])
 @pytest.mark.parametrize("seed", range(3))
-def test_a_dead_apex_is_left_alone(seed, lossy):
+def test_the_team_fills_the_slots_around_a_dead_apex_agent(seed, lossy):
     radio = {"netem.loss_percent": "50", "netem.delay_ms": "200"} if lossy else {}
     fleet, living = wedge_without((0, 0), seed, **radio)
-    telemetry = told(fleet)
+    telemetry = telemetry_of(fleet)
     places = sorted(tuple(telemetry[agent].place) for agent in living)
     assert places == [(queue, rank) for queue in range(4) for rank in (1, 2)]
     heads = [agent for agent in living if telemetry[agent].role == VERTEX]
@@ -110,9 +110,9 @@ def test_a_dead_apex_is_left_alone(seed, lossy):
 
 
 @pytest.mark.parametrize("place", [(1, 1), (2, 2)])
-def test_a_dead_follower_is_passed_by(place):
+def test_the_team_skips_the_slot_of_a_dead_member(place):
     fleet, living = wedge_without(place, 1)
-    places = [tuple(told(fleet)[agent].place) for agent in living]
+    places = [tuple(telemetry_of(fleet)[agent].place) for agent in living]
     assert place not in places
     assert len(set(places)) == 8
     assert fleet.loop.judge.min_separation_m >= 0.25

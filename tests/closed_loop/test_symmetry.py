@@ -1,7 +1,7 @@
-"""A flight in a world moved elsewhere is the same flight, moved.
+"""A run in a rotated and shifted world is the same run, rotated and shifted.
 
-Turning and shifting round differently, and the field amplifies that while agents pass one another;
-what the flights may differ by is stated below, and lies far under anything that flies.
+Rotation and shift change the rounding, and the potential field amplifies the difference while
+agents pass each other. The tolerance below is far under any distance that matters.
 """
 
 from math import cos, degrees, pi, radians, sin
@@ -20,8 +20,8 @@ EDGES = [(-1, 1, 1), (-1, -1, 1), (-1, 1, -1), (-1, -1, -1)]
 AGENTS = 7
 
 
-class Turned:
-    """The plan as the world of a flight: turned about the vertical [rad], then shifted [m]."""
+class Motion:
+    """A rigid motion: a rotation about the vertical [rad], then a shift [m]."""
 
     def __init__(self, yaw, shift):
         self.yaw = yaw
@@ -37,7 +37,7 @@ class Turned:
 
 
 def text(seed, move):
-    """Return the scenario of a plan, in the place to which it is moved."""
+    """Return the scenario of a seed, moved."""
     random = Random(seed)
     starts = [
         [2.0 * cos(k * 2.0 * pi / AGENTS), 2.0 * sin(k * 2.0 * pi / AGENTS), random.uniform(-1, 1)]
@@ -64,7 +64,7 @@ queue = [{queues}]
 
 
 def flown(seed, move):
-    """Return where all were at every slot [m], (slots, agents, 3), and the places they held."""
+    """Return all positions (slots, agents, 3) [m; world frame] and the final places."""
     scenario = parse(text(seed, move))
     fleet, track = VirtualFleet(scenario), []
     for _ in range(round(DURATION_S * scenario.slot_hz)):
@@ -83,10 +83,10 @@ def flown(seed, move):
         (-151.0, (3.1, 20.7, -9.3)),
     ],
 )
-def test_a_flight_moved_is_the_flight_moved(seed, yaw_deg, shift_m):
-    move = Turned(radians(yaw_deg), shift_m)
-    here, places = flown(seed, Turned(0.0, (0.0, 0.0, 0.0)))
+def test_a_run_in_a_moved_world_is_the_same_run_moved(seed, yaw_deg, shift_m):
+    move = Motion(radians(yaw_deg), shift_m)
+    here, places = flown(seed, Motion(0.0, (0.0, 0.0, 0.0)))
     there, moved_places = flown(seed, move)
     assert moved_places == places
     assert np.abs(move.points(here) - there).max() < TOLERANCE_M
-    assert np.abs(here[-1] - here[0]).max() > 0.5, "nobody flew"
+    assert np.abs(here[-1] - here[0]).max() > 0.5, "no vehicle moved"

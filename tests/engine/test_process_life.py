@@ -1,4 +1,4 @@
-"""The life of a process: only the table's transitions happen, and the docs draw that table."""
+"""The life of a process: only transitions of the table happen."""
 
 from pathlib import Path
 
@@ -45,7 +45,7 @@ steps = st.one_of(
 
 
 class Life:
-    """A team under arbitrary faults, whose every change of state is checked."""
+    """A team under arbitrary faults; every change of state is checked."""
 
     def __init__(self) -> None:
         self.members = Membership(scenario())
@@ -53,34 +53,36 @@ class Life:
         self._time_s = 0.0
         self._joined = 0
 
-    def play(self, word: str, what: ProcessFault | int | None) -> None:
+    def apply(self, step: str, argument: ProcessFault | int | None) -> None:
         before = states(self.members)
         self._time_s += 0.4
-        self._do(word, what)
+        self._apply(step, argument)
         for agent, after in enumerate(states(self.members)):
             assert after is before[agent] or (before[agent], after) in AFTER
             assert self.members.alive[agent] == (after in ALIVE)
-            assert self.members.awake[agent] == (after is State.RUNNING)
-            assert self.members.has(agent, None) == (after in ALIVE | {State.BOOTING})
-        assert self.members.whole == bool(np.all(self.members.alive))
+            assert self.members.running[agent] == (after is State.RUNNING)
+            assert self.members.has_process(agent, None) == (after in ALIVE | {State.BOOTING})
+        assert self.members.all_alive == bool(np.all(self.members.alive))
 
-    def _do(self, word: str, what: ProcessFault | int | None) -> None:
+    def _apply(self, step: str, argument: ProcessFault | int | None) -> None:
         members, number = self.members, len(self._begun)
-        if word == "boot":
-            members.apply(members.booted(self._time_s), self._time_s)
-        elif word == "exit" and isinstance(what, int):
-            if members.has(what, None):
-                members.exited(what)
-        elif word == "end" and isinstance(what, int):
-            fault = self._begun.get(what)
-            operation = fault and members.ended(what, fault, positions(), self._time_s)
+        if step == "boot":
+            members.apply(members.admission(self._time_s), self._time_s)
+        elif step == "exit" and isinstance(argument, int):
+            if members.has_process(argument, None):
+                members.record_exit(argument)
+        elif step == "end" and isinstance(argument, int):
+            fault = self._begun.get(argument)
+            operation = fault and members.end_operation(argument, fault, positions(), self._time_s)
             if operation:
                 members.apply(operation, self._time_s)
-        elif isinstance(what, ProcessFault):
-            self._joined += isinstance(what, Join)
-            if self._joined <= 3 or not isinstance(what, Join):
-                self._begun[number] = what
-                operation = members.begun(number, what, CLAIMS, positions(), self._time_s)
+        elif isinstance(argument, ProcessFault):
+            self._joined += isinstance(argument, Join)
+            if self._joined <= 3 or not isinstance(argument, Join):
+                self._begun[number] = argument
+                operation = members.begin_operation(
+                    number, argument, CLAIMS, positions(), self._time_s
+                )
                 members.apply(operation, self._time_s)
 
 
@@ -90,15 +92,15 @@ def test_only_transitions_of_the_table_happen(
     played: list[tuple[str, ProcessFault | int | None]],
 ) -> None:
     life = Life()
-    for word, what in played:
-        life.play(word, what)
+    for step, argument in played:
+        life.apply(step, argument)
 
 
-def test_a_change_that_the_table_does_not_have_is_an_error() -> None:
+def test_a_transition_that_is_not_in_the_table_raises() -> None:
     with pytest.raises(TransitionError, match="a process that is dead cannot pause"):
         next_state(State.DEAD, "pause")
 
 
-def test_every_state_but_the_first_can_be_reached_and_left() -> None:
+def test_every_state_but_absent_is_reached_and_every_state_is_left() -> None:
     assert {after for _, after in AFTER} == set(State) - {State.ABSENT}
     assert {before for before, _ in AFTER} == set(State)

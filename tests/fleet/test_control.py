@@ -1,4 +1,4 @@
-"""What an operator asks for: done at once, told as the operator's, or refused with a reason."""
+"""Requests of an operator: carried out and reported, or rejected with a reason."""
 
 from math import inf, nan
 from pathlib import Path
@@ -21,109 +21,109 @@ LINES = formation_tables(DEPLOY / "formations/three-horizontal-lines.toml")
 JOINED = "[{ at_s = 15, join = 1 }]"
 
 
-class Operated:
-    """A fleet in virtual time, and an operator at its control."""
+class OperatedFleet:
+    """A fleet in virtual time with an operator's control."""
 
     def __init__(self, until_s: float = 1.0, launcher: bool = True, **overrides: str) -> None:
         keys = {key.replace("__", "."): value for key, value in overrides.items()}
         scenario = load(WEDGE, {"duration_s": "60", **keys})
-        self.fleet = VirtualFleet(scenario)
-        self.loop = self.fleet.loop
+        self.virtual = VirtualFleet(scenario)
+        self.loop = self.virtual.loop
         self.control = Control(scenario, self.loop, launcher)
         self.fly(until_s)
 
     def fly(self, until_s: float) -> None:
         while self.loop.world.time_s < until_s:
-            self.fleet.slot()
+            self.virtual.slot()
 
     def ask(self, to: int | None = None, version: int | None = None, **event: Any) -> Answer:
         request = Request(event or None, to, version)
-        return self.control.answer(msgspec.json.encode(request), self.do)
+        return self.control.answer(msgspec.json.encode(request), self.carry_out)
 
-    def do(self, operation: Operation, by: By) -> None:
-        self.fleet.carry_out(operation)
+    def carry_out(self, operation: Operation, by: By) -> None:
+        self.virtual.carry_out(operation)
         self.loop.apply(operation, by)
 
 
-def test_a_change_of_the_radio_holds_and_is_undone() -> None:
-    operated = Operated()
-    assert operated.ask().conditions == Conditions(range_m=6.0)
-    answer = operated.ask(netem={"loss_percent": 50}, for_s=0.5)
+def test_a_change_of_conditions_is_in_force_and_is_undone() -> None:
+    fleet = OperatedFleet()
+    assert fleet.ask().conditions == Conditions(range_m=6.0)
+    answer = fleet.ask(netem={"loss_percent": 50}, for_s=0.5)
     (event,) = answer.events
     assert isinstance(event, ConditionsChanged)
     assert (event.by, event.planned, event.loss_percent) == ("operator", True, 50.0)
     assert answer.conditions.loss_percent == 50.0
-    operated.fly(2.0)
-    assert operated.ask().conditions.loss_percent is None
-    assert operated.fleet.medium_counters.fates["dropped_loss"] > 0
+    fleet.fly(2.0)
+    assert fleet.ask().conditions.loss_percent is None
+    assert fleet.virtual.medium_counters.fates["dropped_loss"] > 0
 
 
-def test_a_fault_of_the_radio_is_reported_while_it_is_in_force() -> None:
+def test_a_radio_fault_is_reported_while_it_is_in_force() -> None:
     jam = Jam((0.0, 0.0, 0.0), 2.0)
-    operated = Operated(
+    fleet = OperatedFleet(
         event="[{ at_s = 0.5, jam = { centre_m = [0, 0, 0], radius_m = 2 }, for_s = 3 }]"
     )
-    operated.ask(flap={"period_s": 2, "links": [[0, 1]]}, for_s=1)
-    operated.ask(flap={"period_s": 3})
-    faults = operated.ask(partition=[[0, 1], [2]]).faults
+    fleet.ask(flap={"period_s": 2, "links": [[0, 1]]}, for_s=1)
+    fleet.ask(flap={"period_s": 3})
+    faults = fleet.ask(partition=[[0, 1], [2]]).faults
     assert [(each.since_s, each.fault) for each in faults] == [
         (0.5, RadioEvent(jam=jam)),
         (1.0, RadioEvent(flap=Flap(2.0, ((0, 1),)))),
         (1.0, RadioEvent(flap=Flap(3.0))),
         (1.0, RadioEvent(partition=Partition(((0, 1), (2,))))),
     ]
-    operated.fly(2.5)
+    fleet.fly(2.5)
     ring = Partition(((0, 1, 2, 3),), "ring")
-    faults = operated.ask(partition={"kind": "ring", "groups": [[0, 1, 2, 3]]}, for_s=0.5).faults
+    faults = fleet.ask(partition={"kind": "ring", "groups": [[0, 1, 2, 3]]}, for_s=0.5).faults
     assert faults[-1].fault == RadioEvent(partition=ring)
     assert len(faults) == 4
-    operated.fly(4.0)
-    left = [each.fault for each in operated.ask(heal=True).faults]
-    assert left == [RadioEvent(flap=Flap(3.0))]
+    fleet.fly(4.0)
+    remaining = [each.fault for each in fleet.ask(heal=True).faults]
+    assert remaining == [RadioEvent(flap=Flap(3.0))]
 
 
-def test_an_event_goes_over_the_wire_and_comes_back() -> None:
-    answer = Operated().ask(kill=[3])
+def test_an_answer_is_equal_after_encoding_and_decoding() -> None:
+    answer = OperatedFleet().ask(kill=[3])
     assert msgspec.json.decode(msgspec.json.encode(answer), type=Answer) == answer
 
 
-def test_processes_are_struck_and_come_back() -> None:
-    operated = Operated()
-    assert [event.agent for event in operated.ask(kill=[3, 2], for_s=1.0).events] == [2, 3]
-    operated.fly(3.5)
-    members = operated.loop.members
+def test_processes_are_killed_and_restart() -> None:
+    fleet = OperatedFleet()
+    assert [event.agent for event in fleet.ask(kill=[3, 2], for_s=1.0).events] == [2, 3]
+    fleet.fly(3.5)
+    members = fleet.loop.members
     assert members.alive.all()
     assert (members.incarnations[2], members.incarnations[4]) == (1, 0)
-    assert [event.kind for event in operated.ask(pause=["random:2"]).events] == ["pause", "pause"]
+    assert [event.kind for event in fleet.ask(pause=["random:2"]).events] == ["pause", "pause"]
 
 
-def test_a_mission_goes_to_the_agent_that_was_named_and_spreads() -> None:
-    operated = Operated(8.0)
-    (event,) = operated.ask(to=4, formation=LINES).events
+def test_a_mission_is_given_to_the_requested_agent_and_spreads() -> None:
+    fleet = OperatedFleet(8.0)
+    (event,) = fleet.ask(to=4, formation=LINES).events
     assert isinstance(event, FormationGiven)
     assert (event.agent, event.formation) == (4, "three-horizontal-lines")
-    operated.fly(8.06)
-    flown = [command.telemetry.mission for command in operated.loop.world.latest if command]
+    fleet.fly(8.06)
+    flown = [command.telemetry.mission for command in fleet.loop.world.latest if command]
     assert [agent for agent, key in enumerate(flown) if key] == [4]
-    operated.fly(25.0)
-    assert operated.loop.judge.phases[-1].converge_s is not None
-    (turned,) = operated.ask(to=0, version=7, frame={"yaw_deg": 90}).events
+    fleet.fly(25.0)
+    assert fleet.loop.judge.phases[-1].converge_s is not None
+    (turned,) = fleet.ask(to=0, version=7, frame={"yaw_deg": 90}).events
     assert isinstance(turned, FrameGiven)
     assert turned.mission == 7 * 2**16
 
 
-def test_spare_rows_are_for_joiners_beyond_the_timelines() -> None:
-    operated = Operated(fleet__spare="2", event=JOINED)
-    assert [event.agent for event in operated.ask(join=2).events] == [9, 10]
-    operated.fly(16.5)
-    assert operated.loop.members.alive.all()
+def test_spare_rows_allow_more_joins_than_the_timeline_has() -> None:
+    fleet = OperatedFleet(fleet__spare="2", event=JOINED)
+    assert [event.agent for event in fleet.ask(join=2).events] == [9, 10]
+    fleet.fly(16.5)
+    assert fleet.loop.members.alive.all()
 
 
-REFUSED = [
+REJECTED = [
     ({"kill": [9]}, "kill[0]: no agent 9; 0 to 8"),
     ({"kill": ["vertex:V9"]}, "kill[0]: no vertex 'V9'"),
     ({"restart": [3]}, "restart: no agent to restart"),
-    ({"resume": ["all"]}, "resume: no agent that ['all'] selects can do that now"),
+    ({"resume": ["all"]}, "resume: no agent in ['all'] can do that now"),
     ({"join": 1}, "join: 1; fleet.spare leaves room for 0"),
     ({"heal": True}, "heal: no partition to heal"),
     ({"jam": {"centre_m": [0, 0, 0], "radius_m": -1}}, "jam.radius_m: got -1"),
@@ -131,9 +131,9 @@ REFUSED = [
     ({"netem": {}}, "netem: no key to set"),
     ({"netem": {"rate_kbit": 1e-300}}, "netem.rate_kbit: got 1e-300; allowed: a number from 0.001"),
     ({"flap": {"period_s": 1e-300}}, "flap.period_s: got 1e-300; allowed: a number from 0.05"),
-    ({"netem": {"loss_percent": nan}}, "netem.loss_percent: nothing, or a number that is not"),
-    ({"netem": {"loss_percent": 5}, "for_s": nan}, "for_s: nothing, or a number that is not"),
-    ({"jam": {"centre_m": [0, inf, 0], "radius_m": 1}}, "jam.centre_m[1]: nothing, or a number"),
+    ({"netem": {"loss_percent": nan}}, "netem.loss_percent: null or not finite"),
+    ({"netem": {"loss_percent": 5}, "for_s": nan}, "for_s: null or not finite"),
+    ({"jam": {"centre_m": [0, inf, 0], "radius_m": 1}}, "jam.centre_m[1]: null or not finite"),
     ({"netem": {"distribution": "poisson"}}, "netem.distribution: "),
     ({"netem": {"gemodel": {"p_percent": 5, "r_percent": 500}}}, "netem.gemodel.r_percent: got 5"),
     ({"partition": [[0, 1], [1]]}, "partition[1]: agent 1 is named twice"),
@@ -144,50 +144,52 @@ REFUSED = [
     ({"formation": {**LINES, "vertices": {"V1": [0, 0, 0]}}}, "formation."),
     ({"frame": {"yaw_deg": 9}, "to": 9}, "to: no agent 9; 0 to 8"),
     ({"frame": {"yaw_deg": 9}, "version": 0}, "version: 0; above 0"),
-    ({"kill": [1], "to": 2}, "kill: only a mission goes to an agent"),
+    ({"kill": [1], "to": 2}, "kill: to and version go with a mission only"),
     ({"kill": [1], "leave": [2]}, "leave: not beside kill"),
     ({"heal": True, "for_s": 3}, "for_s: heal is not undone"),
     ({"explode": True}, "explode: unknown key"),
 ]
 
 
-@pytest.mark.parametrize(("asked", "reason"), REFUSED, ids=[reason for _, reason in REFUSED])
-def test_what_cannot_be_is_refused_and_changes_nothing(asked: dict[str, Any], reason: str) -> None:
-    operated = Operated()
-    before, radio = len(operated.loop.events), operated.ask()
-    with pytest.raises(RequestError) as refusal:
-        operated.ask(**asked)
-    assert str(refusal.value).startswith(reason)
-    assert "\n" not in str(refusal.value)
-    assert len(operated.loop.events) == before
-    assert operated.ask() == radio
+@pytest.mark.parametrize(("keys", "reason"), REJECTED, ids=[reason for _, reason in REJECTED])
+def test_an_invalid_request_is_rejected_and_changes_nothing(
+    keys: dict[str, Any], reason: str
+) -> None:
+    fleet = OperatedFleet()
+    before, radio = len(fleet.loop.events), fleet.ask()
+    with pytest.raises(RequestError) as error:
+        fleet.ask(**keys)
+    assert str(error.value).startswith(reason)
+    assert "\n" not in str(error.value)
+    assert len(fleet.loop.events) == before
+    assert fleet.ask() == radio
     assert radio.faults == ()
-    assert operated.loop.members.awake.all()
+    assert fleet.loop.members.running.all()
 
 
-def test_an_older_version_is_refused() -> None:
-    operated = Operated(8.0)
-    operated.ask(to=4, version=3, formation=LINES)
-    with pytest.raises(RequestError, match="version: 3; above 3, which flies already"):
-        operated.ask(to=4, version=3, frame={"yaw_deg": 90})
-    operated.ask(kill=[4])
+def test_an_older_mission_version_is_rejected() -> None:
+    fleet = OperatedFleet(8.0)
+    fleet.ask(to=4, version=3, formation=LINES)
+    with pytest.raises(RequestError, match="version: 3; above 3 is allowed"):
+        fleet.ask(to=4, version=3, frame={"yaw_deg": 90})
+    fleet.ask(kill=[4])
     with pytest.raises(RequestError, match=r"to: agent 4 is not running \(dead\)"):
-        operated.ask(to=4, frame={"yaw_deg": 90})
+        fleet.ask(to=4, frame={"yaw_deg": 90})
 
 
-def test_by_hand_processes_are_left_alone_and_the_radio_is_not() -> None:
-    operated = Operated(launcher=False)
+def test_without_a_launcher_only_the_radio_can_be_changed() -> None:
+    fleet = OperatedFleet(launcher=False)
     with pytest.raises(RequestError, match="kill: this fleet has no launcher"):
-        operated.ask(kill=[2])
-    assert len(operated.ask(partition=[[0, 1]]).faults) == 1
+        fleet.ask(kill=[2])
+    assert len(fleet.ask(partition=[[0, 1]]).faults) == 1
 
 
-JUNK = [b"", b"\xff", b"[]", b'{"event": 3}', bytes(MAX_REQUEST_B + 1)]
-JUNK += [b'{"event":{"netem":' + b"[" * deep + b"]" * deep + b"}}" for deep in (400, 30_000)]
+MALFORMED = [b"", b"\xff", b"[]", b'{"event": 3}', bytes(MAX_REQUEST_B + 1)]
+MALFORMED += [b'{"event":{"netem":' + b"[" * deep + b"]" * deep + b"}}" for deep in (400, 30_000)]
 
 
-@pytest.mark.parametrize("asked", JUNK, ids=range(len(JUNK)))
-def test_what_is_no_request_is_refused(asked: bytes) -> None:
-    operated = Operated(0.0)
+@pytest.mark.parametrize("data", MALFORMED, ids=range(len(MALFORMED)))
+def test_a_malformed_request_is_rejected(data: bytes) -> None:
+    fleet = OperatedFleet(0.0)
     with pytest.raises(RequestError):
-        operated.control.answer(asked, operated.do)
+        fleet.control.answer(data, fleet.carry_out)

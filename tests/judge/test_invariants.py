@@ -1,4 +1,4 @@
-"""The judge of allocation: times by the formulas, and each planted breach is seen."""
+"""Invariants of the allocation: the time bounds, and the detection of each planted breach."""
 
 from dataclasses import replace
 
@@ -40,13 +40,13 @@ def judged(ticks: list[Tick], *events: RunEvent) -> dict[str, tuple[int, int]]:
     waiting = list(events)
     for tick in ticks:
         while waiting and waiting[0].t_s <= tick.time_s:
-            judge.note(waiting.pop(0))
+            judge.handle_event(waiting.pop(0))
         judge.see(tick)
-    return {name: (row["ticks"], row["violations"]) for name, row in judge.invariants().items()}
+    return {name: (row.ticks, row.violations) for name, row in judge.invariants().items()}
 
 
 def claimed(ticks: list[Tick], agent: int, place: tuple[int, int], from_s: float) -> list[Tick]:
-    """Return ticks in which an agent claims another place from a time on."""
+    """Return the ticks with another place claimed by an agent from a time on [s]."""
     changed = []
     for tick in ticks:
         places = tick.place.copy()
@@ -59,16 +59,14 @@ def claimed(ticks: list[Tick], agent: int, place: tuple[int, int], from_s: float
 @pytest.mark.parametrize(
     ("loss_percent", "horizon_s"), [(0.0, 9.0), (20.0, 23.0), (50.0, 46.0), (80.0, 132.0)]
 )
-def test_how_long_it_takes_until_a_team_must_have_settled(
-    loss_percent: float, horizon_s: float
-) -> None:
-    reach = Connectivity(wedge(AGENTS))
-    reach.note(changed(1, Conditions(loss_percent=loss_percent)))
-    settled_s = reach.detection_s(2) + 2.0 * reach.everybody_s(AGENTS, 2)
+def test_the_settling_time_of_a_team_under_loss(loss_percent: float, horizon_s: float) -> None:
+    connectivity = Connectivity(wedge(AGENTS))
+    connectivity.handle_event(changed(1, Conditions(loss_percent=loss_percent)))
+    settled_s = connectivity.detection_s(2) + 2.0 * connectivity.dissemination_s(AGENTS, 2)
     assert settled_s == pytest.approx(horizon_s, abs=0.6)
 
 
-def test_nothing_reaches_everybody_where_all_is_lost() -> None:
+def test_without_delivery_the_number_of_rounds_is_infinite() -> None:
     assert rounds_to_all(9, 2, 1.0) == np.inf
     assert rounds_to_all(9, 0, 1.0) == 0
 
@@ -76,22 +74,22 @@ def test_nothing_reaches_everybody_where_all_is_lost() -> None:
 def test_components_follow_range_and_partition() -> None:
     (tick, *_) = flight(4)
     line = replace(tick, position=np.array([[k, 0, 0] for k in (0, 1, 2, 9)], dtype=np.float32))
-    reach = Connectivity(wedge(4))
-    assert reach.components(line).members() == [[0, 1, 2, 3]]
-    reach.note(changed(1, Conditions(range_m=1.5)))
-    assert reach.components(line).members() == [[0, 1, 2], [3]]
-    assert reach.components(line).hops == 2
-    reach.note(
+    connectivity = Connectivity(wedge(4))
+    assert connectivity.components(line).members() == [[0, 1, 2, 3]]
+    connectivity.handle_event(changed(1, Conditions(range_m=1.5)))
+    assert connectivity.components(line).members() == [[0, 1, 2], [3]]
+    assert connectivity.components(line).hops == 2
+    connectivity.handle_event(
         Partitioned(
             t_s=0.0, agent=None, planned=True, number=2, groups=((1,),), parted="clean", bridge=()
         )
     )
-    assert reach.components(line).members() == [[0], [1], [2], [3]]
-    reach.note(HEALED)
-    assert reach.components(line).hops == 2
+    assert connectivity.components(line).members() == [[0], [1], [2], [3]]
+    connectivity.handle_event(HEALED)
+    assert connectivity.components(line).hops == 2
 
 
-def test_a_team_that_flies_straight_to_its_places_breaks_nothing() -> None:
+def test_a_team_that_flies_straight_to_its_slots_violates_nothing() -> None:
     found = judged(flight())
     assert set(found) == {"I1", "I2", "I3", "I4", "I6", "I7", "I8"}
     assert {name: broken for name, (_, broken) in found.items() if name not in {"I1"}} == {
@@ -101,13 +99,13 @@ def test_a_team_that_flies_straight_to_its_places_breaks_nothing() -> None:
     assert 300 < found["I7"][0] < found["I2"][0] < 601
 
 
-def test_a_vertex_without_an_agent_breaks_i2() -> None:
+def test_a_vertex_without_an_agent_violates_i2() -> None:
     (apex,) = np.flatnonzero((flight()[0].place == (0, 0)).all(axis=1))
     found = judged(claimed(flight(), apex, (0, 3), 20.0))
     assert found["I2"][1] == 201
 
 
-def test_a_queue_with_two_too_many_breaks_i3() -> None:
+def test_a_queue_with_two_excess_agents_violates_i3() -> None:
     ticks = flight()
     others = np.flatnonzero(ticks[0].place[:, 0] == 3)[:2]
     for rank, agent in enumerate(others):
@@ -115,14 +113,14 @@ def test_a_queue_with_two_too_many_breaks_i3() -> None:
     assert judged(ticks)["I3"][1] == 201
 
 
-def test_two_in_one_place_may_be_for_a_while_only() -> None:
+def test_a_shared_place_violates_i4_only_after_a_while() -> None:
     ticks = flight()
     there = tuple(ticks[0].place[5].tolist())
     assert judged(claimed(ticks, 4, there, 29.1))["I4"][1] == 0
     assert judged(claimed(ticks, 4, there, 20.0))["I4"][1] > 150
 
 
-def test_a_place_changed_in_a_quiet_team_breaks_i7_and_after_a_fault_does_not() -> None:
+def test_a_change_of_place_in_a_quiet_team_violates_i7_unless_a_fault_precedes_it() -> None:
     ticks = flight()
     swapped = claimed(
         claimed(ticks, 4, tuple(ticks[0].place[5]), 25.0), 5, tuple(ticks[0].place[4]), 25.0
@@ -131,7 +129,7 @@ def test_a_place_changed_in_a_quiet_team_breaks_i7_and_after_a_fault_does_not() 
     assert judged(swapped, msgspec.structs.replace(HEALED, t_s=24.0))["I7"][1] == 0
 
 
-def test_a_fourth_change_of_role_without_a_fault_breaks_i6() -> None:
+def test_a_fourth_change_of_role_without_a_fault_violates_i6() -> None:
     flips = [RoleChanged(t_s=10.0 + k, agent=3, role="member") for k in range(4)]
     assert judged(flight(), *flips[:3])["I6"][1] == 0
     assert judged(flight(), *flips)["I6"][1] == 1

@@ -1,4 +1,4 @@
-"""Run events: each comes back from its row as it was, and the judge recovers the radio's faults."""
+"""Run events: rows decode to equal events, and the judge recovers the radio faults in force."""
 
 import json
 from typing import get_args
@@ -48,13 +48,13 @@ EVENTS: list[RunEvent] = [
 
 
 @pytest.mark.parametrize("event", EVENTS, ids=lambda event: event.kind)
-def test_an_event_comes_back_from_its_line(event: RunEvent) -> None:
+def test_an_event_is_equal_after_encoding_and_decoding(event: RunEvent) -> None:
     row = as_row(event)
     assert list(row)[:3] == ["t_s", "kind", "agent"]
     assert event_of(json.loads(json.dumps(row))) == event
 
 
-def test_every_kind_has_its_own_name() -> None:
+def test_every_event_type_has_its_own_kind() -> None:
     kinds = [event.__struct_config__.tag for event in get_args(RunEvent)]
     assert len(set(kinds)) == len(kinds)
 
@@ -62,7 +62,7 @@ def test_every_kind_has_its_own_name() -> None:
 @pytest.mark.parametrize(
     "row", [{}, {"kind": "explode", "t_s": 0, "agent": None}, {"kind": "kill"}]
 )
-def test_a_row_that_is_no_event_is_refused(row: dict[str, object]) -> None:
+def test_an_invalid_row_is_rejected(row: dict[str, object]) -> None:
     with pytest.raises(msgspec.ValidationError):
         event_of(row)
 
@@ -78,15 +78,15 @@ orders = st.one_of(
 
 @settings(derandomize=True, deadline=None, max_examples=80)
 @given(st.lists(orders, max_size=12))
-def test_from_its_events_the_judge_knows_what_is_in_force(given_orders: list[FaultOrder]) -> None:
+def test_the_judge_recovers_the_faults_in_force_from_events(given_orders: list[FaultOrder]) -> None:
     world, judge = NetworkConditions(Conditions()), NetworkConditions(Conditions())
     for order in given_orders:
         if order.fault is None and not world.ends(order):
             continue
         event = event_of(json.loads(json.dumps(as_row(applied(order, world, 1.5, None)))))
         judge.apply(order_of(event))
-        assert [held.fault for held in judge.in_force.values()] == [
-            held.fault for held in world.in_force.values()
+        assert [each.fault for each in judge.in_force.values()] == [
+            each.fault for each in world.in_force.values()
         ]
         assert list(judge.in_force) == list(world.in_force)
         assert judge.conditions == world.conditions

@@ -1,4 +1,4 @@
-"""What is in force: which model each link has, which faults cut it, how they compose and end."""
+"""Conditions in force: models of links, faults that cut them, their composition and their end."""
 
 from itertools import permutations
 
@@ -14,7 +14,7 @@ from netem.medium import Medium
 from netem.messages import MediumSetup
 from netem.wire.channels import LOCAL, MULTIHOP
 from netem.wire.frame import Outgoing, Transmission
-from tests.netem.ordering import begin, end
+from tests.netem.fault_orders import begin, end
 
 FIELDS = LinkKeys.__struct_fields__
 AIR = ("rate_kbit", "rate_overhead_b", "limit")
@@ -42,7 +42,9 @@ def conditions(both, local, multihop, link=()):
 
 @settings(derandomize=True, deadline=None)
 @given(tables, tables, tables, tables)
-def test_a_links_own_table_wins_over_its_channels_and_that_over_both(both, local, multihop, own):
+def test_a_links_table_overrides_its_channels_and_that_overrides_the_common_one(
+    both, local, multihop, own
+):
     models = LinkModels(conditions(both, local, multihop, (DirectedLink(source=2, to=5, **own),)))
     for channel, table in ((LOCAL, local), (MULTIHOP, multihop)):
         own_rate = any(key in own for key in AIR)
@@ -56,8 +58,8 @@ def test_without_conditions_the_radio_is_clean():
     assert models.of_link(LOCAL, 0, 1) == models.of_link(MULTIHOP, 1, 0) == LinkModel()
 
 
-def test_a_value_of_nothing_is_a_value():
-    """A channel without loss is without loss, whatever the table for both channels says."""
+def test_a_value_of_zero_overrides():
+    """A channel with zero loss has no loss, whatever the table of both channels sets."""
     models = LinkModels(conditions({"loss_percent": 50.0}, {"loss_percent": 0.0}, {}))
     assert models.of_link(LOCAL, 0, 1).loss_percent == 0.0
     assert models.of_link(MULTIHOP, 0, 1).loss_percent == 50.0
@@ -65,7 +67,7 @@ def test_a_value_of_nothing_is_a_value():
 
 @settings(derandomize=True, deadline=None)
 @given(tables, tables, tables, tables)
-def test_a_change_lies_over_what_was_table_by_table_and_key_by_key(both, own, change, other):
+def test_a_change_overrides_the_keys_that_it_sets_table_by_table(both, own, change, other):
     before = conditions(both, {}, own, (DirectedLink(source=0, to=1, **own),))
     links = tuple(DirectedLink(source=a, to=b, **other) for a, b in ((0, 1), (1, 2)))
     after = overlaid(before, conditions(change, {}, other, links))
@@ -79,52 +81,52 @@ def test_a_change_lies_over_what_was_table_by_table_and_key_by_key(both, own, ch
 
 
 def radio(**keys):
-    made = Medium(MediumSetup(1, 3, 4, 80.0, Conditions(**keys)))
-    made.place(((0.0, 0.0, 0.0),) * 3)
-    return made
+    medium = Medium(MediumSetup(1, 3, 4, 80.0, Conditions(**keys)))
+    medium.place(((0.0, 0.0, 0.0),) * 3)
+    return medium
 
 
-def say(made, sent_s):
-    made.transmit(0, sent_s, Transmission(0, 0, (Outgoing(LOCAL, b"x"),)))
+def send(medium, sent_s):
+    medium.transmit(0, sent_s, Transmission(0, 0, (Outgoing(LOCAL, b"x"),)))
 
 
-def test_a_change_meets_later_frames_and_not_those_in_flight():
-    made = radio(delay_ms=100.0)
-    say(made, 0.0)
-    made.obey(begin(1, Conditions(loss_percent=100.0)))
-    say(made, 0.05)
-    assert [len(made.collect(who, 1.0)) for who in (1, 2)] == [1, 1]
-    assert made.counters(0).fates["dropped_loss"] == 2
+def test_a_change_affects_later_frames_and_none_in_flight():
+    medium = radio(delay_ms=100.0)
+    send(medium, 0.0)
+    medium.apply(begin(1, Conditions(loss_percent=100.0)))
+    send(medium, 0.05)
+    assert [len(medium.collect(agent, 1.0)) for agent in (1, 2)] == [1, 1]
+    assert medium.counters(0).fates["dropped_loss"] == 2
 
 
 def test_a_partition_cuts_later_frames_and_a_heal_ends_it():
-    made = radio(delay_ms=100.0)
-    say(made, 0.0)
-    made.obey(begin(1, Partition(((0, 1),))))
-    say(made, 0.05)
-    made.obey(end(1))
-    say(made, 0.06)
-    assert [len(made.collect(who, 1.0)) for who in (1, 2)] == [3, 2]
-    fates = made.counters(0).fates
+    medium = radio(delay_ms=100.0)
+    send(medium, 0.0)
+    medium.apply(begin(1, Partition(((0, 1),))))
+    send(medium, 0.05)
+    medium.apply(end(1))
+    send(medium, 0.06)
+    assert [len(medium.collect(agent, 1.0)) for agent in (1, 2)] == [3, 2]
+    fates = medium.counters(0).fates
     assert (fates["dropped_partition"], fates["delivered"]) == (1, 5)
 
 
-def test_what_is_in_flight_to_a_radio_that_goes_is_dropped_by_the_medium():
-    made = radio(delay_ms=100.0)
-    say(made, 0.0)
-    made.place(((0.0, 0.0, 0.0), None, (0.0, 0.0, 0.0)))
-    say(made, 0.05)
-    assert [len(made.collect(who, 1.0)) for who in (1, 2)] == [0, 2]
-    told = made.counters(0)
-    assert (told.fates["dropped_medium"], told.fates["dropped_range"]) == (1, 1)
-    assert told.addressed == sum(told.fates.values()) + told.in_flight
+def test_frames_in_flight_to_a_radio_that_disappears_are_dropped_by_the_medium():
+    medium = radio(delay_ms=100.0)
+    send(medium, 0.0)
+    medium.place(((0.0, 0.0, 0.0), None, (0.0, 0.0, 0.0)))
+    send(medium, 0.05)
+    assert [len(medium.collect(agent, 1.0)) for agent in (1, 2)] == [0, 2]
+    counters = medium.counters(0)
+    assert (counters.fates["dropped_medium"], counters.fates["dropped_range"]) == (1, 1)
+    assert counters.addressed == sum(counters.fates.values()) + counters.in_flight
 
 
 AGENTS = range(7)
 
 
 def in_force(**faults):
-    """Return conditions with faults begun, in turn, under the numbers 1, 2, ..."""
+    """Return conditions after faults began in order, with the numbers 1, 2, ..."""
     network = NetworkConditions(Conditions())
     for number, fault in enumerate(faults.values(), 1):
         network.apply(begin(number, fault))
@@ -139,40 +141,45 @@ def within(*groups):
     return {pair for group in groups for pair in permutations(group, 2)}
 
 
-def parted(*arguments):
+def cut_by_partition(*arguments):
     network = in_force(partition=Partition(*arguments))
     assert network.obstructed
     return open_links(network)
 
 
-def test_agents_that_no_group_names_are_one_group_more():
-    assert parted(((0, 1), (2,))) == within((0, 1), (2,), (3, 4, 5, 6))
+def test_unnamed_agents_form_one_more_group():
+    assert cut_by_partition(((0, 1), (2,))) == within((0, 1), (2,), (3, 4, 5, 6))
 
 
-def test_one_way_a_group_hears_all_and_is_heard_by_itself_alone():
+def test_in_a_one_way_partition_a_group_hears_all_and_only_itself_hears_it():
     heard = within((0, 1), (2,), (3, 4, 5, 6))
     heard |= {(others, group) for others in (3, 4, 5, 6) for group in (0, 1, 2)}
-    assert parted(((0, 1), (2,)), "one_way") == heard
+    assert cut_by_partition(((0, 1), (2,)), "one_way") == heard
 
 
 def test_a_bridge_hears_both_sides_and_is_heard_by_both():
     through = {pair for pair in permutations(AGENTS, 2) if 6 in pair}
-    assert parted(((0, 1, 2), (3, 4, 5)), "bridge", (6,)) == within((0, 1, 2), (3, 4, 5)) | through
+    assert (
+        cut_by_partition(((0, 1, 2), (3, 4, 5)), "bridge", (6,))
+        == within((0, 1, 2), (3, 4, 5)) | through
+    )
 
 
-def test_in_a_ring_everybody_hears_the_two_beside():
+def test_in_a_ring_each_agent_hears_its_two_neighbours():
     ring = (4, 0, 2, 1, 3)
-    beside = set(zip(ring, (*ring[1:], ring[0]), strict=True))
-    assert parted((ring,), "ring") == beside | {(b, a) for a, b in beside} | within((5, 6))
+    neighbours = set(zip(ring, (*ring[1:], ring[0]), strict=True))
+    assert cut_by_partition((ring,), "ring") == neighbours | {
+        (b, a) for a, b in neighbours
+    } | within((5, 6))
 
 
 @pytest.mark.parametrize("ring", [(0,), (0, 1), (0, 1, 2)])
-def test_in_a_small_ring_everybody_is_beside_everybody(ring):
+def test_in_a_ring_of_up_to_three_all_agents_are_neighbours(ring):
     rest = tuple(agent for agent in AGENTS if agent not in ring)
-    assert parted((ring,), "ring") == within(ring, rest)
+    assert cut_by_partition((ring,), "ring") == within(ring, rest)
 
 
-def test_a_heal_ends_every_partition_and_no_more():
+def test_a_heal_ends_every_partition_and_no_other_fault():
     network = in_force(one=Partition(((0,),)), other=Partition(((1,),)), jam=Jam((0, 0, 0), 1.0))
     network.apply(begin(4, Heal()))
     assert network.obstructed
@@ -181,12 +188,12 @@ def test_a_heal_ends_every_partition_and_no_more():
     assert not network.obstructed
 
 
-def test_a_jam_is_a_sphere_and_each_ends_by_its_number():
+def test_a_jam_is_a_sphere_and_ends_by_its_number():
     network = in_force(one=Jam((0.0, 0.0, 0.0), 1.0), other=Jam((5.0, 0.0, 0.0), 2.0))
     places = [(1.0, 0.0, 0.0), (0.8, 0.8, 0.0), (2.9, 0.0, 0.0), (3.0, 0.0, 0.0), (5.0, 1.4, 1.4)]
-    assert [network.jammed(where) for where in places] == [True, False, False, True, True]
+    assert [network.jammed(position) for position in places] == [True, False, False, True, True]
     network.apply(end(2))
-    assert [network.jammed(where) for where in places] == [True, False, False, False, False]
+    assert [network.jammed(position) for position in places] == [True, False, False, False, False]
 
 
 def test_a_flap_is_down_for_the_first_half_of_each_period():
@@ -199,7 +206,7 @@ def test_a_flap_is_down_for_the_first_half_of_each_period():
     assert all(open_links(network, now_s) == within(AGENTS) for now_s in up)
 
 
-def test_a_flap_of_some_links_leaves_the_others_alone():
+def test_a_flap_of_some_links_does_not_affect_the_others():
     network = in_force(flap=Flap(2.0, ((0, 1), (2, 3))))
     assert open_links(network) == within(AGENTS) - {(0, 1), (2, 3)}
     network.apply(end(1))
@@ -220,8 +227,8 @@ faults = st.one_of(
 
 @settings(derandomize=True, deadline=None, max_examples=50)
 @given(st.lists(faults, min_size=1, max_size=6), st.randoms(use_true_random=False))
-def test_faults_compose_and_end_by_themselves_in_any_order(begun, random):
-    """After some have ended, in whatever order, those left act as if they alone had begun."""
+def test_faults_compose_and_end_independently_in_any_order(begun, random):
+    """After some faults have ended, the others act as if they alone had begun."""
     network = NetworkConditions(Conditions(range_m=6.0))
     numbers = list(range(len(begun)))
     for number in numbers:
@@ -247,7 +254,7 @@ def test_an_inner_partition_that_ends_leaves_the_outer_one_in_force():
     assert open_links(network) == within((0, 1), AGENTS[2:])
 
 
-def test_the_end_of_what_is_not_in_force_changes_nothing():
+def test_the_end_of_a_fault_that_is_not_in_force_changes_nothing():
     network = in_force(jam=Jam((0, 0, 0), 1.0))
     assert not network.ends(end(7))
     network.apply(end(7))

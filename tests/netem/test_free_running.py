@@ -45,7 +45,7 @@ def test_batches_that_leave_before_they_are_due_are_not_late() -> None:
     assert lateness.summary() is None
     far_ahead_s, behind_s = 1e6, -1e6
     for due_s in (far_ahead_s, far_ahead_s, behind_s):
-        lateness.note(due_s, newest_s=0.0, read_at=0.0)
+        lateness.record(due_s, newest_s=0.0, read_at=0.0)
     summary = lateness.summary()
     assert summary is not None
     assert summary[0] == 0.0

@@ -11,7 +11,7 @@ from netem.link_keys import Conditions, DirectedLink, GilbertElliott, LinkKeys, 
 from netem.medium import Medium
 from netem.messages import MediumSetup
 from netem.wire.frame import Outgoing, Transmission
-from tests.netem.ordering import begin, end
+from tests.netem.fault_orders import begin, end
 
 AGENTS = 6
 SLOT_S = 0.0125
@@ -62,7 +62,7 @@ def played(mediums, seed, shuffled=None, slots=60):
             shuffled.shuffle(order)
         for medium in mediums:
             if slot % 8 == 4:
-                medium.obey(ORDERS[slot // 8 % len(ORDERS)])
+                medium.apply(ORDERS[slot // 8 % len(ORDERS)])
             medium.place(tuple(places))
             for agent in order:
                 frames = tuple(
@@ -90,7 +90,7 @@ def test_shards_have_the_verdicts_the_frames_and_the_digest_of_one_medium(owners
         assert digest.value == whole.digest()
     counters = whole.counters(0)
     parts = [shard.counters(0) for shard in shards]
-    assert all((part.sent, part.spoken_b) == (counters.sent, counters.spoken_b) for part in parts)
+    assert all((part.sent, part.sent_b) == (counters.sent, counters.sent_b) for part in parts)
     for name in ("addressed", "in_flight", "duplicated", "corrupted"):
         assert sum(getattr(part, name) for part in parts) == getattr(counters, name)
     for fate, count in counters.fates.items():

@@ -113,8 +113,6 @@ def test_by_hand_process_faults_are_refused_at_the_start(
     python = QSWARM[0]
     world = start(python, "-m", "worldsim", scenario, "--connect", endpoint, "--out", str(run))
     assert world.status(10.0) == 2
-    error = (
-        "event[1].kill: needs the launcher (qswarm run): who is started by hand is ended by hand"
-    )
-    assert world.text == f"world: {scenario}: {error}\n"
+    reason = "needs the launcher (qswarm run): processes started by hand are ended by hand"
+    assert world.text == f"world: {scenario}: event[1].kill: {reason}\n"
     assert not run.exists()

@@ -4,9 +4,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from tests.recording.flights import record, straight_flight, wedge
+from worldsim.judge.invariants import InvariantTally
 from worldsim.judge.verdict import Judge
 from worldsim.recording.recorder import RunRecorder
 from worldsim.recording.verify import Difference, verify
@@ -29,7 +31,7 @@ def summary_of(judge: Judge) -> dict[str, Any]:
         ],
         "min_separation_m": judge.min_separation_m,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
-        "invariants": judge.invariants(),
+        "invariants": msgspec.to_builtins(judge.invariants()),
         "phases": [
             {
                 "formation": phase.formation.name,
@@ -106,7 +108,7 @@ def test_missing_packets_are_found_in_the_recording(tmp_path: Path) -> None:
     recorder = RunRecorder(tmp_path / "run.rrd", scenario, "leaky", mode="virtual")
     record(recorder, scenario, [*ticks, last])
     verification = verify(tmp_path)
-    assert verification.invariants["I8"] == {"ticks": len(ticks) + 1, "violations": 1}
+    assert verification.invariants["I8"] == InvariantTally(len(ticks) + 1, 1)
     assert verification.exit_status == 1
 
 
@@ -119,7 +121,7 @@ def test_packets_are_judged_from_the_first_counters_on(tmp_path: Path) -> None:
     judge = record(recorder, scenario, ticks)
     (tmp_path / "summary.json").write_text(json.dumps(summary_of(judge)))
     verification = verify(tmp_path)
-    assert verification.invariants["I8"] == {"ticks": len(ticks) - 3, "violations": 0}
+    assert verification.invariants["I8"] == InvariantTally(len(ticks) - 3, 0)
     assert verification.differences == ()
 
 

@@ -90,7 +90,7 @@ def test_late_batches_of_the_radio_are_in_ms(run: FinishedRun) -> None:
 
 
 def test_what_was_not_measured_is_null_and_no_pass(run: FinishedRun) -> None:
-    run.loop.judge.packet_ticks = 0
+    run.loop.judge.invariants()["I8"].ticks = 0
     made = summary(run, medium_counters=None, real_time_factor=float("nan"), mode="processes")
     assert set(made["packets"].values()) == {None}
     assert made["real_time_factor"] is None
@@ -120,7 +120,7 @@ def test_few_late_ticks_leave_a_pass(run: FinishedRun, late: float | None) -> No
 
 
 def test_a_slow_host_does_not_excuse_a_collision(run: FinishedRun) -> None:
-    run.loop.judge.safety_violations = 1
+    run.loop.judge.invariants()["I1"].violations = 1
     made = summary(run, late_tick_fraction=0.5, cut_off_by="interrupted")
     assert (made["outcome"], made["reason"]) == ("fail", "violated: I1")
 

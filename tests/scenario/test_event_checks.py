@@ -1,4 +1,4 @@
-"""A timeline is checked against the fleet that each event will meet; the key at fault is named."""
+"""A timeline is checked against the fleet that each event meets; errors name the key."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ def timeline(*events: str) -> Scenario:
     return load(WEDGE, {"event": f"[{', '.join(f'{{ {event} }}' for event in events)}]"})
 
 
-SOUND = [
+VALID = [
     ["at_s = 5, kill = [2, 'vertex:V1', 'queue:Q1', 'random:2', 'all'], for_s = 3"],
     ["at_s = 5, join = 2", "at_s = 6, kill = [10]", "at_s = 7, restart = ['all', 10]"],
     ["at_s = 5, join = { count = 1, start = { kind = 'box', centre_m = [9, 9, 9] } }"],
@@ -42,13 +42,13 @@ SOUND = [
 ]
 
 
-@pytest.mark.parametrize("events", SOUND)
-def test_what_is_sound_reads_back(events: list[str]) -> None:
+@pytest.mark.parametrize("events", VALID)
+def test_a_valid_timeline_is_equal_after_writing_and_reading(events: list[str]) -> None:
     scenario = timeline(*events)
     assert parse(dump(scenario)) == scenario
 
 
-def test_rows_are_those_at_the_start_and_all_that_join() -> None:
+def test_there_is_a_row_for_each_initial_and_each_joining_agent() -> None:
     assert timeline("at_s = 5, join = 2", "at_s = 1, join = { count = 3 }").rows == 14
 
 
@@ -84,16 +84,16 @@ RADIO = [
 ]
 
 
-@pytest.mark.parametrize(("event", "key", "says"), RADIO, ids=[event for event, _, _ in RADIO])
-def test_what_the_radio_cannot_do_is_refused(event: str, key: str, says: str) -> None:
+@pytest.mark.parametrize(("event", "key", "detail"), RADIO, ids=[event for event, _, _ in RADIO])
+def test_an_invalid_radio_fault_is_rejected(event: str, key: str, detail: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         timeline(f"at_s = 5, {event}")
     assert str(caught.value).startswith(f"{WEDGE}: event[0].{key}: ")
-    assert says in str(caught.value)
+    assert detail in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-BROKEN = [
+INVALID = [
     (["at_s = 5"], "event[0]", "no action; one of kill, leave"),
     (["at_s = 5, kill = [1], leave = [2]"], "event[0].leave", "not beside kill"),
     (["kill = [1]"], "event[0].at_s", "is missing"),
@@ -175,15 +175,17 @@ BROKEN = [
 ]
 
 
-@pytest.mark.parametrize(("events", "key", "says"), BROKEN)
-def test_the_key_at_fault_is_named(events: list[str], key: str, says: str) -> None:
+@pytest.mark.parametrize(("events", "key", "detail"), INVALID)
+def test_an_error_names_the_key_of_an_invalid_event(
+    events: list[str], key: str, detail: str
+) -> None:
     with pytest.raises(ScenarioError) as caught:
         timeline(*events)
     assert str(caught.value).startswith(f"{WEDGE}: {key}")
-    assert says in str(caught.value)
+    assert detail in str(caught.value)
 
 
-def test_more_joiners_than_a_formation_holds_are_refused() -> None:
+def test_a_join_beyond_the_size_of_the_formation_is_rejected() -> None:
     text = f"formation = {PAIR.replace('[3, 0, 0]', '[2, 0, 0]')}\n[fleet]\nagents = 3\n"
     assert parse(text + "[[event]]\nat_s = 1\nkill = [0]\n").rows == 3
     with pytest.raises(ScenarioError) as caught:
@@ -191,14 +193,14 @@ def test_more_joiners_than_a_formation_holds_are_refused() -> None:
     assert "event[0].join: 'pair' has no room for them" in str(caught.value)
 
 
-def test_a_listed_start_has_no_places_for_more() -> None:
+def test_a_join_needs_positions_where_the_start_is_a_list() -> None:
     text = f"formation = {PAIR}\n[fleet]\nagents = 2\n[fleet.start]\nkind = 'list'\n"
     with pytest.raises(ScenarioError) as caught:
         parse(text + "positions_m = [[0, 0, 0], [1, 0, 0]]\n[[event]]\nat_s = 1\njoin = 1\n")
     assert "event[0].join.start: is missing" in str(caught.value)
 
 
-def test_a_file_of_a_later_formation_is_named_itself(tmp_path: Path) -> None:
+def test_an_error_in_a_formation_file_names_that_file(tmp_path: Path) -> None:
     formation = tmp_path / "f.toml"
     formation.write_text("name = 'f'\nvertices = { V1 = [0, 'a', 0] }\nqueue = []\n")
     with pytest.raises(ScenarioError) as caught:

@@ -1,4 +1,4 @@
-"""A sensor that fails by the timeline: what is refused, and what the fleet does about it."""
+"""Sensor faults of the timeline: which are valid, and how the fleet reacts."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ WEDGE = Path("deploy/scenarios/wedge-9.toml")
 
 
 @pytest.mark.parametrize(
-    ("fault", "key", "says"),
+    ("fault", "key", "detail"),
     [
         ("{ agents = [0] }", "sensor.mode", "is missing"),
         ("{ mode = 'silent' }", "sensor.agents", "is missing"),
@@ -23,22 +23,22 @@ WEDGE = Path("deploy/scenarios/wedge-9.toml")
         ("{ agents = ['vertex:X'], mode = 'stuck' }", "sensor.agents[0]", "no vertex 'X'"),
     ],
 )
-def test_a_fault_that_cannot_be_is_refused(fault: str, key: str, says: str) -> None:
+def test_an_invalid_sensor_fault_is_rejected(fault: str, key: str, detail: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         load(WEDGE, {"event": f"[{{ at_s = 1, sensor = {fault} }}]"})
     assert str(caught.value).startswith(f"{WEDGE}: event[0].{key}: ")
-    assert says in str(caught.value)
+    assert detail in str(caught.value)
 
 
 @pytest.mark.parametrize("sensors", ["['proximity']", "['laser', 'sonar']"])
 @pytest.mark.parametrize("mode", ["stuck", "silent", "wrong"])
-def test_nobody_collides_and_it_is_told(mode: str, sensors: str) -> None:
+def test_no_vehicles_collide_and_the_fault_is_reported(mode: str, sensors: str) -> None:
     event = f"[{{ at_s = 1.5, for_s = 2, sensor = {{ agents = [0], mode = '{mode}' }} }}]"
     scenario = load(WEDGE, {"event": event, "vehicle.sensors": sensors, "duration_s": "6"})
     loop = fly(scenario).loop
-    told = [
+    reported = [
         (each.t_s, each.agent, each.mode) for each in loop.events if isinstance(each, SensorChanged)
     ]
-    assert told == [(1.5, 0, mode), (3.5, 0, "works again")]
+    assert reported == [(1.5, 0, mode), (3.5, 0, "works again")]
     assert loop.judge.min_separation_m is not None
     assert loop.judge.min_separation_m >= 0.25

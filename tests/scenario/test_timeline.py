@@ -1,4 +1,4 @@
-"""The timeline by itself: what is due when, and in which order."""
+"""The timeline: when steps are due, and in which order."""
 
 from math import inf
 
@@ -20,7 +20,7 @@ def scenario(*events: str, radio: str = "") -> Scenario:
 
 
 def played(*events: str) -> list[tuple[float, int, object, bool]]:
-    """Return every step: when it comes (asked for each 0.1 s), number, action, whether it ends."""
+    """Return each step: time at which it is due (0.1 s apart), number, action, whether it ends."""
     timeline = Timeline(scenario(*events))
     return [
         (k / 10, step.number, step.event.action, step.ends)
@@ -29,7 +29,7 @@ def played(*events: str) -> list[tuple[float, int, object, bool]]:
     ]
 
 
-def test_each_event_comes_once_at_its_time_whatever_order_the_file_has() -> None:
+def test_each_event_is_due_once_at_its_time_in_any_order_of_the_file() -> None:
     later, sooner = "at_s = 5.0\nkill = [1, 'random:1']", "at_s = 0.3\nleave = ['vertex:V1']"
     assert played(later, sooner) == [
         (0.3, 1, Leave(("vertex:V1",)), False),
@@ -42,7 +42,7 @@ def test_without_events_nothing_is_ever_due() -> None:
     assert played() == []
 
 
-def test_what_became_due_meanwhile_comes_at_once_in_order() -> None:
+def test_steps_that_became_due_since_the_last_call_come_in_order() -> None:
     timeline = Timeline(scenario("at_s = 2\nkill = [0]\nfor_s = 3", "at_s = 4\njoin = 2"))
     assert timeline.due(1.9) == []
     assert timeline.next_s == 2.0

@@ -1,1 +1,1 @@
-"""The slot loop and its clocks: virtual time, and processes with their launcher."""
+"""The engine of a run, pure: slot loop, membership, operations, telemetry, virtual time."""

@@ -4,8 +4,8 @@ Direct links are the paper's N_c,i (Sec. 3.4): they need not grow with the team.
 """
 
 from collections import Counter
-from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,49 +14,55 @@ from netem.messages import MediumCounters
 from netem.wire.channels import CHANNELS
 
 
+class DirectLinks(msgspec.Struct, frozen=True):
+    """Number of neighbours that each agent hears directly; row i = agent i, None without a step."""
+
+    mean: list[float | None]
+    """Over the agent's steps."""
+    most: list[int | None]
+
+
 class RadioUse:
-    """Counts for each row of a fleet; tick_hz: ticks in a second."""
+    """How each agent uses the radio; row i = agent i. tick_hz: ticks per simulated second."""
 
     def __init__(self, rows: int, tick_hz: float) -> None:
         self._tick_hz = tick_hz
-        self._awake_ticks = np.zeros(rows, dtype=np.int64)
+        self._running_ticks = np.zeros(rows, dtype=np.int64)
         self._steps = [0] * rows
         self._links = [0] * rows
         self._most = [0] * rows
 
-    def note(self, agent: int, heard: int) -> None:
-        """Take how many neighbours an agent hears at one of its steps."""
+    def count_step(self, agent: int, neighbours: int) -> None:
+        """Count one step of an agent that hears this many neighbours directly."""
         self._steps[agent] += 1
-        self._links[agent] += heard
-        self._most[agent] = max(self._most[agent], heard)
+        self._links[agent] += neighbours
+        self._most[agent] = max(self._most[agent], neighbours)
 
-    def tick(self, awake: NDArray[np.bool_]) -> None:
-        """Take who takes part at a tick (N,)."""
-        self._awake_ticks += awake
+    def count_tick(self, running: NDArray[np.bool_]) -> None:
+        """Count one tick for the agents that are running (N,)."""
+        self._running_ticks += running
 
-    def links(self) -> dict[str, Any]:
-        """Return direct links of each agent, mean over its steps and most; None without a step."""
-        stepped = list(zip(self._steps, self._links, self._most, strict=True))
-        return {
-            "mean": [links / steps if steps else None for steps, links, _ in stepped],
-            "most": [most if steps else None for steps, _, most in stepped],
-        }
+    def links(self) -> DirectLinks:
+        """Return each agent's direct links."""
+        rows = list(zip(self._steps, self._links, self._most, strict=True))
+        return DirectLinks(
+            mean=[links / steps if steps else None for steps, links, _ in rows],
+            most=[most if steps else None for steps, _, most in rows],
+        )
 
-    def bytes_per_s(
-        self, medium_counters: MediumCounters | None
-    ) -> dict[str, list[float | None]] | None:
-        """Return for each channel what each agent sent in a second of its taking part [bytes/s].
+    def bytes_per_s(self, counters: MediumCounters | None) -> dict[str, list[float | None]] | None:
+        """Return for each channel the payload that each agent sent [bytes/s] while it was running.
 
-        Payloads alone; None where the radio told of nothing.
+        None without counters of the medium.
         """
-        if medium_counters is None or not medium_counters.spoken_b:
+        if counters is None or not counters.sent_b:
             return None
-        seconds = (self._awake_ticks / self._tick_hz).tolist()
+        running_s = (self._running_ticks / self._tick_hz).tolist()
         return {
             name: [
-                spoken / flown_s if flown_s else None
-                for spoken, flown_s in zip(
-                    medium_counters.spoken_b[channel :: len(CHANNELS)], seconds, strict=True
+                sent_b / time_s if time_s else None
+                for sent_b, time_s in zip(
+                    counters.sent_b[channel :: len(CHANNELS)], running_s, strict=True
                 )
             ]
             for channel, name in enumerate(CHANNELS)
@@ -64,18 +70,19 @@ class RadioUse:
 
 
 class RejectionCounters:
-    """Counts by cause, as commands tell them; those of processes that are gone stay counted."""
+    """Messages that agents rejected, by cause; those of ended processes stay counted."""
 
     def __init__(self) -> None:
-        self._told: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
+        self._newest: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
+        """By agent and incarnation: pairs of an index of CAUSES and a count since its start."""
 
-    def note(self, agent: int, command: Command) -> None:
-        """Take what an agent tells of itself."""
-        self._told[agent, command.incarnation] = command.telemetry.rejected
+    def update(self, agent: int, command: Command) -> None:
+        """Take the counts in an agent's command."""
+        self._newest[agent, command.incarnation] = command.telemetry.rejected
 
     def by_cause(self) -> dict[str, int]:
-        """Return how many were refused for which cause, causes in alphabetical order."""
+        """Return the number of rejected messages by cause, causes in alphabetical order."""
         total: Counter[str] = Counter()
-        for told in self._told.values():
-            total.update({CAUSES[index]: count for index, count in told})
+        for counts in self._newest.values():
+            total.update({CAUSES[index]: count for index, count in counts})
         return dict(sorted(total.items()))

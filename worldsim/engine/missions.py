@@ -1,6 +1,6 @@
-"""Missions on their way into the team: each goes to one agent, which spreads it by radio."""
+"""Missions for the team: each is given to one agent, which spreads it by radio."""
 
-from typing import assert_never
+from typing import Literal, assert_never
 
 from agent.codec import encode_formation
 from agent.comms.mission import KEYS_PER_VERSION
@@ -13,10 +13,10 @@ from worldsim.scenario.target_frame import FrameChange, changed_frame, path_of
 
 
 class Missions:
-    """What the team was last asked to form, and the mission that no agent has confirmed yet.
+    """The newest formation and frame, and the mission that no agent has confirmed yet.
 
-    A mission is pending until an agent reports that it flies it, so it outlives the agent that it
-    was given to, and an observation that was lost.
+    A mission is pending until an agent reports that it flies it. So it is not lost with the agent
+    that got it, nor with an observation.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -24,13 +24,15 @@ class Missions:
         self.frame = scenario.frame
         self.pending: Mission | None = None
         self.to: int | None = None
-        """The agent that the pending mission was given to; None: the lowest id."""
+        """The agent that gets the pending mission; None: the running agent with the lowest id."""
         self._issued = 0
+        """The version of the newest mission issued here."""
         self._flown = [0] * scenario.rows
+        """The key of the mission that each agent flies; row i = agent i."""
 
     @property
     def newest(self) -> int:
-        """The version of the newest mission, issued here or reported by an agent."""
+        """The version of the newest mission that was issued here or reported by an agent."""
         return max(self._issued, max(self._flown) // KEYS_PER_VERSION)
 
     def changed(self, change: MissionChange, at_s: float) -> GiveMission:
@@ -38,22 +40,26 @@ class Missions:
         match change:
             case FormationSpec():
                 self.formation = change
-                return GiveMission("formation", self.formation, path_of(self.frame))
+                return self._given("formation")
             case FrameChange():
                 self.frame = changed_frame(self.frame, change, at_s)
-                return GiveMission("frame", self.formation, path_of(self.frame))
+                return self._given("frame")
         assert_never(change)
 
     def issue(self, mission: GiveMission) -> int:
-        """Make a mission pending, newer than any reported so far; return its key."""
+        """Make a mission pending; return its key, which is above all keys reported so far."""
         self._issued = mission.version or self.newest + 1
         self.to = mission.to
         key = self._issued * KEYS_PER_VERSION
-        self.pending = Mission(key, mission.path, encode_formation(mission.formation))
+        formation = encode_formation(mission.formation)
+        self.pending = Mission(key=key, frame=mission.path, formation=formation)
         return key
 
     def report(self, agent: int, key: int) -> None:
-        """Note the mission that an agent flies; 0 for an agent that starts."""
+        """Record the key of the mission that an agent flies; 0 for an agent that starts."""
         self._flown[agent] = key
         if self.pending is not None and key >= self.pending.key:
             self.pending = None
+
+    def _given(self, kind: Literal["formation", "frame"]) -> GiveMission:
+        return GiveMission(kind=kind, formation=self.formation, path=path_of(self.frame))

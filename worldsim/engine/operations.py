@@ -1,7 +1,7 @@
-"""What a clock carries out between slots: events of the timeline, with the agents they mean.
+"""Operations: what a clock carries out between two slots.
 
-Each clock (virtual, lockstep, free-running) matches on :data:`Operation`; a kind that a clock
-forgets fails the type check.
+An operation is a step of the timeline with its selectors resolved to agents. Each clock (virtual,
+lockstep, free-running) matches on :data:`Operation`; a kind without a case fails the type check.
 """
 
 from typing import Literal, NamedTuple
@@ -9,11 +9,12 @@ from typing import Literal, NamedTuple
 from agent.messages import FramePath, Vector
 from agent.qstructure.formation import FormationSpec
 from netem.faults import FaultOrder
-from worldsim.scenario.faults import FailureMode, Selectors
+from worldsim.scenario.faults import FailureMode
+from worldsim.scenario.selectors import Selectors
 
 
 class StartPose(NamedTuple):
-    """Where a vehicle enters the world."""
+    """The pose with which a vehicle enters the world."""
 
     position: Vector
     """[m; world frame]"""
@@ -22,72 +23,86 @@ class StartPose(NamedTuple):
 
 
 class EndProcesses(NamedTuple):
-    """These agents' processes end now."""
+    """End the processes of agents."""
 
     number: int
+    """The event's number."""
     agents: tuple[int, ...]
+    """In ascending order."""
     selectors: Selectors
+    """The event's own, for its report."""
     leaves: bool
-    """Whether their vehicles leave the world too; otherwise they hover."""
+    """Whether the vehicles leave the world too; otherwise they hover."""
 
 
 class PauseProcesses(NamedTuple):
-    """These agents' processes are stopped now."""
+    """Stop the processes of agents."""
 
     number: int
+    """The event's number."""
     agents: tuple[int, ...]
+    """In ascending order."""
     selectors: Selectors
+    """The event's own, for its report."""
 
 
 class ResumeProcesses(NamedTuple):
-    """These agents' stopped processes go on now."""
+    """Continue the stopped processes of agents."""
 
     number: int
+    """The event's number."""
     agents: tuple[int, ...]
+    """In ascending order."""
     selectors: Selectors
+    """The event's own, for its report; empty at the end of a pause."""
 
 
 class StartProcesses(NamedTuple):
-    """These agents' processes start now."""
+    """Start the processes of agents."""
 
     number: int
+    """The event's number."""
     kind: Literal["restart", "join"]
     incarnations: dict[int, int]
-    """Each agent's incarnation."""
+    """The incarnation of each agent that starts."""
     poses: dict[int, StartPose]
-    """Of the agents whose vehicle is not in the world."""
+    """The poses of the agents whose vehicles are not in the world yet."""
     refused: str | None = None
-    """Why no process starts."""
+    """The reason for which no process starts."""
 
 
 class AdmitAgents(NamedTuple):
-    """These agents have booted: they step from now on."""
+    """Let agents step that have booted."""
 
     agents: tuple[int, ...]
+    """In ascending order."""
 
 
 class SetSensorMode(NamedTuple):
-    """These agents' sensors fail, or work again."""
+    """Let sensors of agents fail, or work again."""
 
     number: int
+    """The event's number."""
     agents: tuple[int, ...]
+    """In ascending order."""
     sensor: str | None
-    """Its kind; None: every sensor that they have."""
+    """The sensor's kind; None: every sensor of the agent."""
     mode: FailureMode | None
-    """None: it works again."""
+    """None: the sensor works again."""
 
 
 class GiveMission(NamedTuple):
-    """The team gets a formation, or a frame, by way of one agent."""
+    """Give the team a mission, by way of one agent."""
 
     kind: Literal["formation", "frame"]
-    """What is new."""
+    """The part of the mission that is new."""
     formation: FormationSpec
     path: FramePath
+    """Of the target's frame [world frame]."""
     to: int | None = None
-    """The agent that it is given to; None: the lowest id."""
+    """The agent that gets the mission; None: the running agent with the lowest id."""
     version: int | None = None
-    """The mission's own; None: the next."""
+    """The mission's version; None: the next one."""
 
 
 ProcessOperation = EndProcesses | PauseProcesses | ResumeProcesses | StartProcesses | AdmitAgents

@@ -1,4 +1,6 @@
-"""Where vehicles are put that enter the world after its start."""
+"""Start poses of vehicles that enter the world after its start."""
+
+from typing import assert_never
 
 import numpy as np
 
@@ -11,9 +13,9 @@ from worldsim.truth.vehicle import Floats
 
 
 class Placement:
-    """Draws places from the seed, clear of obstacles and of the vehicles that are present.
+    """Draws poses from the seed, clear of obstacles and of the vehicles in the world.
 
-    Every method takes the positions of all vehicles (N, 3) [m; world frame], NaN for none, and the
+    Every method takes the position of all vehicles (N, 3) [m; world frame], NaN for none, and the
     time [s], and raises StartError where there is no room.
     """
 
@@ -22,11 +24,12 @@ class Placement:
         self._obstacles = Obstacles(scenario.obstacle)
         start = scenario.fleet.start
         self._origins = [(start, index) for index in range(scenario.fleet.agents)]
+        """For each id, the start table that it was placed by and its index there."""
 
     def joiners(
         self, number: int, start: BoxStart | ListStart, count: int, position: Floats, time_s: float
     ) -> list[StartPose]:
-        """Return where so many new vehicles are put by the event of that number."""
+        """Return the poses of the new vehicles of a join event with this number."""
         poses = self._drawn(number, start, count, position, time_s)
         self._origins += [(start, index) for index in range(count)]
         return poses
@@ -34,7 +37,7 @@ class Placement:
     def returning(
         self, number: int, agents: list[int], position: Floats, time_s: float
     ) -> dict[int, StartPose]:
-        """Return where vehicles that left are put: in their listed place, or a new draw."""
+        """Return the poses of vehicles that had left: as listed, or drawn anew from their box."""
         poses: dict[int, StartPose] = {}
         for agent in agents:
             taken = np.array([pose.position for pose in poses.values()]).reshape(-1, 3)
@@ -46,11 +49,14 @@ class Placement:
 
     def _start_of(self, agent: int) -> BoxStart | ListStart:
         start, index = self._origins[agent]
-        if isinstance(start, BoxStart):
-            return start
-        own = slice(index, index + 1)
-        yaws_deg = start.yaws_deg[own] if start.yaws_deg is not None else None
-        return ListStart(positions_m=start.positions_m[own], yaws_deg=yaws_deg)
+        match start:
+            case BoxStart():
+                return start
+            case ListStart(positions_m=positions_m, yaws_deg=yaws_deg):
+                own = slice(index, index + 1)
+                own_yaw_deg = yaws_deg[own] if yaws_deg is not None else None
+                return ListStart(positions_m=positions_m[own], yaws_deg=own_yaw_deg)
+        assert_never(start)
 
     def _drawn(
         self, key: int, start: BoxStart | ListStart, count: int, position: Floats, time_s: float
@@ -59,8 +65,8 @@ class Placement:
             vehicles=position[~np.isnan(position[:, 0])],
             vehicle_m=self._scenario.control.separation_m,
         )
-        where, yaws = start_poses(start, count, self._scenario.seed, clearance, event=key + 1)
+        positions, yaws = start_poses(start, count, self._scenario.seed, clearance, event=key + 1)
         return [
             StartPose((x, y, z), yaw)
-            for (x, y, z), yaw in zip(where.tolist(), yaws.tolist(), strict=True)
+            for (x, y, z), yaw in zip(positions.tolist(), yaws.tolist(), strict=True)
         ]

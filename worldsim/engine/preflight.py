@@ -1,14 +1,14 @@
-"""What a scenario must pass before anything is started, besides its own checks.
+"""Checks of a scenario before a run starts, beside those of its file.
 
-A start with room for everybody, a controller that can be had, vehicles that the safety filter can
-hold under the clock in question.
+The start has room for all vehicles, the controller can be loaded, and the safety filter can keep
+the vehicles apart under the run's clock.
 """
 
 from pathlib import Path
 
 from agent.controller import ControllerError
 from agent.controller import load as load_controller
-from worldsim.scenario.events import ON_PROCESSES
+from worldsim.scenario.faults import ProcessFault
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.rules import speed_problem
 from worldsim.scenario.tables import Scenario
@@ -17,33 +17,34 @@ from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.start_positions import StartError, start_poses_of
 
 VIRTUAL_COMMAND_TICKS = 1
-"""Life of a command in virtual time and in lockstep, where none is late [ticks]."""
+"""Lifetime of a command in virtual time and in lockstep, where none is late [ticks]."""
 PROCESS_COMMAND_TICKS = 2
-"""Life of a command in free-running processes [ticks]; H of docs/method.md follows from it."""
+"""Lifetime of a command of free-running processes [ticks]; H of docs/method.md."""
 
 
 def admit(scenario: Scenario, file: str | Path, command_ticks: int, by_hand: bool = False) -> None:
-    """Raise ScenarioError if a scenario cannot be flown where a command lives that long.
+    """Raise ScenarioError where a scenario cannot be flown.
 
-    by_hand: whether every process is started by hand, so that none can be stopped by a timeline.
+    command_ticks: lifetime of a command under the run's clock. by_hand: the processes are started
+    by hand, so that events on processes cannot be carried out.
     """
-    broken = (
+    problem = (
         speed_problem(scenario, command_ticks)
         or (_launcher(scenario) if by_hand else None)
         or _controller(scenario)
         or _room(scenario)
     )
-    if broken is not None:
-        raise ScenarioError(file, *broken)
+    if problem is not None:
+        raise ScenarioError(file, *problem)
 
 
 def _launcher(scenario: Scenario) -> Problem | None:
-    """Say which event needs somebody who starts and ends processes."""
+    """Return a problem for the first event that needs a launcher."""
     for index, event in enumerate(scenario.event):
-        if event.kind in ON_PROCESSES:
+        if isinstance(event.action, ProcessFault):
             return Problem(
                 f"event[{index}].{event.kind}",
-                "needs the launcher (qswarm run): who is started by hand is ended by hand",
+                "needs the launcher (qswarm run): processes started by hand are ended by hand",
             )
     return None
 
@@ -54,7 +55,7 @@ def _controller(scenario: Scenario) -> Problem | None:
         load_controller(name)
     except ControllerError as error:
         return Problem("control.controller", str(error))
-    except Exception as error:  # the user's module may raise anything while it is imported
+    except Exception as error:  # importing the user's module may raise anything
         return Problem(
             "control.controller", f"{name!r} cannot be imported: {type(error).__name__}: {error}"
         )

@@ -1,6 +1,6 @@
-"""The life of an agent's process: every state, every transition, in one table.
+"""The life of an agent's process: its states and transitions, in one table.
 
-Everything that changes a process's state goes through :func:`next_state`. The diagram in
+Every change of a process's state goes through :func:`next_state`. The diagram in
 docs/architecture.md is :func:`diagram` of this table.
 """
 
@@ -9,31 +9,31 @@ from typing import Literal
 
 
 class State(Enum):
-    """What an agent's process is, and with it the agent's vehicle."""
+    """The state of an agent's process."""
 
     ABSENT = "absent"
-    """It has not joined yet: there is no process and no vehicle."""
+    """The agent has not joined yet: it has no process and no vehicle."""
     BOOTING = "booting"
-    """It was started, and does not step until boot_s has passed."""
+    """The process was started; the agent does not step until boot_s has passed."""
     RUNNING = "running"
-    """It steps."""
+    """The agent steps."""
     PAUSED = "paused"
-    """It is stopped; its vehicle hovers once the last command has expired."""
+    """The process is stopped; the vehicle hovers when the last command has expired."""
     DEAD = "dead"
-    """It has ended; its vehicle hovers."""
+    """The process has ended; the vehicle hovers."""
     GONE = "gone"
-    """It has ended, and its vehicle has left the world."""
+    """The process has ended, and the vehicle has left the world."""
 
 
 Cause = Literal["join", "boot", "pause", "resume", "kill", "leave", "restart", "exit"]
-"""What changes a state; exit: the process ended unplanned."""
+"""The cause of a transition; exit: the process ended unplanned."""
 
 ALIVE = frozenset({State.RUNNING, State.PAUSED})
-"""States in which the process can be signalled and holds its place in the team."""
+"""States in which the agent has a radio and a place in the team."""
 STARTED = ALIVE | {State.BOOTING}
-"""States in which a process exists, or is about to."""
+"""States in which the process exists or is being started."""
 ENDED = frozenset({State.DEAD, State.GONE})
-"""States from which an agent can come back."""
+"""States from which the agent can restart."""
 KNOWN = STARTED | ENDED
 """States of agents that have an id."""
 
@@ -51,11 +51,11 @@ TRANSITIONS: dict[tuple[State, Cause], State] = {
 
 
 class TransitionError(RuntimeError):
-    """A change of a process's state that the table does not have."""
+    """A transition that is not in the table."""
 
 
 def next_state(state: State, cause: Cause) -> State:
-    """Return the state after a cause. Raises TransitionError where the table has none."""
+    """Return the state after a cause. Raises TransitionError where the table has no row."""
     try:
         return TRANSITIONS[state, cause]
     except KeyError:

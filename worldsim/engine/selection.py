@@ -1,31 +1,45 @@
-"""Which agents a selector means, at the moment when its event happens."""
+"""Selectors: the agents that they select at the time of their event."""
 
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 import numpy as np
 
 from agent.messages import Place
 from agent.qstructure.formation import Formation
-from worldsim.scenario.faults import Selectors
+from worldsim.scenario.selectors import (
+    AllAgents,
+    OneAgent,
+    QueueAgents,
+    RandomAgents,
+    Selector,
+    Selectors,
+    VertexAgent,
+    parsed,
+)
 
 RANDOM_KEY = 0xFA17
 
 
 class Claims(NamedTuple):
-    """The place that each agent last claimed, in a formation."""
+    """The places that agents claim in a formation, as last reported."""
 
     places: list[tuple[int, int] | None]
     """Queue and rank; row i = agent i."""
     formation: Formation
 
-    def holders(self, selector: str, among: list[int]) -> list[int]:
-        """Return the agents that hold the vertex, or a place of the queue, of that name."""
-        word, _, name = selector.partition(":")
-        held = [(agent, Place(*place)) for agent in among if (place := self.places[agent])]
-        if word == "vertex":
-            return [agent for agent, place in held if place == self.formation.vertex_places[name]]
+    def of_vertex(self, name: str, agents: list[int]) -> list[int]:
+        """Return those of the agents that claim a vertex."""
+        vertex = self.formation.vertex_places[name]
+        return [agent for agent, place in self._claimed(agents) if place == vertex]
+
+    def of_queue(self, name: str, agents: list[int]) -> list[int]:
+        """Return those of the agents that claim a place of a queue."""
         index = [queue.name for queue in self.formation.queues].index(name)
-        return [agent for agent, place in held if index in self.formation.queues_of(place)]
+        queues_of = self.formation.queues_of
+        return [agent for agent, place in self._claimed(agents) if index in queues_of(place)]
+
+    def _claimed(self, agents: list[int]) -> list[tuple[int, Place]]:
+        return [(agent, Place(*place)) for agent in agents if (place := self.places[agent])]
 
 
 class Candidates(NamedTuple):
@@ -34,28 +48,38 @@ class Candidates(NamedTuple):
     agents: list[int]
     """In ascending order."""
     running: list[int]
-    """Those of them that step, and so hold the place they claim."""
+    """Those of them that are running, and so hold the place that they claim."""
 
 
 def selected(
     selectors: Selectors, candidates: Candidates, claims: Claims, key: tuple[int, int]
 ) -> tuple[int, ...]:
-    """Return the candidates that any selector means, in ascending order.
+    """Return the candidates that the selectors select, in ascending order.
 
-    key: the run's seed and the event's number, by which random ones are drawn.
+    key: the run's seed and the event's number, for random draws.
     """
     chosen: set[int] = set()
     for selector in selectors:
-        if isinstance(selector, int):
-            chosen.add(selector)
-        elif selector == "all":
-            chosen.update(candidates.agents)
-        elif selector.startswith("random:"):
-            count = int(selector.removeprefix("random:"))
-            chosen.update(_drawn(count, candidates.agents, key))
-        else:
-            chosen.update(claims.holders(selector, candidates.running))
+        chosen.update(_selected(selector, candidates, claims, key))
     return tuple(agent for agent in candidates.agents if agent in chosen)
+
+
+def _selected(
+    selector: Selector, candidates: Candidates, claims: Claims, key: tuple[int, int]
+) -> list[int]:
+    kind = parsed(selector)
+    match kind:
+        case OneAgent(agent):
+            return [agent]
+        case AllAgents():
+            return candidates.agents
+        case RandomAgents(number):
+            return _drawn(number, candidates.agents, key)
+        case VertexAgent(name):
+            return claims.of_vertex(name, candidates.running)
+        case QueueAgents(name):
+            return claims.of_queue(name, candidates.running)
+    assert_never(kind)
 
 
 def _drawn(count: int, agents: list[int], key: tuple[int, int]) -> list[int]:

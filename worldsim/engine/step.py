@@ -1,8 +1,8 @@
-"""The slot loop, the same under every clock: what is due, what is observed, what is judged.
+"""The slot loop, the same under every clock: operations, observations, commands, judging.
 
-Before a slot a clock carries out each operation that is ``due`` and has it ``apply``. It calls
-``open`` at the start of a slot, brings the observations to the agents and their commands back to
-``obey``, and calls ``close``. How messages travel is the clock's.
+Before a slot, a clock carries out each operation that is ``due`` and calls ``apply`` with it. At
+the start of the slot it calls ``open``; it takes the observations to the agents and their commands
+to ``apply_command``, and then calls ``close``. The clock decides how messages travel.
 """
 
 from collections.abc import Callable, Iterable
@@ -15,7 +15,7 @@ import numpy as np
 from agent.messages import Command, Observation, Vector
 from worldsim.engine.counters import RadioUse, RejectionCounters
 from worldsim.engine.operations import Operation, StartProcesses
-from worldsim.engine.telemetry import NO_TELEMETRY, telemetry_row, tick_of
+from worldsim.engine.telemetry import FleetTelemetry
 from worldsim.engine.timeline_effects import TimelineEffects
 from worldsim.engine.trace import Trace
 from worldsim.judge.run_events import By, QueueChanged, RoleChanged, RunEvent, SlotChanged
@@ -31,27 +31,29 @@ from worldsim.truth.world import Clock, World
 
 
 class Recorder(Protocol):
-    """Keeps what a run showed. It must never fail the run: it reports its own troubles."""
+    """Records a run. It must not raise: it reports its own failures."""
 
     @property
-    def shows(self) -> bool:
-        """Whether it keeps ticks; only then are links and tiers gathered, which are only shown."""
+    def records_ticks(self) -> bool:
+        """Whether it records ticks; only then are links and the hierarchy gathered."""
 
     def tick(self, tick: Tick, figures: Figures) -> None:
-        """Keep one tick."""
+        """Record one tick."""
 
     def event(self, event: RunEvent) -> None:
-        """Keep one event."""
+        """Record one event."""
 
 
-class Opened(msgspec.Struct, frozen=True, gc=False):
-    """A slot as it begins: the truth for the medium, an observation for each agent that steps."""
+class OpenSlot(msgspec.Struct, frozen=True, kw_only=True, gc=False):
+    """The start of a slot: the truth for the medium, an observation for each agent that steps."""
 
     slot: int
     time_s: float
+    """[s; simulated time]"""
     positions: tuple[Vector | None, ...]
-    """Of the radios [m; world frame]; None for an agent whose process is not alive."""
+    """Row i = agent i's radio [m; world frame]; None where its process is not alive."""
     observations: list[tuple[int, Observation]]
+    """(agent, observation), agents in ascending order."""
 
 
 def world_of(scenario: Scenario, command_ticks: int) -> World:
@@ -75,9 +77,9 @@ def world_of(scenario: Scenario, command_ticks: int) -> World:
 
 
 class SlotLoop:
-    """Steps a world slot by slot, and shows every tick to the judge and the recorder.
+    """Steps a world slot by slot, and passes every tick to the judge and the recorder.
 
-    ``packets`` is asked once a tick for the medium's counters.
+    packets: returns the medium's packet counters; called once a tick.
     """
 
     def __init__(
@@ -91,70 +93,79 @@ class SlotLoop:
         self.judge = Judge(scenario)
         self.trace = Trace()
         self.events: list[RunEvent] = []
+        """Every event so far, in order."""
         self.figures: Figures | None = None
+        """Of the last tick; None before the first."""
         self.effects = TimelineEffects(scenario, world, self.emit)
         self.members = self.effects.members
         self.network = self.effects.network
         self.radio_use = RadioUse(scenario.rows, scenario.fleet.tick_hz)
         self.rejections = RejectionCounters()
         self._recorder = recorder
-        self._shows = recorder is not None and recorder.shows
+        self._records_ticks = recorder is not None and recorder.records_ticks
         self._packets = packets
-        self._headings = world.vehicles.yaw.tolist()
-        self._telemetry = [NO_TELEMETRY] * scenario.rows
+        self._headings: list[float] = world.vehicles.yaw.tolist()
+        """The yaw that each agent last observed [rad; world frame]."""
+        self._telemetry = FleetTelemetry(scenario.rows)
 
     def due(self) -> Iterable[Operation]:
-        """Return what is to happen before this slot; carry out and ``apply`` each in turn."""
+        """Return the operations before this slot; carry out and ``apply`` each before the next."""
         return () if self.effects.nothing_due() else self.effects.due()
 
     def apply(self, operation: Operation, by: By = None) -> None:
-        """Apply an operation that was carried out, and report it as asked for ``by``."""
+        """Apply an operation that was carried out, and report its events, requested ``by``."""
         self.effects.apply(operation, by)
         if isinstance(operation, StartProcesses):
             for agent in operation.incarnations:
-                self._telemetry[agent] = NO_TELEMETRY
+                self._telemetry.forget(agent)
 
-    def open(self) -> Opened:
-        """Begin the present slot; at a tick, judge and record it first."""
+    def open(self) -> OpenSlot:
+        """Begin the present slot; at the start of a tick, judge and record the tick first."""
         world = self.world
         self.trace.poses(world.slot, world.vehicles)
         if world.slot % world.clock.slots_per_tick == 0:
-            self._see_tick()
-        slots, awake = world.clock.slots_per_tick, self.members.awake.tolist()
-        group = [agent for agent in range(world.slot % slots, len(awake), slots) if awake[agent]]
+            self._judge_tick()
+        slots, running = world.clock.slots_per_tick, self.members.running.tolist()
+        rows = range(world.slot % slots, len(running), slots)
+        group = [agent for agent in rows if running[agent]]
         observations = list(zip(group, world.observe(group), strict=True)) if group else []
         for agent, observation in observations:
             self._headings[agent] = observation.yaw
         if self.effects.missions.pending is not None:
             observations = [self._with_mission(*each) for each in observations]
-        return Opened(world.slot, world.time_s, self._radios(), observations)
+        return OpenSlot(
+            slot=world.slot,
+            time_s=world.time_s,
+            positions=self._radios(),
+            observations=observations,
+        )
 
-    def obey(self, agent: int, command: Command, encoded: bytes) -> None:
-        """Take one agent's command; under a barrier, in order of ids."""
+    def apply_command(self, agent: int, command: Command, encoded: bytes) -> None:
+        """Apply an agent's command; in lockstep and virtual time, agents in ascending order."""
         if self.world.accept(agent, command):
             self.trace.command(agent, encoded)
             telemetry = command.telemetry
-            self._telemetry[agent] = telemetry_row(telemetry, self._headings[agent])
-            self.radio_use.note(agent, len(telemetry.heard))
+            self._telemetry.update(agent, telemetry, self._headings[agent])
+            self.radio_use.count_step(agent, len(telemetry.heard))
             self.effects.missions.report(agent, telemetry.mission)
-            self._see_place(agent, telemetry.place)
+            self._report_place(agent, telemetry.place)
             if telemetry.rejected:
-                self.rejections.note(agent, command)
+                self.rejections.update(agent, command)
 
     def close(self, digest: bytes) -> None:
-        """End the slot with the medium's digest: the vehicles fly through it."""
+        """End the slot: move the vehicles. digest: the medium's hash over all verdicts."""
         self.trace.verdicts(digest)
         self.world.advance()
 
     def finish(self) -> None:
         """Judge and record the last tick, at the end of the run."""
         if self.world.slot % self.world.clock.slots_per_tick == 0:
-            self._see_tick()
+            self._judge_tick()
 
     def emit(self, event: RunEvent) -> None:
-        """Keep an event, and show it to the judge and the recorder."""
+        """Append an event, and pass it to the judge and the recorder."""
         self.events.append(event)
-        self.judge.note(event)
+        self.judge.handle_event(event)
         if self._recorder is not None:
             self._recorder.event(event)
 
@@ -166,14 +177,17 @@ class SlotLoop:
         return agent, msgspec.structs.replace(observation, orders=(mission,))
 
     def _radios(self) -> tuple[Vector | None, ...]:
+        """Return the position of each agent's radio; None where its process is not alive."""
         positions = self.world.positions()
-        if self.members.whole:
+        if self.members.all_alive:
             return positions
         alive = self.members.alive.tolist()
-        return tuple(where if here else None for where, here in zip(positions, alive, strict=True))
+        return tuple(
+            position if lives else None for position, lives in zip(positions, alive, strict=True)
+        )
 
-    def _see_place(self, agent: int, now: tuple[int, int] | None) -> None:
-        """Report what changes with the place that an agent claims."""
+    def _report_place(self, agent: int, now: tuple[int, int] | None) -> None:
+        """Emit events for a change of the place that an agent claims."""
         before = self.effects.places[agent]
         if now == before:
             return
@@ -187,12 +201,14 @@ class SlotLoop:
                 RoleChanged(t_s=t_s, agent=agent, role="vertex" if _is_vertex(now) else "member")
             )
 
-    def _see_tick(self) -> None:
-        awake = self.members.awake
-        self.radio_use.tick(awake)
-        tick = tick_of(self.world, self._telemetry, awake, self._shows, self._packets())
+    def _judge_tick(self) -> None:
+        """Judge and record the present tick."""
+        running = self.members.running
+        self.radio_use.count_tick(running)
+        packets = self._packets()
+        tick = self._telemetry.tick(self.world, running, self._records_ticks, packets)
         self.figures = self.judge.see(tick)
-        if self._recorder is not None and self._shows:
+        if self._recorder is not None and self._records_ticks:
             self._recorder.tick(tick, self.figures)
 
 

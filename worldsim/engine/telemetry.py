@@ -1,8 +1,7 @@
-"""What agents told of their reasons, and beside the truth as rows of a tick."""
+"""The newest telemetry of each agent, and the tick that truth and telemetry make together."""
 
 from math import atan2, degrees, hypot, nan, pi
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,78 +10,98 @@ from worldsim.judge.tick import HierarchyRows, Packets, Tick
 from worldsim.truth.world import World
 
 MOVING_MPS = 0.02
+"""A slower step has no azimuth [m/s]."""
+NO_TARGET = (nan, nan, nan)
+NO_PLACE = (-1, -1)
 NO_LINKS: NDArray[np.int32] = np.zeros((0, 2), dtype=np.int32)
+NO_TELEMETRY = Telemetry(
+    wanted=(0.0, 0.0, 0.0),
+    force=nan,
+    target=None,
+    place=None,
+    heard=(),
+    rejected=(),
+    mission=0,
+    tier=-1,
+    parent=-1,
+    role=-1,
+    record_age_s=nan,
+)
+"""The row of an agent that has sent none."""
 
 
-class TelemetryRow(msgspec.Struct, frozen=True, gc=False):
-    """What an agent last told of its reasons, as a row of a tick; see Telemetry and Tick."""
+class FleetTelemetry:
+    """The newest telemetry of each agent; row i = agent i."""
 
-    target: Vector
-    place: tuple[int, int]
-    force: float
-    turn_deg: float
-    heard: tuple[int, ...]
-    mission: int
-    tier: int
-    parent: int
-    role: int
-    record_age_s: float
+    def __init__(self, rows: int) -> None:
+        self._newest = [NO_TELEMETRY] * rows
+        self._turn_deg = [nan] * rows
 
+    def update(self, agent: int, telemetry: Telemetry, heading: float) -> None:
+        """Keep an agent's telemetry; heading: the yaw that it observed [rad; world frame]."""
+        self._newest[agent] = telemetry
+        self._turn_deg[agent] = _turn_deg(telemetry.wanted, heading)
 
-NO_TELEMETRY = TelemetryRow((nan, nan, nan), (-1, -1), nan, nan, (), 0, -1, -1, -1, nan)
+    def forget(self, agent: int) -> None:
+        """Drop the telemetry of an agent's earlier incarnation."""
+        self._newest[agent] = NO_TELEMETRY
+        self._turn_deg[agent] = nan
 
+    def tick(
+        self, world: World, running: NDArray[np.bool_], recorded: bool, packets: Packets
+    ) -> Tick:
+        """Return the present tick; agents that are not running have no telemetry in it.
 
-def telemetry_row(telemetry: Telemetry, heading: float) -> TelemetryRow:
-    """Return an agent's telemetry as its row; heading: what it observed as its own [rad]."""
-    return TelemetryRow(
-        telemetry.target or NO_TELEMETRY.target,
-        telemetry.place or NO_TELEMETRY.place,
-        telemetry.force,
-        _turn_deg(telemetry.wanted, heading),
-        telemetry.heard,
-        telemetry.mission,
-        telemetry.tier,
-        telemetry.parent,
-        telemetry.role,
-        telemetry.record_age_s,
-    )
+        running: (N,). recorded: also fill links and hierarchy, which are recorded and not judged.
+        """
+        rows, turns_deg = self._rows(running)
+        reasons = np.array(
+            [
+                (*(row.target or NO_TARGET), row.force, turn_deg)
+                for row, turn_deg in zip(rows, turns_deg, strict=True)
+            ],
+            dtype=np.float32,
+        )
+        return Tick(
+            index=world.slot // world.clock.slots_per_tick,
+            time_s=world.time_s,
+            position=world.vehicles.position.astype(np.float32),
+            attitude=_attitude(world),
+            target=reasons[:, :3],
+            place=np.array([row.place or NO_PLACE for row in rows], dtype=np.int16),
+            force=reasons[:, 3],
+            turn_deg=reasons[:, 4],
+            alive=running.copy(),
+            mission=np.array([row.mission for row in rows], dtype=np.int64),
+            links=_links(rows) if recorded else NO_LINKS,
+            packets=packets,
+            hierarchy=_hierarchy_rows(rows) if recorded else None,
+        )
 
-
-def tick_of(
-    world: World, told: list[TelemetryRow], awake: NDArray[np.bool_], shown: bool, packets: Packets
-) -> Tick:
-    """Return the present tick; shown: with what is recorded and not judged, links first of all.
-
-    awake (N,): who steps; the others tell nothing.
-    """
-    rows = [row if up else NO_TELEMETRY for row, up in zip(told, awake.tolist(), strict=True)]
-    fleet = world.vehicles
-    reasons = np.array([(*row.target, row.force, row.turn_deg) for row in rows], dtype=np.float32)
-    attitude = np.empty((len(rows), 3), dtype=np.float32)
-    attitude[:, 0], attitude[:, 1:] = fleet.yaw, fleet.tilt
-    return Tick(
-        index=world.slot // world.clock.slots_per_tick,
-        time_s=world.time_s,
-        position=fleet.position.astype(np.float32),
-        attitude=attitude,
-        target=reasons[:, :3],
-        place=np.array([row.place for row in rows], dtype=np.int16),
-        force=reasons[:, 3],
-        turn_deg=reasons[:, 4],
-        alive=awake.copy(),
-        mission=np.array([row.mission for row in rows], dtype=np.int64),
-        links=_links(rows) if shown else NO_LINKS,
-        packets=packets,
-        hierarchy=_hierarchy_rows(rows) if shown else None,
-    )
+    def _rows(self, running: NDArray[np.bool_]) -> tuple[list[Telemetry], list[float]]:
+        """Return the telemetry and the turn [deg] of each agent that is running."""
+        if running.all():
+            return self._newest, self._turn_deg
+        up = running.tolist()
+        return (
+            [row if runs else NO_TELEMETRY for row, runs in zip(self._newest, up, strict=True)],
+            [turn if runs else nan for turn, runs in zip(self._turn_deg, up, strict=True)],
+        )
 
 
-def _links(rows: list[TelemetryRow]) -> NDArray[np.int32]:
-    pairs = [(row, other) for row, each in enumerate(rows) for other in each.heard]
+def _attitude(world: World) -> NDArray[np.float32]:
+    attitude = np.empty((len(world.vehicles.yaw), 3), dtype=np.float32)
+    attitude[:, 0], attitude[:, 1:] = world.vehicles.yaw, world.vehicles.tilt
+    return attitude
+
+
+def _links(rows: list[Telemetry]) -> NDArray[np.int32]:
+    """Return (hearer, heard) pairs (L, 2)."""
+    pairs = [(hearer, heard) for hearer, row in enumerate(rows) for heard in row.heard]
     return np.array(pairs, dtype=np.int32).reshape(-1, 2)
 
 
-def _hierarchy_rows(rows: list[TelemetryRow]) -> HierarchyRows:
+def _hierarchy_rows(rows: list[Telemetry]) -> HierarchyRows:
     return HierarchyRows(
         tier=np.array([row.tier for row in rows], dtype=np.int16),
         parent=np.array([row.parent for row in rows], dtype=np.int32),
@@ -94,6 +113,6 @@ def _hierarchy_rows(rows: list[TelemetryRow]) -> HierarchyRows:
 def _turn_deg(wanted: Vector, heading: float) -> float:
     """Return the wanted turn [deg] in (-180, 180]; NaN for a step too slow to have an azimuth."""
     if hypot(wanted[0], wanted[1]) <= MOVING_MPS:
-        return float("nan")
+        return nan
     turn = atan2(wanted[1], wanted[0]) - heading
     return degrees(turn - 2.0 * pi * round(turn / (2.0 * pi)))

@@ -1,11 +1,11 @@
-"""From a step of the timeline to an operation, and from an operation to its effects and events.
+"""The timeline's effects: from a step to an operation, and from an operation to state and events.
 
-A clock asks for the operations that are due, carries each out on its processes and its medium, and
-then has it applied here: to the members, the radio's conditions, the sensors and the missions.
+A clock takes the operations that are due and carries each out on its processes and its medium.
+Then it is applied here: to the members, the radio's conditions, the sensors and the missions.
 """
 
 from collections.abc import Callable, Iterator
-from typing import assert_never
+from typing import Literal, assert_never
 
 from agent.qstructure.formation import Formation, FormationSpec
 from netem.conditions import NetworkConditions
@@ -57,7 +57,7 @@ Emit = Callable[[RunEvent], None]
 
 
 class TimelineEffects:
-    """What the timeline and an operator have done to a fleet so far."""
+    """The effects of the timeline and of an operator on a fleet."""
 
     def __init__(self, scenario: Scenario, world: World, emit: Emit) -> None:
         self.timeline = Timeline(scenario)
@@ -65,7 +65,7 @@ class TimelineEffects:
         self.network = NetworkConditions(scenario.netem)
         self.missions = Missions(scenario)
         self.places: list[tuple[int, int] | None] = [None] * scenario.rows
-        """What each agent claims, as it last reported; row i = agent i."""
+        """The place (queue, rank) that each agent claims, as last reported; row i = agent i."""
         self._spacing_m = scenario.control.spacing_m
         self._formation = Formation(scenario.formation, self._spacing_m)
         self._world = world
@@ -73,31 +73,35 @@ class TimelineEffects:
 
     @property
     def addressee(self) -> int | None:
-        """The agent that gets the pending mission: the one it is for, else the lowest id."""
+        """The agent that gets the pending mission.
+
+        If the mission's own agent is not running, the running agent with the lowest id.
+        """
         to = self.missions.to
-        return to if to is not None and self.members.awake[to] else self.members.first
+        running = to is not None and self.members.running[to]
+        return to if running else self.members.first_running
 
     def due(self) -> Iterator[Operation]:
-        """Yield what is to happen before the present slot; apply each before taking the next."""
+        """Yield the operations before the present slot; apply each before taking the next."""
         time_s = self._world.time_s
         for step in self.timeline.due(time_s):
             operation = self.operation(step)
             if operation is not None:
                 yield operation
         if self.members.next_boot_s <= time_s + SLACK_S:
-            yield self.members.booted(time_s)
+            yield self.members.admission(time_s)
 
     def nothing_due(self) -> bool:
-        """Return whether nothing is to happen before the present slot."""
+        """Return whether no operation is due before the present slot."""
         next_s = min(self.timeline.next_s, self.members.next_boot_s)
         return next_s > self._world.time_s + SLACK_S
 
     def operation(self, step: Step) -> Operation | None:
-        """Return what a step means now; None where it has nothing to do or to undo."""
+        """Return the operation of a step now; None where there is nothing to do or to undo."""
         action, number = step.event.action, step.number
         match action:
             case Conditions() | Partition() | Jam() | Flap() | Heal():
-                return self._order(step, action)
+                return self._fault_order(step, action)
             case Kill() | Leave() | Restart() | Pause() | Resume() | Join():
                 return self._process_operation(step, action)
             case SensorFault():
@@ -130,29 +134,30 @@ class TimelineEffects:
             case _:
                 assert_never(operation)
 
-    def exited(self, agent: int, signal: int | None, status: int | None) -> None:
-        """Note that an agent's process ended unplanned, by a signal or with a status."""
-        self.members.exited(agent)
+    def record_exit(self, agent: int, signal: int | None, status: int | None) -> None:
+        """Record that an agent's process ended unplanned, by a signal or with a status."""
+        self.members.record_exit(agent)
         self._emit(Killed(t_s=self._t_s, agent=agent, planned=False, signal=signal, status=status))
 
     @property
     def _t_s(self) -> float:
+        """The time of an event that happens now [s]."""
         return round(self._world.time_s, 6)
 
     @property
     def _claims(self) -> Claims:
         return Claims(self.places, self._formation)
 
-    def _order(self, step: Step, fault: RadioFault) -> FaultOrder | None:
+    def _fault_order(self, step: Step, fault: RadioFault) -> FaultOrder | None:
         event = None if step.ends else RadioEvent.of(fault)
-        order = FaultOrder(step.number, step.at_s, event)
+        order = FaultOrder(number=step.number, at_s=step.at_s, event=event)
         return None if step.ends and not self.network.ends(order) else order
 
     def _process_operation(self, step: Step, fault: ProcessFault) -> Operation | None:
         position, time_s = self._world.vehicles.position, self._world.time_s
         if step.ends:
-            return self.members.ended(step.number, fault, position, time_s)
-        return self.members.begun(step.number, fault, self._claims, position, time_s)
+            return self.members.end_operation(step.number, fault, position, time_s)
+        return self.members.begin_operation(step.number, fault, self._claims, position, time_s)
 
     def _end(self, operation: EndProcesses, by: By) -> None:
         self.members.apply(operation, self._world.time_s)
@@ -167,18 +172,18 @@ class TimelineEffects:
         operation: EndProcesses | PauseProcesses | ResumeProcesses,
         by: By,
     ) -> None:
-        """Emit an event for each agent, or one that says that the selectors meant none."""
+        """Emit an event for each agent, or one event where the selectors select none."""
         for agent in operation.agents:
             self._emit(event(t_s=self._t_s, agent=agent, planned=True, by=by))
         if not operation.agents:
-            nobody = operation.selectors
-            self._emit(event(t_s=self._t_s, agent=None, planned=True, by=by, nobody=nobody))
+            selectors = operation.selectors
+            self._emit(event(t_s=self._t_s, agent=None, planned=True, by=by, nobody=selectors))
 
     def _start(self, operation: StartProcesses, by: By) -> None:
         self.members.apply(operation, self._world.time_s)
         for agent, pose in operation.poses.items():
             self._world.enter(agent, pose.position, pose.yaw)
-        event = Restarted if operation.kind == "restart" else Joined
+        event = _start_event(operation.kind)
         for agent, incarnation in operation.incarnations.items():
             self.places[agent] = None
             self.missions.report(agent, 0)
@@ -202,7 +207,7 @@ class TimelineEffects:
     def _give(self, mission: GiveMission, by: By) -> None:
         key = self.missions.issue(mission)
         self._formation = Formation(mission.formation, self._spacing_m)
-        event = FormationGiven if mission.kind == "formation" else FrameGiven
+        event = _mission_event(mission.kind)
         self._emit(
             event(
                 t_s=self._t_s,
@@ -215,3 +220,21 @@ class TimelineEffects:
                 tables=mission.formation,
             )
         )
+
+
+def _start_event(kind: Literal["restart", "join"]) -> type[Restarted | Joined]:
+    match kind:
+        case "restart":
+            return Restarted
+        case "join":
+            return Joined
+    assert_never(kind)
+
+
+def _mission_event(kind: Literal["formation", "frame"]) -> type[FormationGiven | FrameGiven]:
+    match kind:
+        case "formation":
+            return FormationGiven
+        case "frame":
+            return FrameGiven
+    assert_never(kind)

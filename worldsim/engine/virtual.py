@@ -1,7 +1,7 @@
-"""The virtual clock: the whole fleet in one process, as fast as the host allows.
+"""Virtual time: the whole fleet in one process, as fast as the host allows.
 
-The same agents, medium and world as in processes, driven by the same slot loop. Every message
-still crosses its codec; payloads that several agents hear are decoded once.
+The agents, the medium and the world are those of the processes, driven by the same slot loop. Every
+message is encoded and decoded; a payload that several agents hear is decoded once.
 """
 
 from collections import deque
@@ -36,11 +36,12 @@ from worldsim.engine.operations import (
     StartProcesses,
 )
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
-from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
+from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
 from worldsim.judge.run_events import RunEvent
 from worldsim.scenario.tables import Scenario
 
 PROGRESS_EVERY_S = 0.5
+"""[s; wall time]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +51,11 @@ class Flight:
     loop: SlotLoop
     medium_counters: MediumCounters
     rejected: int
+    """Messages that agents rejected."""
     wall_s: float
+    """Wall time [s]."""
     cpu_s: float
+    """CPU time of this process [s]."""
 
 
 class VirtualFleet:
@@ -62,7 +66,7 @@ class VirtualFleet:
         self._scenario = scenario
         self._medium = Medium(scenario.medium_setup())
         self._decoders = decoders
-        self._agents = {agent: self._started(agent, 0) for agent in range(scenario.fleet.agents)}
+        self._agents = {agent: self._new_agent(agent, 0) for agent in range(scenario.fleet.agents)}
         self._inboxes = [deque[bytes](maxlen=BATCH_RING) for _ in range(scenario.rows)]
         self.loop = SlotLoop(
             scenario, world_of(scenario, VIRTUAL_COMMAND_TICKS), recorder, self._medium.packets
@@ -70,7 +74,7 @@ class VirtualFleet:
 
     @property
     def rejected(self) -> int:
-        """Messages that agents refused to believe."""
+        """Messages that agents rejected."""
         return sum(self.loop.rejections.by_cause().values())
 
     @property
@@ -79,57 +83,57 @@ class VirtualFleet:
         return self._medium.counters(self.loop.world.slot)
 
     def slot(self) -> None:
-        """Run one slot: what is due before it, truth, batches, steps, verdicts, flight."""
+        """Run one slot: operations before it, positions, steps, batches of the next, motion."""
         for operation in self.loop.due():
             self.carry_out(operation)
             self.loop.apply(operation)
-        opened = self.loop.open()
-        self._medium.place(opened.positions)
-        for agent, observation in opened.observations:
-            self._step(agent, encode(observation), opened)
-        self._deliver(opened.slot + 1)
+        open_slot = self.loop.open()
+        self._medium.place(open_slot.positions)
+        for agent, observation in open_slot.observations:
+            self._step(agent, encode(observation), open_slot)
+        self._deliver(open_slot.slot + 1)
         self.loop.close(self._medium.digest())
 
     def carry_out(self, operation: Operation) -> None:
-        """Carry out what happens between slots."""
+        """Carry out an operation between slots."""
         match operation:
             case EndProcesses(agents=agents):
                 for agent in agents:
-                    # An agent that still boots has its core already.
+                    # A booting agent has its core already.
                     del self._agents[agent]
                     self._inboxes[agent].clear()
             case StartProcesses(incarnations=incarnations):
                 for agent, incarnation in incarnations.items():
-                    self._agents[agent] = self._started(agent, incarnation)
+                    self._agents[agent] = self._new_agent(agent, incarnation)
             case FaultOrder():
-                self._medium.obey(operation)
+                self._medium.apply(operation)
             case PauseProcesses() | ResumeProcesses() | AdmitAgents():
-                pass  # whether an agent steps is the loop's
+                pass  # the slot loop decides which agents step
             case SetSensorMode() | GiveMission():
-                pass  # sensors and missions are the loop's
+                pass  # the slot loop applies sensor modes and missions
             case _:
                 assert_never(operation)
 
-    def _started(self, agent: int, incarnation: int) -> Agent:
+    def _new_agent(self, agent: int, incarnation: int) -> Agent:
         setup = self._scenario.agent_setup(agent, incarnation, VIRTUAL_COMMAND_TICKS)
         return Agent(setup, self._decoders)
 
-    def _step(self, agent: int, observed: bytes, opened: Opened) -> None:
+    def _step(self, agent: int, encoded: bytes, open_slot: OpenSlot) -> None:
         core = self._agents[agent]
-        observation = decode_observation(observed)
+        observation = decode_observation(encoded)
         inbox = self._inboxes[agent]
         while inbox:
             for frame in unpack_batch(inbox.popleft()).frames:
                 core.receive(frame.source, frame.channel, frame.payload, observation.time_s)
         outbox = core.step(observation)
         outgoing = tuple([Outgoing(channel, payload) for channel, payload in outbox.frames])
-        sent = pack(Transmission(opened.slot, outbox.command.incarnation, outgoing))
-        self._medium.transmit(agent, opened.time_s, unpack_transmission(sent))
+        transmission = pack(Transmission(open_slot.slot, outbox.command.incarnation, outgoing))
+        self._medium.transmit(agent, open_slot.time_s, unpack_transmission(transmission))
         command = encode(outbox.command)
-        self.loop.obey(agent, decode_command(command), command)
+        self.loop.apply_command(agent, decode_command(command), command)
 
     def _deliver(self, slot: int) -> None:
-        """Hand what is due by a slot to the group that steps in it."""
+        """Put the batches of a slot into the inboxes of the agents that step in it."""
         clock = self.loop.world.clock
         alive, time_s = self.loop.members.alive.tolist(), clock.time_s(slot)
         for agent in range(slot % clock.slots_per_tick, len(alive), clock.slots_per_tick):
@@ -145,23 +149,23 @@ def fly(
     on_progress: Callable[[SlotLoop], None] | None = None,
     unwanted: Callable[[], bool] = lambda: False,
 ) -> Flight:
-    """Fly a scenario in virtual time to its end, or until unwanted."""
+    """Fly a scenario in virtual time to its end, or until ``unwanted`` returns True."""
     fleet = VirtualFleet(scenario, recorder)
     wall, cpu = perf_counter(), process_time()
-    told, progress_at = 0, wall + PROGRESS_EVERY_S
+    reported, progress_at = 0, wall + PROGRESS_EVERY_S
     while fleet.loop.world.slot < scenario.slots and not unwanted():
         fleet.slot()
-        while on_event is not None and told < len(fleet.loop.events):
-            on_event(fleet.loop.events[told])
-            told += 1
+        while on_event is not None and reported < len(fleet.loop.events):
+            on_event(fleet.loop.events[reported])
+            reported += 1
         if on_progress is not None and perf_counter() >= progress_at:
             progress_at = perf_counter() + PROGRESS_EVERY_S
             on_progress(fleet.loop)
     fleet.loop.finish()
     return Flight(
-        fleet.loop,
-        fleet.medium_counters,
-        fleet.rejected,
-        perf_counter() - wall,
-        process_time() - cpu,
+        loop=fleet.loop,
+        medium_counters=fleet.medium_counters,
+        rejected=fleet.rejected,
+        wall_s=perf_counter() - wall,
+        cpu_s=process_time() - cpu,
     )

@@ -1,52 +1,56 @@
-"""What an operator asks of a flying fleet: an event that happens now, or a report.
+"""Control of a running fleet by an operator: events that happen now, and reports.
 
-Each request is checked against the fleet as it is. A refused request changes nothing; one that is
-carried out is reported in events like the timeline's own, as ``by`` the operator.
+Each request is checked against the present state of the fleet. A rejected request changes nothing.
+An accepted one is reported in events like the timeline's own, ``by`` the operator.
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, assert_never
 
 import msgspec
 import numpy as np
 import zenoh
 
-from netem.faults import RadioEvent
+from netem.faults import FaultOrder, RadioEvent
 from netem.link_keys import Conditions
 from netem.wire.bus import Bus, Handler, drain
 from worldsim.engine.operations import (
+    AdmitAgents,
     EndProcesses,
     GiveMission,
     Operation,
     PauseProcesses,
     ResumeProcesses,
+    SetSensorMode,
     StartProcesses,
 )
 from worldsim.engine.step import SlotLoop
 from worldsim.judge.run_events import By, RunEvent
 from worldsim.scenario.decoding import decode
-from worldsim.scenario.event_checks import Present, broken_now
-from worldsim.scenario.events import ON_PROCESSES, EventTable
+from worldsim.scenario.event_checks import problem_now
+from worldsim.scenario.events import EventTable
+from worldsim.scenario.faults import MissionChange, ProcessFault
+from worldsim.scenario.foreseen_fleet import FleetNow
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.timeline import Step
 from worldsim.scenario.toml import ScenarioError
 
 MAX_REQUEST_B = 64 * 1024
 MAX_VERSION = 2**31
-REQUESTS_A_SLOT = 4
-MISSIONS = ("formation", "frame")
+REQUESTS_PER_SLOT = 4
 CarryOut = Callable[[Operation, By], None]
+"""Carries an operation out, and applies it to the slot loop."""
 
 
 class Request(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What an operator asks for: an event that happens now, or only a report."""
+    """An operator's request: an event that happens now, or a report only."""
 
     event: dict[str, Any] | None = None
-    """The event's keys without ``at_s``; None: only report."""
+    """The event's keys without ``at_s``, not checked yet; None: only a report."""
     to: int | None = None
-    """The agent that a mission is given to; None: the lowest id."""
+    """The agent that gets a mission; None: the running agent with the lowest id."""
     version: int | None = None
-    """The mission's own; None: the next."""
+    """The mission's version; None: the next one."""
 
 
 class ActiveFault(msgspec.Struct, frozen=True):
@@ -54,28 +58,32 @@ class ActiveFault(msgspec.Struct, frozen=True):
 
     number: int
     since_s: float
-    """[s; simulated time]"""
+    """When it began [s; simulated time]."""
     fault: RadioEvent
 
 
 class Answer(msgspec.Struct, frozen=True):
-    """What a request led to, and the radio since then."""
+    """The answer to a request that was carried out."""
 
     t_s: float
     """[s; simulated time]"""
     events: tuple[RunEvent, ...]
+    """The events that the request caused."""
     conditions: Conditions
-    """The link conditions in force."""
+    """The link conditions in force afterwards."""
     faults: tuple[ActiveFault, ...]
-    """The radio faults in force, in the order of their beginning."""
+    """The radio faults in force afterwards, in the order in which they began."""
 
 
 class RequestError(ValueError):
-    """A request that is refused; the text is the reason, in one line."""
+    """A rejected request; the text is the reason, in one line."""
 
 
 class Control:
-    """Carries out requests on a slot loop. launcher: whether processes can be started and ended."""
+    """Carries out requests on a slot loop.
+
+    launcher: whether processes can be started and ended.
+    """
 
     def __init__(self, scenario: Scenario, loop: SlotLoop, launcher: bool) -> None:
         self._scenario = scenario
@@ -83,71 +91,79 @@ class Control:
         self._timeline = loop.effects.timeline
         self._launcher = launcher
 
-    def answer(self, asked: bytes, carry_out: CarryOut) -> Answer:
-        """Carry out a request, or raise RequestError."""
-        request = _request(asked)
-        before = len(self._loop.events)
+    def answer(self, data: bytes, carry_out: CarryOut) -> Answer:
+        """Carry out an encoded request. Raises RequestError."""
+        request = _request(data)
+        first = len(self._loop.events)
         if request.event is not None:
             step = self._timeline.begin_now(self._event(request.event))
             carry_out(self._operation(step, request), "operator")
             self._timeline.end_later(step)
-        return self._answer(self._loop.events[before:])
+        return self._answer(self._loop.events[first:])
 
     def _event(self, keys: dict[str, Any]) -> EventTable:
-        if (unsaid := _unsaid(keys)) is not None:
-            raise RequestError(f"{unsaid}: nothing, or a number that is not finite")
+        """Return a request's event, checked against the present fleet. Raises RequestError."""
+        null = _null_key(keys)
+        if null is not None:
+            raise RequestError(f"{null}: null or not finite; a value is needed")
         try:
             event = decode({**keys, "at_s": self._loop.world.time_s}, EventTable, "")
         except ScenarioError as error:
             raise RequestError(f"{error.key}: {error.detail}") from error
-        broken = broken_now(self._scenario, event, self._present())
-        if broken is not None:
-            raise RequestError(": ".join(part for part in broken if part))
-        if event.kind in ON_PROCESSES and not self._launcher:
+        problem = problem_now(self._scenario, event, self._fleet_now())
+        if problem is not None:
+            raise RequestError(": ".join(part for part in problem if part))
+        if isinstance(event.action, ProcessFault) and not self._launcher:
             raise RequestError(f"{event.kind}: this fleet has no launcher; do it by hand")
         return event
 
-    def _present(self) -> Present:
+    def _fleet_now(self) -> FleetNow:
         effects, members = self._loop.effects, self._loop.members
-        return Present(
+        return FleetNow(
             formation=effects.missions.formation,
             frame=effects.missions.frame,
             partitioned=effects.network.partitioned,
-            known=members.known,
-            living=frozenset(np.flatnonzero(members.awake).tolist()),
-            room=self._scenario.rows - members.known - self._timeline.joiners,
+            id_count=members.id_count,
+            running=frozenset(np.flatnonzero(members.running).tolist()),
+            room=self._scenario.rows - members.id_count - self._timeline.joiners,
         )
 
     def _operation(self, step: Step, request: Request) -> Operation:
-        """Return what a step means now. Raises RequestError where it means no agent."""
+        """Return the operation of a step now. Raises RequestError where there is nothing to do."""
         self._check_mission(step.event, request)
         operation, kind = self._loop.effects.operation(step), step.event.kind
         match operation:
             case None:
                 raise RequestError(f"{kind}: nothing to do")
-            case EndProcesses() | PauseProcesses() | ResumeProcesses() if not operation.agents:
-                selectors = list(operation.selectors)
-                raise RequestError(f"{kind}: no agent that {selectors} selects can do that now")
-            case StartProcesses() if not operation.incarnations:
-                raise RequestError(f"{kind}: {operation.refused or 'no agent to restart'}")
+            case EndProcesses() | PauseProcesses() | ResumeProcesses():
+                if not operation.agents:
+                    selectors = list(operation.selectors)
+                    raise RequestError(f"{kind}: no agent in {selectors} can do that now")
+                return operation
+            case StartProcesses():
+                if not operation.incarnations:
+                    raise RequestError(f"{kind}: {operation.refused or 'no agent to restart'}")
+                return operation
             case GiveMission():
                 return operation._replace(to=request.to, version=request.version)
-        return operation
+            case FaultOrder() | SetSensorMode() | AdmitAgents():
+                return operation
+        assert_never(operation)
 
     def _check_mission(self, event: EventTable, request: Request) -> None:
-        """Raise RequestError where a mission's addressee or version cannot be."""
-        if event.kind not in MISSIONS:
+        """Raise RequestError where the addressee or the version of a mission is not valid."""
+        if not isinstance(event.action, MissionChange):
             if (request.to, request.version) != (None, None):
-                raise RequestError(f"{event.kind}: only a mission goes to an agent")
+                raise RequestError(f"{event.kind}: to and version go with a mission only")
             return
         members, newest = self._loop.members, self._loop.effects.missions.newest
-        if request.to is not None and not 0 <= request.to < members.known:
-            raise RequestError(f"to: no agent {request.to}; 0 to {members.known - 1}")
-        if request.to is not None and not members.awake[request.to]:
+        if request.to is not None and not 0 <= request.to < members.id_count:
+            raise RequestError(f"to: no agent {request.to}; 0 to {members.id_count - 1}")
+        if request.to is not None and not members.running[request.to]:
             state = members.state(request.to).value
             raise RequestError(f"to: agent {request.to} is not running ({state})")
         if request.version is not None and not newest < request.version < MAX_VERSION:
-            raise RequestError(f"version: {request.version}; above {newest}, which flies already")
+            raise RequestError(f"version: {request.version}; above {newest} is allowed")
 
     def _answer(self, events: list[RunEvent]) -> Answer:
         network = self._loop.network
@@ -159,17 +175,17 @@ class Control:
         return Answer(t_s, tuple(events), network.conditions, faults)
 
 
-def _request(asked: bytes) -> Request:
-    if len(asked) > MAX_REQUEST_B:
-        raise RequestError(f"{len(asked)} B; a request has {MAX_REQUEST_B} B at most")
+def _request(data: bytes) -> Request:
+    if len(data) > MAX_REQUEST_B:
+        raise RequestError(f"{len(data)} B; a request has at most {MAX_REQUEST_B} B")
     try:
-        return msgspec.json.decode(asked, type=Request)
+        return msgspec.json.decode(data, type=Request)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise RequestError(f"a request that cannot be read: {error}") from error
+        raise RequestError(f"malformed request: {error}") from error
 
 
-def _unsaid(keys: dict[str, Any]) -> str | None:
-    """Return where a request says nothing, or None; that is what JSON makes of NaN."""
+def _null_key(keys: dict[str, Any]) -> str | None:
+    """Return the first key whose value is null, as JSON writes NaN; None where there is none."""
     waiting: list[tuple[str, Any]] = list(keys.items())
     for path, value in waiting:
         if value is None:
@@ -181,21 +197,21 @@ def _unsaid(keys: dict[str, Any]) -> str | None:
     return None
 
 
-class Reception:
-    """Where requests come in over Zenoh, and are answered between slots."""
+class ControlServer:
+    """Answers requests over Zenoh, between slots."""
 
     def __init__(self, bus: Bus, control: Control) -> None:
         self._control = control
-        self._questions: Handler[zenoh.Query] = bus.queryable("control")
+        self._queries: Handler[zenoh.Query] = bus.queryable("control")
 
-    def attend(self, carry_out: CarryOut) -> None:
-        """Answer what has come, a few a slot."""
-        for query in drain(self._questions, REQUESTS_A_SLOT):
+    def answer_waiting(self, carry_out: CarryOut) -> None:
+        """Answer up to REQUESTS_PER_SLOT requests that have arrived."""
+        for query in drain(self._queries, REQUESTS_PER_SLOT):
             with query:
-                asked = query.payload.to_bytes() if query.payload is not None else b""
+                data = query.payload.to_bytes() if query.payload is not None else b""
                 try:
-                    answer = self._control.answer(asked, carry_out)
-                except RequestError as refusal:
-                    query.reply_err(str(refusal))
+                    answer = self._control.answer(data, carry_out)
+                except RequestError as error:
+                    query.reply_err(str(error))
                 else:
                     query.reply(query.key_expr, msgspec.json.encode(answer))

@@ -28,8 +28,8 @@ from worldsim.engine.operations import (
     StartProcesses,
 )
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS
-from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
-from worldsim.fleet.control import Control, Reception
+from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
+from worldsim.fleet.control import Control, ControlServer
 from worldsim.fleet.delivery_latency import DeliveryLatency, LatencyCollector
 from worldsim.fleet.ipc import AgentProcess
 from worldsim.fleet.launcher_link import LauncherLink
@@ -72,7 +72,9 @@ class FreeRunningFleet:
         self._launcher = launcher
         self._startup = startup
         self._actions = ProcessActions(bus, startup, launcher, scenario.fleet.boot_s / speed)
-        self._reception = Reception(bus, Control(scenario, self.loop, launcher.controls_processes))
+        self._control_server = ControlServer(
+            bus, Control(scenario, self.loop, launcher.controls_processes)
+        )
         self.begun = self._landed = False
         self._rejected: Counter[str] = Counter()
         self._pacer = Pacer(1.0 / (scenario.slot_hz * speed))
@@ -146,7 +148,7 @@ class FreeRunningFleet:
         self._startup.answer_setup_requests()
         for operation in self.loop.due():
             self._carry_out(operation)
-        self._reception.attend(self._carry_out)
+        self._control_server.answer_waiting(self._carry_out)
         self._send(self.loop.open())
         self._handle_exits()
         while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not should_stop():
@@ -177,16 +179,22 @@ class FreeRunningFleet:
             detail = "its process is not up by the end of boot_s"
             self.loop.emit(LateStart(t_s=t_s, agent=agent, detail=detail))
 
-    def _send(self, opened: Opened) -> None:
+    def _send(self, opened: OpenSlot) -> None:
         incarnations = tuple(self.loop.members.incarnations)
-        self._truth(pack(Truth(opened.slot, opened.time_s, opened.positions, incarnations)))
+        truth = Truth(
+            slot=opened.slot,
+            time_s=opened.time_s,
+            positions=opened.positions,
+            incarnations=incarnations,
+        )
+        self._truth(pack(truth))
         for agent, observation in opened.observations:
             self._observers[agent](encode(observation))
             self.lateness.observe(agent, opened.slot, self.loop.world.latest[agent])
 
     def _accept_command(self, agent: int, data: bytes) -> None:
         """Take a command; one of an agent that is not running any more has no effect."""
-        if not self.loop.members.awake[agent]:
+        if not self.loop.members.running[agent]:
             return
         try:
             command = decode_command(data)
@@ -194,7 +202,7 @@ class FreeRunningFleet:
             self._rejected[error.cause] += 1
             return
         if command.incarnation == self.loop.members.incarnations[agent]:
-            self.loop.obey(agent, command, data)
+            self.loop.apply_command(agent, command, data)
         else:
             self._rejected["incarnation"] += 1
 
@@ -214,8 +222,8 @@ class FreeRunningFleet:
 
     def _handle_exits(self) -> None:
         for agent, incarnation, (number, status) in self._launcher.agent_exits():
-            if self.loop.members.has(agent, incarnation):
-                self.loop.effects.exited(agent, number, status)
+            if self.loop.members.has_process(agent, incarnation):
+                self.loop.effects.record_exit(agent, number, status)
 
     def _packets(self) -> Packets:
         return self.medium_counters.packets() if self.medium_counters is not None else {}

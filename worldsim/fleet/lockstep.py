@@ -12,7 +12,14 @@ from typing import assert_never
 from agent.codec import RejectedError, decode_command, encode
 from netem.delivery_log import Digest, joined_pages
 from netem.faults import FaultOrder
-from netem.messages import Done, MediumCounters, Truth, Turn, together, unpack_done
+from netem.messages import (
+    MediumCounters,
+    SlotInput,
+    SlotResult,
+    Truth,
+    merged,
+    unpack_slot_result,
+)
 from netem.wire.barrier import (
     ANSWER_TIMEOUT_S,
     LOCKSTEP_RING,
@@ -36,8 +43,8 @@ from worldsim.engine.operations import (
     StartProcesses,
 )
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
-from worldsim.engine.step import Opened, Recorder, SlotLoop, world_of
-from worldsim.fleet.control import Control, Reception
+from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
+from worldsim.fleet.control import Control, ControlServer
 from worldsim.fleet.ipc import AgentProcess, ProcessAction, names_of
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.progress import ProgressReporter, StallReporter
@@ -78,7 +85,9 @@ class LockstepFleet:
         self._launcher = launcher
         self._should_stop: Callable[[], bool] = lambda: False
         self._actions = AwaitedActions(startup, launcher, self._check_exits, self._stopped)
-        self._reception = Reception(bus, Control(scenario, self.loop, launcher.controls_processes))
+        self._control_server = ControlServer(
+            bus, Control(scenario, self.loop, launcher.controls_processes)
+        )
         self._progress_reporter = ProgressReporter(scenario.duration_s, self.loop, launcher)
         self._digest = Digest()
         self._truth = bus.publisher("truth", lockstep=True)
@@ -123,7 +132,7 @@ class LockstepFleet:
     def _slot(self) -> None:
         for operation in self.loop.due():
             self._carry_out(operation)
-        self._reception.attend(self._carry_out)
+        self._control_server.answer_waiting(self._carry_out)
         self._check_exits()
         opened = self.loop.open()
         self._send(opened)
@@ -136,14 +145,14 @@ class LockstepFleet:
         self._actions.carry_out(operation, self.loop.members.incarnations)
         self.loop.apply(operation, by)
 
-    def _send(self, opened: Opened) -> None:
-        turn = Turn(
-            Truth(opened.slot, opened.time_s, opened.positions),
-            tuple(agent for agent, _ in opened.observations),
-            tuple(self.loop.members.incarnations),
-            self._actions.orders(),
+    def _send(self, opened: OpenSlot) -> None:
+        slot_input = SlotInput(
+            truth=Truth(slot=opened.slot, time_s=opened.time_s, positions=opened.positions),
+            participants=tuple(agent for agent, _ in opened.observations),
+            incarnations=tuple(self.loop.members.incarnations),
+            orders=self._actions.orders(),
         )
-        self._truth(pack(turn))
+        self._truth(pack(slot_input))
         for agent, observation in opened.observations:
             self._observers[agent](encode(observation))
 
@@ -157,19 +166,19 @@ class LockstepFleet:
         check_slot(what, command.slot, slot)
         if command.incarnation != self.loop.members.incarnations[agent]:
             raise LockstepError(f"{what} is of its incarnation {command.incarnation}")
-        self.loop.obey(agent, command, data)
+        self.loop.apply_command(agent, command, data)
 
     def _await_mediums(self, slot: int) -> bytes:
         """Wait until all mediums are done with a slot; return the digest of all fates so far."""
         parts = [self._await_medium(shard, slot) for shard in range(len(self._done))]
-        self.medium_counters = together([part.medium_counters for part in parts])
+        self.medium_counters = merged([part.counters for part in parts])
         self._digest.update(joined_pages(dict(part.pages) for part in parts))
         return self._digest.value
 
-    def _await_medium(self, shard: int, slot: int) -> Done:
+    def _await_medium(self, shard: int, slot: int) -> SlotResult:
         what = f"{medium_name(shard)}'s answer of slot {slot}"
         try:
-            done = unpack_done(self._answer(self._done[shard], what))
+            done = unpack_slot_result(self._answer(self._done[shard], what))
         except WireError as error:
             raise LockstepError(f"{what}: {error}") from error
         check_slot(what, done.slot, slot)
@@ -192,7 +201,7 @@ class LockstepFleet:
     def _check_exits(self) -> None:
         """Raise LockstepError when the process of a running or booting agent has ended."""
         for each in self._launcher.agent_exits():
-            if self.loop.members.has(each.agent, each.incarnation):
+            if self.loop.members.has_process(each.agent, each.incarnation):
                 raise LockstepError(str(each))
 
     def _launcher_failure(self) -> str | None:

@@ -35,7 +35,7 @@ class ProgressReporter:
         return Progress(
             self._loop.world.time_s,
             self._duration_s,
-            int(np.count_nonzero(self._loop.members.awake)),
+            int(np.count_nonzero(self._loop.members.running)),
             in_place,
             self._loop.judge.min_separation_m,
             late_fraction,

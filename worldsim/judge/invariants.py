@@ -1,16 +1,19 @@
-"""Invariants of allocation: what must hold at every tick whose premise holds, in any run.
+"""Invariants of the allocation: they hold at every tick of any run at which their premise holds.
 
-I2 one vertex agent for each vertex of the formation in each component. I3 each queue's members
-within 1 of its share there. Both from T_d + 2B after the last fault on. I4 no two of a component
-claim one place for longer than 2B. I6 at most 3 changes of role an agent and fault. I7 quiet:
-settled and all in place, nobody changes its place; where frames are lost, once an agent at most.
-A fault is every event of the timeline, every death, and every change of who can reach whom.
+I2: in each connected component, each vertex of the formation has exactly one agent.
+I3: in each component, the number of agents of a queue is within 1 of the queue's share.
+Premise of both: T_d + 2B have passed since the last fault.
+I4: no two agents of a component claim one place for longer than 2B.
+I6: no agent changes its role more than 3 times after a fault.
+I7: no agent changes its place in a settled team in which every agent is in its place; where frames
+are lost, each agent may once.
+A fault is an event of the timeline, an exit, or a change of the connected components.
 """
 
 from collections import Counter
-from dataclasses import dataclass
-from typing import Any, assert_never
+from typing import NamedTuple, assert_never
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,136 +45,167 @@ from worldsim.judge.run_events import (
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import CONVERGED_S, Scenario
 
-LOOK_EVERY_S = 1.0
+COMPONENTS_EVERY_S = 1.0
+"""Interval at which connectivity is computed anew [s]."""
 MAX_ROLE_CHANGES = 3
 Claims = list[tuple[int, int]]
+"""The place (queue, rank) that each agent claims; row i = agent i."""
 
 
-@dataclass(slots=True)
-class Tally:
-    """At how many ticks an invariant was looked at, and at how many it did not hold."""
+class InvariantTally(msgspec.Struct):
+    """How often an invariant was evaluated and violated."""
 
     ticks: int = 0
+    """Ticks at which it was evaluated."""
     violations: int = 0
+    """Ticks at which it was violated."""
 
-    def count(self, broken: int) -> None:
-        """Count a tick, and whether anything was broken at it."""
+    def count(self, breaches: int) -> None:
+        """Count a tick with this number of breaches."""
         self.ticks += 1
-        self.violations += broken > 0
+        self.violations += breaches > 0
+
+
+class Breaches(NamedTuple):
+    """Breaches of I2 and I3 at one tick."""
+
+    vertices: int
+    """Vertices that do not have exactly one agent."""
+    shares: int
+    """Queues whose number of agents is not within 1 of their share."""
 
 
 class Invariants:
-    """Watches the allocation of a whole run; bodies: shown every tick."""
+    """Evaluates the allocation of a whole run. hovering: sees every tick first."""
 
-    def __init__(self, scenario: Scenario, bodies: HoveringVehicles) -> None:
-        self.tallies = {name: Tally() for name in ("I2", "I3", "I4", "I6", "I7")}
-        self._reach = Connectivity(scenario)
-        self._bodies = bodies
+    def __init__(self, scenario: Scenario, hovering: HoveringVehicles) -> None:
+        self.tallies = {name: InvariantTally() for name in ("I2", "I3", "I4", "I6", "I7")}
+        self._connectivity = Connectivity(scenario)
+        self._hovering = hovering
         self._boot_s = scenario.fleet.boot_s
         self._fault_s = 0.0
-        self._look_s = 0.0
+        """When the last fault is over [s; simulated time]."""
+        self._components_due_s = 0.0
+        """When connectivity is to be computed anew [s; simulated time]."""
         self._components: Components | None = None
         self._members: list[list[int]] = []
-        self._seen: tuple[Any, ...] = ()
+        """The rows of each component."""
+        self._seen: tuple[bytes, ...] = ()
         self._claims: Claims = []
-        self._broken = (0, 0)
+        self._breaches = Breaches(0, 0)
         self._shared: list[bool] = []
+        """For each agent, whether another agent of its component claims its place."""
         self._shared_since: dict[int, tuple[tuple[int, int], float]] = {}
-        self._roles: Counter[int] = Counter()
-        self._flips = 0
+        """For each agent that shares its place: the place, and since when [s; simulated time]."""
+        self._role_changes: Counter[int] = Counter()
+        """Of each agent since the last fault."""
+        self._excess_role_changes = 0
+        """Above MAX_ROLE_CHANGES, since the last tick."""
         self._moves: Counter[int] = Counter()
+        """Changes of place of each agent since the last fault, in a quiet team."""
         self._quiet_since_s: float | None = None
-        self._settled_s = self._twice_s = 0.0
+        """Since when every agent is in its place in a settled team [s; simulated time]."""
+        self._settled_s = 0.0
+        """When the team must have settled [s; simulated time]: T_d + 2B after the last fault."""
+        self._twice_s = 0.0
+        """2B [s]."""
 
-    def note(self, event: RunEvent) -> None:
-        """Take an event, in order."""
+    def handle_event(self, event: RunEvent) -> None:
+        """Take an event; events come in order."""
         match event:
-            case RoleChanged(agent=int(agent)):
-                self._roles[agent] += 1
-                self._flips += self._roles[agent] > MAX_ROLE_CHANGES
+            case RoleChanged():
+                self._count_role_change(event)
             case Restarted() | Joined():
                 self._fault(event.t_s, event.t_s + self._boot_s)
             case Killed() | Left() | Paused() | Resumed() | FormationGiven() | FrameGiven():
                 self._fault(event.t_s, event.t_s)
             case Partitioned() | Healed() | Jammed() | Flapped() | ConditionsChanged():
-                self._reach.note(event)
+                self._connectivity.handle_event(event)
                 self._fault(event.t_s, event.t_s)
-            case RoleChanged() | SlotChanged() | QueueChanged() | SensorChanged() | LateStart():
+            case SlotChanged() | QueueChanged() | SensorChanged() | LateStart():
                 pass
             case _:
                 assert_never(event)
 
     def see(self, tick: Tick, phase: Phase, in_place: bool) -> None:
-        """Judge a tick; in_place: whether all the living are in their places."""
-        if tick.time_s >= self._look_s:
-            self._look(tick)
-        before = self._claims
-        self._find(tick, phase)
-        self.tallies["I6"].count(self._flips)
-        self._flips = 0
-        self.tallies["I4"].count(self._lasting(tick.time_s))
+        """Evaluate a tick; in_place: whether every running agent is in its place."""
+        if tick.time_s >= self._components_due_s:
+            self._find_components(tick)
+        last_claims = self._claims
+        self._find_breaches(tick, phase)
+        self.tallies["I6"].count(self._excess_role_changes)
+        self._excess_role_changes = 0
+        self.tallies["I4"].count(self._count_lasting(tick.time_s))
         if tick.time_s >= self._settled_s:
-            self.tallies["I2"].count(self._broken[0])
-            self.tallies["I3"].count(self._broken[1])
-        self._see_quiet(tick, before, in_place)
+            self.tallies["I2"].count(self._breaches.vertices)
+            self.tallies["I3"].count(self._breaches.shares)
+        self._evaluate_quiet(tick, last_claims, in_place)
 
-    def _fault(self, look_s: float, over_s: float) -> None:
-        """Start anew after a fault at ``look_s`` that is over at ``over_s`` [s]."""
-        self._look_s = look_s
-        self._restart_quiet(over_s)
+    def _count_role_change(self, event: RoleChanged) -> None:
+        if event.agent is not None:
+            self._role_changes[event.agent] += 1
+            self._excess_role_changes += self._role_changes[event.agent] > MAX_ROLE_CHANGES
 
-    def _restart_quiet(self, time_s: float) -> None:
+    def _fault(self, begins_s: float, over_s: float) -> None:
+        """Start anew after a fault that begins and is over at these times [s]."""
+        self._components_due_s = begins_s
+        self._restart_premises(over_s)
+
+    def _restart_premises(self, time_s: float) -> None:
         self._fault_s = max(self._fault_s, time_s)
         self._quiet_since_s = None
-        self._roles.clear()
+        self._role_changes.clear()
         self._moves.clear()
 
-    def _look(self, tick: Tick) -> None:
-        """See who can reach whom: once a second, and after each fault."""
-        self._look_s = tick.time_s + LOOK_EVERY_S
-        found = self._reach.components(tick)
-        before, self._components, self._members = self._components, found, found.members()
-        if before is not None and not np.array_equal(before.label, found.label):
-            self._restart_quiet(tick.time_s)
+    def _find_components(self, tick: Tick) -> None:
+        """Find the connected components: once a second, and after each fault."""
+        self._components_due_s = tick.time_s + COMPONENTS_EVERY_S
+        found = self._connectivity.components(tick)
+        last, self._components, self._members = self._components, found, found.members()
+        if last is not None and not np.array_equal(last.label, found.label):
+            self._restart_premises(tick.time_s)
         team = int(np.count_nonzero(tick.alive))
-        self._twice_s = 2.0 * self._reach.everybody_s(team, found.hops)
-        self._settled_s = self._fault_s + self._reach.detection_s(found.hops) + self._twice_s
+        self._twice_s = 2.0 * self._connectivity.dissemination_s(team, found.hops)
+        self._settled_s = self._fault_s + self._connectivity.detection_s(found.hops) + self._twice_s
 
-    def _find(self, tick: Tick, phase: Phase) -> None:
-        """Find what is broken; in one component that holds until a claim changes, or a body stands.
+    def _find_breaches(self, tick: Tick, phase: Phase) -> None:
+        """Find the breaches of a tick.
 
-        Where there are more, a vehicle of one may come into a place of another at any time.
+        With one component, they hold until a claim changes or a vehicle comes to hover. With more,
+        a vehicle of one component may enter a place of another at any time.
         """
         members = self._members
         seen = (
             *(rows.tobytes() for rows in (tick.place, tick.alive, tick.mission)),
             self._components.label.tobytes() if self._components is not None else b"",
-            b"" if tick.alive.all() else self._bodies.hovering(tick).tobytes(),
+            b"" if tick.alive.all() else self._hovering.hovering(tick).tobytes(),
         )
         if seen == self._seen and len(members) == 1:
             return
         self._seen, claims = seen, phase.claims(tick)
         self._claims = self._claims if claims == self._claims else claims
-        broken = [self._in_component(tick, phase, rows) for rows in members]
-        self._broken = (sum(heads for heads, _ in broken), sum(shares for _, shares in broken))
-        self._shared = self._sharing(members)
+        found = [self._in_component(tick, phase, rows) for rows in members]
+        vertices, shares = sum(each.vertices for each in found), sum(each.shares for each in found)
+        self._breaches = Breaches(vertices, shares)
+        self._shared = self._find_shared(members)
 
-    def _in_component(self, tick: Tick, phase: Phase, rows: list[int]) -> tuple[int, int]:
-        """Return how many vertices have not one agent, and how many queues not their share."""
+    def _in_component(self, tick: Tick, phase: Phase, rows: list[int]) -> Breaches:
+        """Return the breaches in the component of these rows."""
         held = Counter(Place(*self._claims[row]) for row in rows)
-        layout = self._bodies.layout(tick, phase, rows)
-        heads = sum(held[place] != 1 for place in layout.heads)
+        layout = self._hovering.layout(tick, phase, rows)
+        vertices = sum(held[place] != 1 for place in layout.heads)
         common = set(phase.formation.common)
         own = Counter[int]()
         for place, count in held.items():
             if place not in common:
                 own[place.queue] += count
-        blocked = self._bodies.occupied_places(tick, phase, rows)
+        blocked = self._hovering.occupied_places(tick, phase, rows)
         shares = phase.formation.divide(len(rows), blocked)
-        return heads, sum(abs(own[queue] - share) > 1 for queue, share in enumerate(shares))
+        wrong = sum(abs(own[queue] - share) > 1 for queue, share in enumerate(shares))
+        return Breaches(vertices, wrong)
 
-    def _sharing(self, members: list[list[int]]) -> list[bool]:
-        """Return whose place is claimed by another of its component too."""
+    def _find_shared(self, members: list[list[int]]) -> list[bool]:
+        """Return for each agent whether another agent of its component claims its place."""
         shared = [False] * len(self._claims)
         for rows in members:
             held = Counter(self._claims[row] for row in rows)
@@ -179,8 +213,8 @@ class Invariants:
                 shared[row] = self._claims[row][0] >= 0 and held[self._claims[row]] > 1
         return shared
 
-    def _lasting(self, time_s: float) -> int:
-        """Return how many have shared their place for longer than 2B, and not only just."""
+    def _count_lasting(self, time_s: float) -> int:
+        """Return the number of agents that have shared their present place for longer than 2B."""
         if not any(self._shared):
             self._shared_since = {}
             return 0
@@ -193,24 +227,24 @@ class Invariants:
         self._shared_since = since
         return sum(time_s - from_s > self._twice_s for _, from_s in since.values())
 
-    def _see_quiet(self, tick: Tick, before: Claims, in_place: bool) -> None:
-        """Count changes of place after 2 s of everybody standing in its place, settled."""
+    def _evaluate_quiet(self, tick: Tick, last_claims: Claims, in_place: bool) -> None:
+        """Evaluate I7 once every agent of a settled team has been in its place for 2 s."""
         since_s = self._quiet_since_s
         if since_s is not None and tick.time_s - since_s >= CONVERGED_S:
-            self.tallies["I7"].count(self._moved(tick.alive, before))
+            self.tallies["I7"].count(self._count_moves(tick.alive, last_claims))
         elif not in_place or tick.time_s < self._settled_s:
             self._quiet_since_s = None
         elif since_s is None:
             self._quiet_since_s = tick.time_s
 
-    def _moved(self, alive: NDArray[np.bool_], before: Claims) -> int:
-        """Return how many changed their place at this tick once more than they may."""
-        if before is self._claims:
+    def _count_moves(self, alive: NDArray[np.bool_], last_claims: Claims) -> int:
+        """Return the number of agents that changed their place more often than allowed."""
+        if last_claims is self._claims:
             return 0
-        allowed = 1 if self._reach.loss > 0.0 else 0
-        moved = 0
-        for row, (was, now) in enumerate(zip(before, self._claims, strict=True)):
-            if alive[row] and was != now:
+        allowed = 1 if self._connectivity.loss > 0.0 else 0
+        excess = 0
+        for row, (last, now) in enumerate(zip(last_claims, self._claims, strict=True)):
+            if alive[row] and last != now:
                 self._moves[row] += 1
-                moved += self._moves[row] > allowed
-        return moved
+                excess += self._moves[row] > allowed
+        return excess

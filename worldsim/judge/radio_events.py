@@ -1,7 +1,7 @@
-"""Faults of the radio as the run's events report them, back to orders, and in words.
+"""Radio faults as run events: from a fault order to its event, back, and in words.
 
-The world turns each order to the medium into an event; the judge turns the event into the order
-again, and so knows what is in force from a recording as from a flight.
+The world reports each order to the medium as an event. The judge turns the event into the order
+again, so it knows the faults in force from a recording as well as from a run.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,16 @@ from typing import assert_never
 import msgspec
 
 from netem.conditions import NetworkConditions
-from netem.faults import FaultOrder, Flap, Heal, Jam, Partition, RadioEvent
+from netem.faults import (
+    FaultOrder,
+    Flap,
+    Heal,
+    Jam,
+    LastingFault,
+    Partition,
+    RadioEvent,
+    RadioFault,
+)
 from netem.link_keys import Conditions
 from worldsim.judge.run_events import (
     By,
@@ -23,48 +32,27 @@ from worldsim.judge.run_events import (
     RadioRunEvent,
 )
 
-_CHANGE_KEYS = Conditions.__struct_fields__
+_CONDITION_KEYS = Conditions.__struct_fields__
 
 
 def applied(order: FaultOrder, network: NetworkConditions, t_s: float, by: By) -> RadioRunEvent:
-    """Apply an order at a time [s] to what is in force; return the event that reports it.
+    """Apply an order to the conditions in force at a time [s]; return the event that reports it.
 
     Raises LookupError for the end of a fault that is not in force.
     """
-    begun = order.fault
-    fault = begun if begun is not None else network.in_force[order.number].fault
+    if order.fault is not None:
+        network.apply(order)
+        return _begin_event(order, order.fault, network, t_s, by)
+    ended = network.in_force[order.number].fault
     network.apply(order)
-    number = order.number
-    match fault:
-        case Heal():
-            return Healed(t_s=t_s, agent=None, planned=True, by=by)
-        case Partition() if begun is None:
-            return Healed(t_s=t_s, agent=None, planned=True, by=by, number=number)
-        case Partition(groups=groups, kind=kind, bridge=bridge):
-            return Partitioned(
-                t_s=t_s,
-                agent=None,
-                planned=True,
-                by=by,
-                number=number,
-                groups=groups,
-                parted=kind,
-                bridge=bridge,
-            )
-        case Jam():
-            jam = fault if begun is not None else None
-            return Jammed(t_s=t_s, agent=None, planned=True, by=by, number=number, jam=jam)
-        case Flap(period_s=period_s, links=links):
-            flap = FlapWindow(period_s, links, order.at_s) if begun is not None else None
-            return Flapped(t_s=t_s, agent=None, planned=True, by=by, number=number, flap=flap)
-        case Conditions():
-            return _conditions_changed(order, fault, network.conditions, t_s, by)
-    assert_never(fault)
+    return _end_event(order.number, ended, network, t_s, by)
 
 
 def order_of(event: RadioRunEvent) -> FaultOrder:
     """Return the order that an event reports."""
-    return FaultOrder(number=_number(event), at_s=_since_s(event), event=_begun(event))
+    fault = _begun(event)
+    begins = RadioEvent.of(fault) if fault is not None else None
+    return FaultOrder(event.number or 0, _at_s(event), begins)
 
 
 def radio_sentence(event: RadioRunEvent) -> str:
@@ -93,49 +81,86 @@ def radio_sentence(event: RadioRunEvent) -> str:
     return words
 
 
-def _conditions_changed(
-    order: FaultOrder, change: Conditions, conditions: Conditions, t_s: float, by: By
-) -> ConditionsChanged:
-    ended = order.fault is None
-    keys = {} if ended else {key: getattr(change, key) for key in _CHANGE_KEYS}
-    return ConditionsChanged(
-        t_s=t_s,
-        agent=None,
-        planned=True,
-        by=by,
-        number=order.number,
-        conditions=conditions,
-        undone=change if ended else None,
-        **keys,
-    )
+def _begin_event(
+    order: FaultOrder, fault: RadioFault, network: NetworkConditions, t_s: float, by: By
+) -> RadioRunEvent:
+    number = order.number
+    match fault:
+        case Heal():
+            return Healed(t_s=t_s, agent=None, planned=True, by=by)
+        case Partition(groups=groups, kind=kind, bridge=bridge):
+            return Partitioned(
+                t_s=t_s,
+                agent=None,
+                planned=True,
+                by=by,
+                number=number,
+                groups=groups,
+                parted=kind,
+                bridge=bridge,
+            )
+        case Jam():
+            return Jammed(t_s=t_s, agent=None, planned=True, by=by, number=number, jam=fault)
+        case Flap(period_s=period_s, links=links):
+            flap = FlapWindow(period_s, links, order.at_s)
+            return Flapped(t_s=t_s, agent=None, planned=True, by=by, number=number, flap=flap)
+        case Conditions():
+            return ConditionsChanged(
+                t_s=t_s,
+                agent=None,
+                planned=True,
+                by=by,
+                number=number,
+                conditions=network.conditions,
+                **{key: getattr(fault, key) for key in _CONDITION_KEYS},
+            )
+    assert_never(fault)
 
 
-def _number(event: RadioRunEvent) -> int:
-    if isinstance(event, Healed):
-        return event.number or 0
-    return event.number
+def _end_event(
+    number: int, fault: LastingFault, network: NetworkConditions, t_s: float, by: By
+) -> RadioRunEvent:
+    match fault:
+        case Partition():
+            return Healed(t_s=t_s, agent=None, planned=True, by=by, number=number)
+        case Jam():
+            return Jammed(t_s=t_s, agent=None, planned=True, by=by, number=number, jam=None)
+        case Flap():
+            return Flapped(t_s=t_s, agent=None, planned=True, by=by, number=number, flap=None)
+        case Conditions():
+            return ConditionsChanged(
+                t_s=t_s,
+                agent=None,
+                planned=True,
+                by=by,
+                number=number,
+                conditions=network.conditions,
+                undone=fault,
+            )
+    assert_never(fault)
 
 
-def _since_s(event: RadioRunEvent) -> float:
+def _at_s(event: RadioRunEvent) -> float:
+    """Return the time of the order [s]; a flap reports its own, for its periods."""
     if isinstance(event, Flapped) and event.flap is not None:
         return event.flap.from_s
     return event.t_s
 
 
-def _begun(event: RadioRunEvent) -> RadioEvent | None:
+def _begun(event: RadioRunEvent) -> RadioFault | None:
+    """Return the fault that began with an event; None where one ended."""
     match event:
         case Healed(number=number):
-            return RadioEvent(heal=True) if number is None else None
+            return Heal() if number is None else None
         case Partitioned(groups=groups, parted=kind, bridge=bridge):
-            return RadioEvent(partition=Partition(groups, kind, bridge))
+            return Partition(groups, kind, bridge)
         case Jammed(jam=jam):
-            return RadioEvent(jam=jam) if jam is not None else None
+            return jam
         case Flapped(flap=flap):
-            return RadioEvent(flap=Flap(flap.period_s, flap.links)) if flap is not None else None
-        case ConditionsChanged():
-            if event.undone is not None:
-                return None
-            return RadioEvent(netem=Conditions(**{k: getattr(event, k) for k in _CHANGE_KEYS}))
+            return Flap(flap.period_s, flap.links) if flap is not None else None
+        case ConditionsChanged(undone=undone):
+            keys = {key: getattr(event, key) for key in _CONDITION_KEYS}
+            return Conditions(**keys) if undone is None else None
     assert_never(event)
 
 

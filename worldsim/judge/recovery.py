@@ -1,11 +1,11 @@
-"""Recoveries: how long a team that changed takes until it stands in a whole formation again.
+"""Recoveries: the time until a team that changed stands in a complete formation again.
 
-Whole: the living hold exactly the places that the formation has for so many, and those that a dead
-vehicle hovers in are not among them (E18). Standing: each within 0.12 m of its own, for 2 s.
+Complete: the running agents hold exactly the places that the formation has for their number; a
+place in which a dead vehicle hovers is not among them (E18). Standing: each agent is within 0.12 m
+of its own slot for 2 s.
 """
 
-from dataclasses import dataclass
-
+import msgspec
 import numpy as np
 
 from agent.messages import Place
@@ -16,32 +16,32 @@ from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import CONVERGED_S
 
 
-@dataclass(slots=True)
-class Recovery:
-    """One change of the team: at ``t_s`` [s] these agents went, or came.
-
-    reformed_s: from then to the start of the 2 s [s]; None as long as there were none.
-    """
+class Recovery(msgspec.Struct):
+    """A change of the team, and its time to re-form."""
 
     t_s: float
+    """When the team changed [s; simulated time]."""
     kind: str
+    """The kind of the events."""
     agents: list[int]
+    """The agents that were lost or came back."""
     reformed_s: float | None = None
+    """From the change to the start of the 2 s [s]; None until the team has re-formed."""
 
 
 class Recoveries:
-    """Every change of the team in a run, and what became of it; bodies: shown every tick."""
+    """Every change of the team in a run. hovering: sees every tick first."""
 
-    def __init__(self, bodies: HoveringVehicles) -> None:
+    def __init__(self, hovering: HoveringVehicles) -> None:
         self.all: list[Recovery] = []
         self._open: list[Recovery] = []
         self._since_s: float | None = None
-        self._bodies = bodies
+        self._hovering = hovering
         self._seen: tuple[bytes, ...] = ()
-        self._whole = False
+        self._complete = False
 
-    def note(self, event: LossEvent | ReturnEvent) -> None:
-        """Note that an agent went or came; without an agent, that a start was refused."""
+    def handle_event(self, event: LossEvent | ReturnEvent) -> None:
+        """Take the loss or return of an agent; without an agent, a start that was refused."""
         self._since_s = None
         last = self.all[-1] if self.all else None
         if last is None or (last.t_s, last.kind) != (event.t_s, event.kind):
@@ -54,10 +54,10 @@ class Recoveries:
             last.agents.append(event.agent)
 
     def see(self, tick: Tick, phase: Phase, in_place: bool) -> None:
-        """Take a tick; in_place: whether all the living are in their places."""
+        """Take a tick; in_place: whether every running agent is in its place."""
         if not self._open:
             return
-        if not (in_place and self._all_back(tick) and self._is_whole(tick, phase)):
+        if not (in_place and self._all_back(tick) and self._is_complete(tick, phase)):
             self._since_s = None
             return
         if self._since_s is None:
@@ -68,25 +68,25 @@ class Recoveries:
             self._open = []
 
     def _all_back(self, tick: Tick) -> bool:
-        """Whether those who came, and did not go again, have booted."""
-        gone: set[int] = set()
+        """Return whether every agent that came back, and was not lost again, has booted."""
+        lost_again: set[int] = set()
         for recovery in reversed(self.all):
             if recovery.kind in LOSS_KINDS:
-                gone.update(recovery.agents)
-            elif any(agent not in gone and not tick.alive[agent] for agent in recovery.agents):
+                lost_again.update(recovery.agents)
+            elif any(not tick.alive[agent] for agent in recovery.agents if agent not in lost_again):
                 return False
         return True
 
-    def _is_whole(self, tick: Tick, phase: Phase) -> bool:
-        rows = (tick.place, tick.alive, tick.mission, self._bodies.hovering(tick))
+    def _is_complete(self, tick: Tick, phase: Phase) -> bool:
+        rows = (tick.place, tick.alive, tick.mission, self._hovering.hovering(tick))
         seen = tuple(each.tobytes() for each in rows)
         if seen != self._seen:
             self._seen = seen
             held = [claim for claim in phase.claims(tick) if claim[0] >= 0]
-            self._whole = set(held) == self._places(tick, phase)
-        return self._whole
+            self._complete = set(held) == self._places(tick, phase)
+        return self._complete
 
     def _places(self, tick: Tick, phase: Phase) -> set[Place]:
-        """Return the places that the living must hold."""
+        """Return the places that the running agents must hold."""
         team = np.flatnonzero(tick.alive).tolist()
-        return set(self._bodies.layout(tick, phase, team).places)
+        return set(self._hovering.layout(tick, phase, team).places)

@@ -1,9 +1,9 @@
-"""What happens in a run, as typed events: one line each of events.jsonl and of the recording.
+"""Run events: everything that a run reports, one line each in events.jsonl and the recording.
 
-``kind`` is the event's own key. The judge, the recorder and readers of a run see the same events.
+``kind`` is the event's key. The judge, the recorder and readers of a run get the same events.
 """
 
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import msgspec
 
@@ -13,17 +13,18 @@ from netem.faults import Flap, Group, Jam, PartitionKind
 from netem.link_keys import Conditions
 
 By = Literal["operator"] | None
-"""Who asked for an event; None: the timeline."""
+"""The source of an event; None: the timeline."""
 
 
 class Event(
     msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="kind", gc=False
 ):
-    """Something that happened at a time, to one agent or to none in particular."""
+    """Something that happened at a time."""
 
     t_s: float
     """[s; simulated time]"""
     agent: int | None
+    """The agent that it happened to; None where there is no single one."""
 
     @property
     def kind(self) -> str:
@@ -32,27 +33,27 @@ class Event(
 
 
 class PlannedEvent(Event, frozen=True, kw_only=True):
-    """An event that the timeline, an operator or an accident caused."""
+    """An event that the timeline or an operator caused, or an unplanned exit."""
 
     planned: bool
-    """False for an accident."""
+    """False for an unplanned exit."""
     by: By = None
 
 
 class ProcessEvent(PlannedEvent, frozen=True, kw_only=True):
-    """A change of an agent's process, or of no process where none was selected."""
+    """A change of an agent's process; without an agent where the selectors selected none."""
 
     nobody: tuple[int | str, ...] | None = None
-    """The selectors, where they mean no agent."""
+    """The selectors, where they selected no agent."""
 
 
 class Killed(ProcessEvent, frozen=True, tag="kill"):
     """An agent's process ended; its vehicle hovers."""
 
     signal: int | None = None
-    """By which it ended, where that was not planned."""
+    """The signal that ended it, where that was unplanned."""
     status: int | None = None
-    """With which it ended, where that was not planned."""
+    """Its exit status, where its end was unplanned."""
 
 
 class Left(ProcessEvent, frozen=True, tag="leave"):
@@ -64,79 +65,87 @@ class Paused(ProcessEvent, frozen=True, tag="pause"):
 
 
 class Resumed(ProcessEvent, frozen=True, tag="resume"):
-    """An agent's stopped process goes on."""
+    """An agent's stopped process continued."""
 
 
 class StartEvent(PlannedEvent, frozen=True, kw_only=True):
-    """An agent's process started, or none where that was refused."""
+    """An agent's process started; without an agent where the start was refused."""
 
     incarnation: int | None = None
     refused: str | None = None
-    """Why no process starts."""
+    """The reason for which no process started."""
 
 
 class Restarted(StartEvent, frozen=True, tag="restart"):
-    """An agent that had died or left comes back."""
+    """An agent that had died or left started again."""
 
 
 class Joined(StartEvent, frozen=True, tag="join"):
-    """A new agent comes."""
+    """A new agent started."""
 
 
 class RadioFaultEvent(PlannedEvent, frozen=True, kw_only=True):
-    """A fault of the radio began or ended; ``number`` identifies it."""
+    """A radio fault began or ended."""
 
     number: int
+    """The fault's number."""
 
 
 class Partitioned(RadioFaultEvent, frozen=True, kw_only=True, tag="partition"):
     """A partition began."""
 
     groups: tuple[Group, ...]
+    """The ids of each group."""
     parted: PartitionKind
+    """The partition's kind."""
     bridge: tuple[int, ...]
+    """Ids; for the kind "bridge"."""
 
 
 class Healed(PlannedEvent, frozen=True, kw_only=True, tag="heal"):
-    """A partition ended, or all of them."""
+    """One partition ended, or all."""
 
     number: int | None = None
-    """Of the one that ended; None: all."""
+    """The number of the partition that ended; None: all ended."""
 
 
 class Jammed(RadioFaultEvent, frozen=True, kw_only=True, tag="jam"):
-    """A jam began, or ended."""
+    """A jam began or ended."""
 
     jam: Jam | None
-    """None: it ended."""
+    """None: the jam ended."""
 
 
 class FlapWindow(Flap, frozen=True):
-    """A flap and its start [s; simulated time]."""
+    """A flap and its start."""
 
     from_s: float = 0.0
+    """[s; simulated time]"""
 
 
 class Flapped(RadioFaultEvent, frozen=True, kw_only=True, tag="flap"):
-    """Links began to flap, or stopped."""
+    """A flap began or ended."""
 
     flap: FlapWindow | None
-    """None: they stopped."""
+    """None: the flap ended."""
 
 
 class ConditionsChanged(
     Conditions, frozen=True, kw_only=True, omit_defaults=True, tag_field="kind", tag="netem"
 ):
-    """Link conditions changed: by its own link keys, or back where a change is ``undone``."""
+    """Link conditions changed: to its link keys, or back where a change was undone."""
 
     t_s: float
+    """[s; simulated time]"""
     agent: int | None
     planned: bool
     by: By = None
     number: int
+    """The change's number."""
     conditions: Conditions
-    """All that hold from now on."""
+    """All conditions in force from now on."""
     undone: Conditions | None = None
+    """The change that ended."""
 
     @property
     def kind(self) -> str:
@@ -148,7 +157,7 @@ class SensorChanged(PlannedEvent, frozen=True, kw_only=True, tag="sensor"):
     """An agent's sensor fails, or works again."""
 
     sensor: str
-    """Its kind, or "all"."""
+    """The sensor's kind, or "all"."""
     mode: str
     """stuck, silent, wrong, or "works again"."""
 
@@ -157,42 +166,47 @@ class MissionEvent(PlannedEvent, frozen=True, kw_only=True):
     """A mission was given to an agent."""
 
     formation: str
-    """Its name."""
+    """The formation's name."""
     mission: int
     """The mission's key."""
     path: FramePath
+    """Of the target's frame [world frame]."""
     tables: FormationSpec
+    """The formation."""
 
 
 class FormationGiven(MissionEvent, frozen=True, tag="formation"):
-    """A mission with a new formation."""
+    """A mission with a new formation was given."""
 
 
 class FrameGiven(MissionEvent, frozen=True, tag="frame"):
-    """A mission with a new frame."""
+    """A mission with a new frame was given."""
 
 
 class SlotChanged(Event, frozen=True, kw_only=True, tag="slot"):
-    """An agent claims another place, as queue and rank."""
+    """An agent claims another place."""
 
     place: tuple[int, int] | None
+    """Queue and rank; None: it claims no place."""
     before: tuple[int, int] | None
+    """The place that it claimed before."""
 
 
 class QueueChanged(Event, frozen=True, kw_only=True, tag="queue"):
-    """An agent is in another queue."""
+    """An agent changed its queue."""
 
     queue: int | None
+    """The queue's index; None: it claims no place."""
 
 
 class RoleChanged(Event, frozen=True, kw_only=True, tag="role"):
-    """An agent became a vertex agent, or is none any more."""
+    """An agent became a vertex agent, or a member again."""
 
     role: Literal["vertex", "member"]
 
 
 class LateStart(Event, frozen=True, kw_only=True, tag="late"):
-    """An agent's process is not up by the end of its boot time."""
+    """An agent's process had not started by the end of its boot time."""
 
     detail: str
 
@@ -215,14 +229,14 @@ RunEvent = (
 )
 
 
-def as_row(event: RunEvent) -> dict[str, Any]:
-    """Return an event as plain data, ``t_s``, ``kind`` and ``agent`` first."""
-    row: dict[str, Any] = msgspec.to_builtins(event)
+def as_row(event: RunEvent) -> dict[str, object]:
+    """Return an event as a row of events.jsonl: ``t_s``, ``kind``, ``agent``, then its own keys."""
+    row: dict[str, object] = msgspec.to_builtins(event)
     first = {key: row.pop(key) for key in ("t_s", "kind", "agent")}
     return first | row
 
 
-def event_of(row: Any) -> RunEvent:
-    """Return the event of a row. Raises msgspec.ValidationError where it is none."""
+def event_of(row: object) -> RunEvent:
+    """Return the event of a row. Raises msgspec.ValidationError where the row is no event."""
     event: RunEvent = msgspec.convert(row, RunEvent)
     return event

@@ -1,35 +1,46 @@
-"""The judge: sees every tick, and says in the end whether the expectations held.
+"""The judge: measures every tick of a run and decides whether the expectations are met.
 
-It sees ticks and is told events, in order; an event counts before the tick of its time. The same
-judge, fed from a recording, comes to the same verdict.
+It takes events and ticks in order, an event before the tick of its time. Given the events and ticks
+of a recording, it reaches the same verdict.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import inf
-from typing import Any
+from typing import assert_never
 
+import msgspec
 import numpy as np
 
 from agent.guidance.cone import cone_of
 from agent.qstructure.formation import Formation
 from worldsim.judge.hovering_vehicles import HoveringVehicles
-from worldsim.judge.invariants import Invariants
+from worldsim.judge.invariants import Invariants, InvariantTally
 from worldsim.judge.metrics import Separation, conserved
 from worldsim.judge.obstacle_clearance import ObstacleClearance
 from worldsim.judge.phase import Phase
 from worldsim.judge.queue_convergence import QueueConvergence
 from worldsim.judge.recovery import Recoveries, Recovery
 from worldsim.judge.run_events import (
+    ConditionsChanged,
+    Flapped,
     FormationGiven,
     FrameGiven,
+    Healed,
+    Jammed,
     Joined,
     Killed,
+    LateStart,
     Left,
     MissionRunEvent,
+    Partitioned,
     Paused,
+    QueueChanged,
     Restarted,
     Resumed,
+    RoleChanged,
     RunEvent,
+    SensorChanged,
+    SlotChanged,
 )
 from worldsim.judge.tick import Packets, Tick
 from worldsim.scenario.tables import Scenario
@@ -39,81 +50,93 @@ from worldsim.truth.vehicle import Floats
 TURN_LIMIT_SLACK_DEG = 1e-6
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Figures:
-    """What the judge measured at one tick; NaN where there is nothing to measure.
-
-    separation (N,) [m]: swept since the tick before; slot_error (N,) [m]: to the agent's own slot;
-    obstacle_distance (N,) [m]: centre to surface, swept likewise; None where there is no obstacle.
-    queue_residual (Q,) [m]: of each queue by itself.
-    """
+    """The judge's measurements at one tick; row i = agent i, NaN where nothing can be measured."""
 
     separation: Floats
+    """(N,): least distance to any other vehicle since the last tick, centre to centre [m]."""
     slot_error: Floats
+    """(N,): distance to the agent's own slot [m]; infinite without a valid one."""
     converged: bool
+    """Whether every agent is within 0.12 m of its slot."""
     obstacle_distance: Floats | None = None
+    """(N,): least distance since the last tick, centre to surface [m]; None without obstacles."""
     queue_residual: Floats | None = None
+    """(Q,): largest slot error in each queue [m]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Expectation:
-    """One thing a run must show, and what it did show."""
+class Expectation(msgspec.Struct, frozen=True, kw_only=True):
+    """A requirement on a run, and its measured value."""
 
     name: str
-    wanted: Any
-    got: Any
+    """Its unit is in the name; a convergence is in seconds."""
+    wanted: float | None
+    """The limit; None: the value need only exist."""
+    got: float | None
+    """The measured value; None where there is none."""
     held: bool
+    """Whether the requirement is met."""
 
 
 class Judge:
-    """Sees every tick of a run under a scenario's expectations."""
+    """Measures every tick of a run under a scenario's expectations."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         formation = Formation(scenario.formation, scenario.control.spacing_m)
         self.phases = [Phase(formation, 0.0, path_of(scenario.frame))]
         self.queues = [QueueConvergence(self.phases[0])]
-        self._bodies = HoveringVehicles(scenario.control.spacing_m)
-        self._recoveries = Recoveries(self._bodies)
-        self._allocation = Invariants(scenario, self._bodies) if scenario.expect.converge else None
-        self.ticks = 0
+        self._hovering = HoveringVehicles(scenario.control.spacing_m)
+        self._recoveries = Recoveries(self._hovering)
+        converges = scenario.expect.converge
+        self._allocation = Invariants(scenario, self._hovering) if converges else None
         self.min_separation_m: float | None = None
+        """The least separation so far [m]; None before two vehicles were in the world."""
         self.clearance = ObstacleClearance(scenario)
-        self.safety_violations = 0
-        self.packet_ticks = 0
-        self.packet_violations = 0
+        self._safety = InvariantTally()
+        self._conservation = InvariantTally()
         cones = np.degrees([cone_of(vehicle) for vehicle in scenario.vehicles])
         self._turn_left_deg, self._turn_right_deg = cones.T + TURN_LIMIT_SLACK_DEG
         self._turns = 0
         self._turns_over = 0
-        self._before: Tick | None = None
+        self._last: Tick | None = None
         self._separation = Separation()
 
-    def note(self, event: RunEvent) -> None:
-        """Take an event of the run, in order; most kinds change nothing for the judge."""
+    @property
+    def ticks(self) -> int:
+        """Number of ticks judged so far."""
+        return self._safety.ticks
+
+    def handle_event(self, event: RunEvent) -> None:
+        """Take an event; events come in order."""
         if self._allocation is not None:
-            self._allocation.note(event)
+            self._allocation.handle_event(event)
         match event:
             case FormationGiven() | FrameGiven():
                 self._open_phase(event)
             case Restarted() | Joined():
-                self._recoveries.note(event)
-            case Killed() | Left() | Paused() | Resumed() if event.nobody is None:
-                self._recoveries.note(event)
+                self._recoveries.handle_event(event)
+            case Killed() | Left() | Paused() | Resumed():
+                if event.nobody is None:
+                    self._recoveries.handle_event(event)
+            case Partitioned() | Healed() | Jammed() | Flapped() | ConditionsChanged():
+                pass
+            case SensorChanged() | SlotChanged() | QueueChanged() | RoleChanged() | LateStart():
+                pass
+            case _:
+                assert_never(event)
 
     def see(self, tick: Tick) -> Figures:
-        """Judge one tick; ticks come in order."""
-        before = self._before if self._before is not None else tick
-        self._before = tick
-        self.ticks += 1
-        self._bodies.see(tick)
+        """Judge a tick; ticks come in order."""
+        last = self._last if self._last is not None else tick
+        self._last = tick
+        self._hovering.see(tick)
         separation = self._separation.swept(tick.position)
-        distance, too_near = self.clearance.see(before, tick) if self.clearance else (None, False)
-        self.safety_violations += self._see_separation(separation) or too_near
-        self._see_packets(tick.packets)
-        self._turns += int(np.count_nonzero(~np.isnan(tick.turn_deg)))
-        self._turns_over += int(np.count_nonzero(tick.turn_deg > self._turn_left_deg))
-        self._turns_over += int(np.count_nonzero(tick.turn_deg < -self._turn_right_deg))
+        distance, too_near = self.clearance.see(last, tick) if self.clearance else (None, False)
+        self._safety.count(self._is_too_near(separation) or too_near)
+        self._check_packets(tick.packets)
+        self._count_turns(tick)
         phase = self.phases[-1]
         error = phase.slot_error(tick)
         in_place = phase.see(tick.time_s, np.where(tick.alive, error, np.nan))
@@ -130,7 +153,7 @@ class Judge:
 
     @property
     def recoveries(self) -> list[Recovery]:
-        """Every change of the team, and how long it took to re-form."""
+        """Every change of the team, and its time to re-form."""
         return self._recoveries.all
 
     @property
@@ -140,78 +163,79 @@ class Judge:
 
     @property
     def attitude_error_deg(self) -> float | None:
-        """Largest angle missed at the last tick [deg]; None where every angle is free."""
-        return None if self._before is None else self.phases[-1].attitude_error_deg(self._before)
+        """Largest attitude error at the last tick [deg]; None where every angle is free."""
+        return None if self._last is None else self.phases[-1].attitude_error_deg(self._last)
 
     @property
     def turns_over_limit_fraction(self) -> float | None:
-        """Share of moving steps whose wanted turn exceeds the vehicle's; None without any."""
+        """Share of moving steps whose wanted turn exceeds the vehicle's limit; None without any."""
         return self._turns_over / self._turns if self._turns else None
 
     def expectations(self) -> list[Expectation]:
-        """Return what was expected of the run and what it showed."""
+        """Return every expectation of the run with its measured value."""
         expect = self._scenario.expect
-        wanted_m = self._scenario.separation_bound_m
-        least = self.min_separation_m
-        rows = [
-            Expectation(
-                "min_separation_m",
-                wanted_m,
-                least,
-                least >= wanted_m if least is not None else self._scenario.fleet.agents == 1,
-            )
-        ]
+        rows = [self._separated()]
         if self.clearance:
             rows.append(self._cleared())
-        for phase in self.phases if expect.converge else ():
-            within = expect.converge_within_s
-            got = phase.converge_s
-            held = got is not None and (within is None or got <= within)
-            rows.append(Expectation(f"converge {phase.formation.name}", within, got, held))
+        if expect.converge:
+            rows += [self._converged(phase) for phase in self.phases]
         if expect.reform_within_s is not None:
             rows.append(self._reformed(expect.reform_within_s))
         return rows
 
-    def invariants(self) -> dict[str, dict[str, int]]:
-        """Return each invariant checked at every tick: ticks evaluated, violations.
+    def invariants(self) -> dict[str, InvariantTally]:
+        """Return the tally of each invariant.
 
-        I1: no two vehicles too near, and none to an obstacle. I8 is evaluated wherever the medium's
-        counters are known: in virtual time at every tick, in processes from netem's first report
-        on. One of allocation whose premise never held is absent, as are all of them where no
-        formation is to be formed.
+        I1: no two vehicles are too near, and none is too near to an obstacle. I8: conservation of
+        packets, evaluated where the medium's counters are known: in virtual time at every tick, in
+        processes from netem's first report on. An allocation invariant whose premise never held is
+        absent; all are absent where the run need not converge.
         """
         tallies = self._allocation.tallies if self._allocation is not None else {}
-        allocation = {name: asdict(tally) for name, tally in tallies.items() if tally.ticks}
-        return {
-            "I1": {"ticks": self.ticks, "violations": self.safety_violations},
-            **allocation,
-            "I8": {"ticks": self.packet_ticks, "violations": self.packet_violations},
-        }
+        allocation = {name: tally for name, tally in tallies.items() if tally.ticks}
+        return {"I1": self._safety, **allocation, "I8": self._conservation}
 
     def _open_phase(self, event: MissionRunEvent) -> None:
         formation = Formation(event.tables, self._scenario.control.spacing_m)
         self.phases.append(Phase(formation, event.t_s, event.path, event.mission))
         self.queues.append(QueueConvergence(self.phases[-1]))
 
-    def _reformed(self, within_s: float) -> Expectation:
-        took = [recovery.reformed_s for recovery in self.recoveries]
-        known = [each for each in took if each is not None]
-        worst_s = max(known) if known and len(known) == len(took) else None
-        held = len(known) == len(took) and all(each <= within_s for each in known)
-        return Expectation("reform_within_s", within_s, worst_s, held)
+    def _separated(self) -> Expectation:
+        wanted_m = self._scenario.separation_bound_m
+        least_m = self.min_separation_m
+        held = least_m >= wanted_m if least_m is not None else self._scenario.fleet.agents == 1
+        return Expectation(name="min_separation_m", wanted=wanted_m, got=least_m, held=held)
 
     def _cleared(self) -> Expectation:
         wanted_m, least_m = self.clearance.bound_m, self.min_obstacle_distance_m
         held = least_m is not None and least_m >= wanted_m
-        return Expectation("min_obstacle_distance_m", wanted_m, least_m, held)
+        return Expectation(name="min_obstacle_distance_m", wanted=wanted_m, got=least_m, held=held)
 
-    def _see_packets(self, packets: Packets) -> None:
+    def _converged(self, phase: Phase) -> Expectation:
+        within_s, got_s = self._scenario.expect.converge_within_s, phase.converge_s
+        held = got_s is not None and (within_s is None or got_s <= within_s)
+        name = f"converge {phase.formation.name}"
+        return Expectation(name=name, wanted=within_s, got=got_s, held=held)
+
+    def _reformed(self, within_s: float) -> Expectation:
+        times_s = [recovery.reformed_s for recovery in self.recoveries]
+        known_s = [time_s for time_s in times_s if time_s is not None]
+        complete = len(known_s) == len(times_s)
+        worst_s = max(known_s) if known_s and complete else None
+        held = complete and all(time_s <= within_s for time_s in known_s)
+        return Expectation(name="reform_within_s", wanted=within_s, got=worst_s, held=held)
+
+    def _check_packets(self, packets: Packets) -> None:
         if "addressed" in packets:
-            self.packet_ticks += 1
-            self.packet_violations += not conserved(packets)
+            self._conservation.count(not conserved(packets))
 
-    def _see_separation(self, separation: Floats) -> bool:
-        """Take the distances of a tick [m]; return whether two were too near."""
+    def _count_turns(self, tick: Tick) -> None:
+        self._turns += int(np.count_nonzero(~np.isnan(tick.turn_deg)))
+        self._turns_over += int(np.count_nonzero(tick.turn_deg > self._turn_left_deg))
+        self._turns_over += int(np.count_nonzero(tick.turn_deg < -self._turn_right_deg))
+
+    def _is_too_near(self, separation: Floats) -> bool:
+        """Take the separations of a tick (N,) [m]; return whether any is below the limit."""
         least = float(np.fmin.reduce(separation, initial=np.inf))
         if least == inf:
             return False

@@ -54,7 +54,7 @@ class RunRecorder:
     mode: "processes", "lockstep" or "virtual".
     """
 
-    shows = True
+    records_ticks = True
 
     def __init__(
         self,

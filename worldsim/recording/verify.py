@@ -10,6 +10,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
+from worldsim.judge.invariants import InvariantTally
 from worldsim.judge.phase import Phase
 from worldsim.judge.recovery import Recovery
 from worldsim.judge.run_events import PlannedEvent, RunEvent
@@ -64,7 +67,7 @@ class Verification:
     turns_over_limit_fraction: Figure = None
     phases: tuple[PhaseFigures, ...] = ()
     recoveries: tuple[Recovery, ...] = ()
-    invariants: dict[str, dict[str, int]] = field(default_factory=dict)
+    invariants: dict[str, InvariantTally] = field(default_factory=dict)
     summary: bool = False
     """Whether there is a summary to compare with."""
     differences: tuple[Difference, ...] = ()
@@ -82,7 +85,7 @@ class Verification:
     @property
     def passes(self) -> bool:
         """Whether every expectation held and no invariant was violated, at one tick or more."""
-        violations = sum(counts["violations"] for counts in self.invariants.values())
+        violations = sum(tally.violations for tally in self.invariants.values())
         return self.ticks > 0 and not violations and all(row.held for row in self.expectations)
 
     @property
@@ -138,7 +141,7 @@ def _judge_of(readback: Readback) -> Judge:
     events = sorted(readback.events, key=lambda event: event.t_s)
     for tick in readback.ticks:
         while noted < len(events) and _comes_before(events[noted], tick):
-            judge.note(events[noted])
+            judge.handle_event(events[noted])
             noted += 1
         judge.see(tick)
     return judge
@@ -181,8 +184,8 @@ def _figures_by_path(judged: Verification) -> dict[str, object]:
         "min_obstacle_distance_m": judged.min_obstacle_distance_m,
         "turns_over_limit_fraction": judged.turns_over_limit_fraction,
     }
-    for name, counts in judged.invariants.items():
-        figures[f"invariants.{name}"] = counts
+    for name, tally in judged.invariants.items():
+        figures[f"invariants.{name}"] = msgspec.structs.asdict(tally)
     for index, phase in enumerate(judged.phases):
         for key in ("formation", "from_s", "converged", "converge_s", "residual_m"):
             figures[f"phases.{index}.{key}"] = getattr(phase, key)

@@ -23,7 +23,7 @@ class Sinks:
     def __init__(self, directory: RunDirectory, recorder: ClosingRecorder | None) -> None:
         self._directory = directory
         self._recorder = recorder
-        self.shows = recorder is not None
+        self.records_ticks = recorder is not None
 
     def tick(self, tick: Tick, figures: Figures) -> None:
         """Record one tick."""

@@ -8,8 +8,11 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any, Literal, TypedDict
 
+import msgspec
+
 from netem.messages import MediumCounters
 from worldsim.engine.step import SlotLoop
+from worldsim.judge.invariants import InvariantTally
 from worldsim.judge.verdict import Expectation, Judge
 from worldsim.results.provenance import Provenance, provenance
 from worldsim.scenario.tables import Scenario
@@ -141,9 +144,9 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "packets": _packets(counters, rejected),
         "rejected_by_cause": rejected,
-        "direct_links": run.loop.radio_use.links(),
+        "direct_links": msgspec.to_builtins(run.loop.radio_use.links()),
         "bytes_per_s": run.loop.radio_use.bytes_per_s(counters),
-        "invariants": invariants,
+        "invariants": msgspec.to_builtins(invariants),
         "delivery": run.delivery,
         "delivery_late_ms": _delivery_late_ms(counters),
         "late_tick_fraction": run.late_tick_fraction,
@@ -156,7 +159,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
 
 
 def _outcome(
-    run: FinishedRun, expectations: list[Expectation], invariants: dict[str, dict[str, int]]
+    run: FinishedRun, expectations: list[Expectation], invariants: dict[str, InvariantTally]
 ) -> tuple[Outcome, str | None]:
     """Return the outcome and its reason.
 
@@ -164,13 +167,13 @@ def _outcome(
     """
     if run.failure is not None:
         return "fail", run.failure
-    violated = [name for name, counts in invariants.items() if counts["violations"]]
+    violated = [name for name, tally in invariants.items() if tally.violations]
     if violated:
         return "fail", f"violated: {', '.join(violated)}"
     doubt = _doubt(run)
     if doubt is not None:
         return "inconclusive", doubt
-    unseen = [name for name, counts in invariants.items() if not counts["ticks"]]
+    unseen = [name for name, tally in invariants.items() if not tally.ticks]
     if unseen:
         return "fail", f"never evaluated: {', '.join(unseen)}"
     missed = [expectation.name for expectation in expectations if not expectation.held]
@@ -258,6 +261,8 @@ def _finite(value: Any) -> Any:
     """Replace NaN and infinity by None: JSON has neither, and neither was measured."""
     if isinstance(value, float):
         return float(value) if isfinite(value) else None
+    if isinstance(value, msgspec.Struct):
+        return _finite(msgspec.structs.asdict(value))
     if isinstance(value, dict):
         return {key: _finite(inner) for key, inner in value.items()}
     return [_finite(inner) for inner in value] if isinstance(value, list | tuple) else value

@@ -1,6 +1,6 @@
-"""The timeline's tables: what happens to a fleet while it flies.
+"""The timeline's table: an event is one action at one time.
 
-An event is one action at one time. ``event_checks`` says what must hold between events.
+``event_checks`` checks events against each other.
 """
 
 from agent.config import Positive
@@ -16,21 +16,22 @@ from worldsim.scenario.faults import (
     ProcessFault,
     Restart,
     Resume,
-    Selectors,
     SensorFault,
 )
+from worldsim.scenario.selectors import Selectors
 from worldsim.scenario.target_frame import FrameChange, Time
 
 
 class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
-    """One action at ``at_s``; ``for_s`` later it is undone, where it can be.
+    """One action at ``at_s``; ``for_s`` undoes it after that time, where it can be undone.
 
-    kill: processes die, their vehicles stop and hover; leave: the vehicles go too; restart: they
-    come back; join: new ones come, under the next free ids. pause: processes are stopped, their
-    vehicles hover once the last command has expired; resume: they go on. partition: groups that
-    hear only themselves, unnamed agents form one more, or a table for other kinds; heal ends it.
-    jam: a sphere where no radio works; flap: links that go down and up. netem: keys of [netem] that
-    change. sensor: sensors fail. formation, frame: a mission for the team.
+    kill: ends processes, the vehicles stop and hover; leave: the vehicles leave the world too;
+    restart: starts such agents again; join: adds new agents, under the next free ids. pause: stops
+    processes, the vehicles hover when the last command has expired; resume: continues them.
+    partition: cuts the links between groups, unnamed agents form one more; a table for other kinds;
+    heal: ends all partitions. jam: a sphere in which no radio works; flap: links that go down and
+    up. netem: changes keys of [netem]. sensor: lets sensors fail. formation, frame: a mission for
+    the team.
     """
 
     at_s: Time
@@ -47,7 +48,7 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
 
     @property
     def keys(self) -> list[str]:
-        """The keys of the actions that are given; a valid event has one."""
+        """The keys of the actions that are set; a valid event has one."""
         return [name for name in ACTIONS if getattr(self, name) is not None]
 
     @property
@@ -57,11 +58,11 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
 
     @property
     def action(self) -> Action:
-        """The action that is given. Raises LookupError without one."""
+        """The action whose key is set. Raises LookupError without one."""
         fault = self.radio_fault or self._process_fault or self.sensor
         action = fault or self.formation or self.frame
         if action is None:
-            raise LookupError("an event without an action")
+            raise LookupError("the event has no action")
         return action
 
     @property
@@ -79,20 +80,14 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
 
     @property
     def joiners(self) -> int:
-        """How many agents join by this event."""
+        """Number of agents that join by this event."""
         return self.join.count if isinstance(self.join, Join) else self.join or 0
-
-    @property
-    def selectors(self) -> Selectors:
-        """The agents that an action on processes selects; empty for other actions."""
-        return self.kill or self.leave or self.restart or self.pause or self.resume or ()
 
 
 _TIMES = ("at_s", "for_s")
 _RADIO = RadioEvent.__struct_fields__
 _OTHERS = (key for key in EventTable.__struct_fields__ if key not in (*_TIMES, *_RADIO))
 ACTIONS = (*_OTHERS, *_RADIO)
-UNDONE = ("kill", "leave", "pause", "partition", "jam", "flap", "netem", "sensor")
-"""Actions that ``for_s`` can undo."""
-ON_PROCESSES = ("kill", "leave", "restart", "join", "pause", "resume")
-"""Actions that need a launcher, which starts and signals processes."""
+"""The keys of all actions."""
+UNDOABLE = ("kill", "leave", "pause", "partition", "jam", "flap", "netem", "sensor")
+"""The keys of the actions that ``for_s`` can undo."""

@@ -1,7 +1,7 @@
-"""What an event of the timeline does: to agents' processes, to sensors, to the team's mission.
+"""Actions of the timeline: faults of processes and sensors, and missions.
 
-Faults of the radio are in ``netem.faults``. An event decodes into one of these; who is meant is
-found when it happens.
+An event decodes into one of these types, or into a radio fault of ``netem.faults``. Its selectors
+are resolved to agents when it happens.
 """
 
 from typing import Annotated, Literal
@@ -12,17 +12,13 @@ from msgspec import Meta
 from agent.config import Table
 from agent.qstructure.formation import FormationSpec
 from netem.faults import RadioFault
+from worldsim.scenario.selectors import Selectors
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.target_frame import FrameChange
 
-Selector = Annotated[
-    int | str,
-    Meta(description="an id, 'vertex:V1', 'queue:Q1', 'random:2' or 'all'"),
-]
-Selectors = Annotated[tuple[Selector, ...], Meta(min_length=1, max_length=1000)]
 Joiners = Annotated[int, Meta(ge=1, le=1000)]
 FailureMode = Literal["stuck", "silent", "wrong"]
-"""stuck: the last reading, for ever; silent: no reading; wrong: any reading."""
+"""stuck: repeats the last reading; silent: gives no reading; wrong: gives arbitrary readings."""
 
 
 class _Selected(msgspec.Struct, frozen=True):
@@ -30,35 +26,35 @@ class _Selected(msgspec.Struct, frozen=True):
 
 
 class Kill(_Selected, frozen=True):
-    """The agents' processes die; their vehicles stop and hover."""
+    """End the agents' processes; their vehicles stop and hover."""
 
 
 class Leave(_Selected, frozen=True):
-    """The agents' processes die, and their vehicles leave the world."""
+    """End the agents' processes, and take their vehicles out of the world."""
 
 
 class Restart(_Selected, frozen=True):
-    """Agents that died or left come back, each with the next incarnation."""
+    """Start agents that died or left again, each with its next incarnation."""
 
 
 class Pause(_Selected, frozen=True):
-    """The agents' processes are stopped; a vehicle hovers once its last command has expired."""
+    """Stop the agents' processes; a vehicle hovers when its last command has expired."""
 
 
 class Resume(_Selected, frozen=True):
-    """The agents' paused processes go on."""
+    """Continue the agents' paused processes."""
 
 
 class Join(Table, frozen=True):
-    """New agents come, under the next free ids."""
+    """Add new agents, under the next free ids."""
 
     count: Joiners
     start: BoxStart | ListStart | None = None
-    """Where their vehicles are put; left out: by the [fleet]'s start."""
+    """Start positions of their vehicles; None: by the start of [fleet]."""
 
 
 class SensorFault(Table, frozen=True):
-    """Sensors of some agents fail; ``kind`` left out: every sensor that they have."""
+    """Let sensors of the selected agents fail; without ``kind``, every sensor of an agent."""
 
     agents: Selectors
     mode: FailureMode
@@ -68,4 +64,4 @@ class SensorFault(Table, frozen=True):
 ProcessFault = Kill | Leave | Restart | Pause | Resume | Join
 MissionChange = FormationSpec | FrameChange
 Action = RadioFault | ProcessFault | SensorFault | MissionChange
-"""What one event does."""
+"""The action of one event."""

@@ -14,7 +14,7 @@ import tomli_w
 
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from worldsim.scenario.decoding import decode
-from worldsim.scenario.event_checks import Whose, check_course
+from worldsim.scenario.event_checks import FormationSource, check_timeline
 from worldsim.scenario.obstacle_tables import resolve_field
 from worldsim.scenario.rules import check_rules, tilt_problem
 from worldsim.scenario.tables import Scenario
@@ -39,12 +39,12 @@ def parse(
     try:
         data = tables(text, name)
         override(data, overrides, name)
-        origin = _place_formation(data, Path(name))
+        source = _place_formation(data, Path(name))
         later = _place_events(data, Path(name))
         scenario = _with_field(decode(data, Scenario, name), name)
         check_rules(scenario, name)
-        _check_formation(scenario, Path(name), *origin)
-        check_course(scenario, Path(name), later)
+        _check_formation(scenario, Path(name), *source)
+        check_timeline(scenario, Path(name), later)
     except ScenarioError as error:
         raise _marked_as_override(error, overrides) from error
     return scenario
@@ -67,31 +67,31 @@ def formation_tables(path: Path) -> Data:
     return formation
 
 
-def _place_formation(data: Data, file: Path) -> Whose:
-    """Replace a formation file's name by its content; return where the content's keys are."""
+def _place_formation(data: Data, file: Path) -> FormationSource:
+    """Put what the formation's file holds in place of its name; return its source."""
     table = data.get("formation")
     if not isinstance(table, dict) or "file" not in table:
-        return Whose(file, "formation.")
+        return FormationSource(file, "formation.")
     other = next((key for key in table if key != "file"), None)
     if other is not None:
         raise ScenarioError(file, f"formation.{other}", "cannot be combined with file")
     if not isinstance(table["file"], str):
         raise ScenarioError(file, "formation.file", "must be the path of a formation file, as text")
     path, data["formation"] = _formation_file(file, "formation.file", table["file"])
-    return Whose(path, "")
+    return FormationSource(path, "")
 
 
-def _place_events(data: Data, file: Path) -> dict[int, Whose]:
-    """Replace formation files' names in events by their content; return where its keys are."""
+def _place_events(data: Data, file: Path) -> dict[int, FormationSource]:
+    """Put what formations' files hold in place of their names; return the sources."""
     events = data.get("event")
-    origin = {}
+    sources = {}
     for index, event in enumerate(events if isinstance(events, list) else ()):
         named = event.get("formation") if isinstance(event, dict) else None
         if isinstance(named, str):
             key = f"event[{index}].formation"
             path, event["formation"] = _formation_file(file, key, named)
-            origin[index] = Whose(path, "")
-    return origin
+            sources[index] = FormationSource(path, "")
+    return sources
 
 
 def _formation_file(file: Path, key: str, named: str) -> tuple[Path, Data]:
@@ -115,13 +115,13 @@ def _with_field(scenario: Scenario, file: str | Path) -> Scenario:
     return msgspec.structs.replace(scenario, obstacle=obstacles, obstacle_field=None)
 
 
-def _check_formation(scenario: Scenario, file: Path, origin: Path, prefix: str) -> None:
+def _check_formation(scenario: Scenario, file: Path, source: Path, prefix: str) -> None:
     control = scenario.control
     try:
         formation = Formation(scenario.formation, control.spacing_m)
         formation.check(scenario.fleet.agents, scenario.min_slot_distance_m)
     except FormationError as error:
-        raise ScenarioError(origin, prefix + error.key, error.detail) from error
+        raise ScenarioError(source, prefix + error.key, error.detail) from error
     tilted = tilt_problem(scenario, formation, scenario.fleet.agents)
     if tilted is not None:
         raise ScenarioError(file, *tilted)

@@ -1,14 +1,15 @@
-"""What must hold of a radio fault by itself, in a fleet of so many agents."""
+"""Checks of a single radio fault, in a fleet of a given size."""
 
 from collections.abc import Iterator
+from typing import assert_never
 
-from netem.faults import Flap, Partition, RadioEvent
+from netem.faults import Flap, Heal, Jam, Partition, RadioEvent
 from netem.link_keys import Conditions
 from worldsim.scenario.problem import Problem
 
 
-def radio_findings(event: RadioEvent, agents: int) -> Iterator[Problem]:
-    """Return what is wrong with the radio fault of an event, if it has one."""
+def radio_problems(event: RadioEvent, agents: int) -> Iterator[Problem]:
+    """Yield what makes the radio fault of an event invalid; nothing for other events."""
     fault = event.radio_fault
     match fault:
         case Partition():
@@ -18,6 +19,10 @@ def radio_findings(event: RadioEvent, agents: int) -> Iterator[Problem]:
             yield from _flap(fault, agents)
         case Conditions():
             yield from _links(fault, agents)
+        case Jam() | Heal() | None:
+            pass
+        case _:
+            assert_never(fault)
 
 
 def _partition(partition: Partition, prefix: str, agents: int) -> Iterator[Problem]:
@@ -31,7 +36,7 @@ def _partition(partition: Partition, prefix: str, agents: int) -> Iterator[Probl
                 yield Problem(key, f"agent {agent} is named twice")
             seen.add(agent)
     if bool(partition.bridge) != (partition.kind == "bridge"):
-        detail = "the agents that all hear; with kind = 'bridge', and only there"
+        detail = "agents that keep all links; goes with kind = 'bridge', and only with it"
         yield Problem("partition.bridge", detail)
 
 
@@ -42,7 +47,7 @@ def _flap(flap: Flap, agents: int) -> Iterator[Problem]:
             if agent >= agents:
                 yield Problem(key, _unknown(agent, agents))
         if pair[0] == pair[1]:
-            yield Problem(key, "a link to itself; [from, to], two agents")
+            yield Problem(key, "a link to itself; [from, to] are two agents")
         if pair in flap.links[:index]:
             yield Problem(key, "given before")
 

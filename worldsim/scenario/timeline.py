@@ -1,4 +1,4 @@
-"""The timeline: which event begins or ends when. Pure; the same for every clock."""
+"""The timeline: the steps of a scenario's events in time, the same for every clock."""
 
 from bisect import insort
 from math import inf
@@ -8,6 +8,7 @@ from worldsim.scenario.events import EventTable
 from worldsim.scenario.tables import Scenario
 
 SLACK_S = 1e-9
+"""Times closer than this are one time [s]."""
 
 
 class Step(NamedTuple):
@@ -16,16 +17,14 @@ class Step(NamedTuple):
     at_s: float
     """[s; simulated time]"""
     number: int
-    """The event's: its index in the scenario, or for an operator's event the next number."""
+    """The event's number: its index in the scenario; an operator's event gets the next one."""
     event: EventTable
     ends: bool
+    """Whether the event ends; otherwise it begins."""
 
 
 def steps(scenario: Scenario) -> list[Step]:
-    """Return the beginnings and ends of all events in the order in which they happen.
-
-    At one time ends come before beginnings.
-    """
+    """Return the steps of all events in order of time; at one time, ends before beginnings."""
     begun = [Step(event.at_s, i, event, False) for i, event in enumerate(scenario.event)]
     ended = [
         Step(event.at_s + event.for_s, i, event, True)
@@ -36,7 +35,7 @@ def steps(scenario: Scenario) -> list[Step]:
 
 
 class Timeline:
-    """A scenario's events in order of their times, and an operator's as they come."""
+    """The steps of a scenario's events and of the operator's events, in order of time."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._steps = steps(scenario)
@@ -45,28 +44,28 @@ class Timeline:
 
     @property
     def next_s(self) -> float:
-        """When the next step is due [s]; infinite after the last."""
+        """When the next step is due [s; simulated time]; infinite after the last."""
         return self._steps[self._next].at_s if self._next < len(self._steps) else inf
 
     @property
     def joiners(self) -> int:
-        """How many agents are still to join by the events to come."""
+        """Number of agents that join by the events to come."""
         return sum(step.event.joiners for step in self._steps[self._next :] if not step.ends)
 
     def due(self, time_s: float) -> list[Step]:
-        """Return the steps due by a time [s] that were not returned before, in order."""
+        """Return the steps that became due by a time [s] since the last call, in order."""
         first = self._next
         while self.next_s <= time_s + SLACK_S:
             self._next += 1
         return self._steps[first : self._next]
 
     def begin_now(self, event: EventTable) -> Step:
-        """Return the step of an operator's event, which begins at its ``at_s``, now."""
+        """Return the step of an operator's event, which begins now, at its ``at_s``."""
         self._number += 1
         return Step(event.at_s, self._number, event, False)
 
     def end_later(self, begun: Step) -> None:
-        """Add the end of an operator's event, if it has one."""
+        """Add the end of an operator's event, where it has one."""
         if begun.event.for_s is not None:
             step = begun._replace(at_s=begun.at_s + begun.event.for_s, ends=True)
             insort(self._steps, step, lo=self._next, key=lambda each: each.at_s)

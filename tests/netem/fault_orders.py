@@ -1,4 +1,4 @@
-"""Orders to the medium, as tests write them."""
+"""Fault orders for tests."""
 
 from netem.faults import FaultOrder, RadioEvent, RadioFault
 

@@ -1,0 +1,135 @@
+"""The fleet that each event of a timeline meets, as far as it can be foreseen.
+
+Selectors that depend on claims or on draws are resolved when their event happens: of the agents
+that they select, only the number is foreseen.
+"""
+
+from typing import NamedTuple, assert_never
+
+from agent.qstructure.formation import Formation, FormationSpec
+from netem.faults import Flap, Heal, Jam, Partition
+from netem.link_keys import Conditions
+from worldsim.scenario.faults import (
+    Join,
+    Kill,
+    Leave,
+    Pause,
+    Restart,
+    Resume,
+    SensorFault,
+)
+from worldsim.scenario.selectors import (
+    AllAgents,
+    OneAgent,
+    QueueAgents,
+    RandomAgents,
+    Selectors,
+    VertexAgent,
+    parsed,
+)
+from worldsim.scenario.tables import Scenario
+from worldsim.scenario.target_frame import FrameChange, FrameTable, changed_frame
+from worldsim.scenario.timeline import Step
+
+UNKNOWN_NUMBER = -1
+"""Stands for the event of a partition in force whose number is not known."""
+
+
+class FleetNow(NamedTuple):
+    """The state of a fleet that an operator's event meets."""
+
+    formation: FormationSpec
+    frame: FrameTable
+    partitioned: bool
+    """Whether a partition is in force."""
+    id_count: int
+    """Number of ids in use."""
+    running: frozenset[int]
+    """The agents that are running."""
+    room: int
+    """Number of rows that no joining agent uses."""
+
+
+class ForeseenFleet:
+    """The state of the fleet after the steps applied so far."""
+
+    def __init__(self, scenario: Scenario, now: FleetNow | None = None) -> None:
+        agents = scenario.fleet.agents
+        self._spacing_m = scenario.control.spacing_m
+        self.id_count = now.id_count if now is not None else agents
+        """Number of ids in use."""
+        self.frame = now.frame if now is not None else scenario.frame
+        self.spec = now.formation if now is not None else scenario.formation
+        self.formation = self.made(self.spec)
+        self._running = set(now.running if now is not None else range(agents))
+        self._fewer = 0
+        """Number of running agents that were lost to selectors resolved later."""
+        partitioned = now is not None and now.partitioned
+        self._partitions = {UNKNOWN_NUMBER} if partitioned else set()
+
+    @property
+    def team(self) -> int:
+        """Number of agents that are running."""
+        return max(0, len(self._running) - self._fewer)
+
+    @property
+    def partitioned(self) -> bool:
+        """Whether a partition is in force."""
+        return bool(self._partitions)
+
+    def made(self, spec: FormationSpec) -> Formation:
+        """Return a formation with the scenario's spacing. Raises FormationError."""
+        return Formation(spec, self._spacing_m)
+
+    def apply(self, step: Step) -> None:
+        """Apply a valid step."""
+        action = step.event.action
+        match action:
+            case Partition():
+                (self._partitions.discard if step.ends else self._partitions.add)(step.number)
+            case Heal():
+                self._partitions.clear()
+            case Kill() | Leave() | Pause():
+                self._change_team(action.selectors, back=step.ends)
+            case Restart() | Resume():
+                self._change_team(action.selectors, back=True)
+            case Join():
+                self._running.update(range(self.id_count, self.id_count + action.count))
+                self.id_count += action.count
+            case FrameChange():
+                self.frame = changed_frame(self.frame, action, step.at_s)
+            case FormationSpec():
+                self.spec, self.formation = action, self.made(action)
+            case Conditions() | Jam() | Flap() | SensorFault():
+                pass
+            case _:
+                assert_never(action)
+
+    def _change_team(self, selectors: Selectors, back: bool) -> None:
+        """Remove the selected agents from the team, or bring them back."""
+        for selector in selectors:
+            kind = parsed(selector)
+            match kind:
+                case OneAgent(agent):
+                    (self._running.add if back else self._running.discard)(agent)
+                case AllAgents():
+                    self._running = set(range(self.id_count)) if back else set()
+                    self._fewer = 0
+                case RandomAgents() | VertexAgent() | QueueAgents():
+                    number = self._number(kind)
+                    self._fewer = max(0, self._fewer + (-number if back else number))
+                case _:
+                    assert_never(kind)
+
+    def _number(self, selector: RandomAgents | VertexAgent | QueueAgents) -> int:
+        """Return how many agents a selector selects when every agent is in its place."""
+        match selector:
+            case RandomAgents(number):
+                return number
+            case VertexAgent():
+                return 1
+            case QueueAgents(name):
+                index = [queue.name for queue in self.spec.queue].index(name)
+                places = self.formation.layout(self.team).places
+                return sum(index in self.formation.queues_of(place) for place in places)
+        assert_never(selector)

@@ -1,0 +1,69 @@
+"""Selectors of agents: one type for each form that an event's list may hold."""
+
+import re
+from typing import Annotated, NamedTuple
+
+from msgspec import Meta
+
+Selector = Annotated[
+    int | str,
+    Meta(description="an id, 'vertex:V1', 'queue:Q1', 'random:2' or 'all'"),
+]
+"""As a scenario writes it."""
+Selectors = Annotated[tuple[Selector, ...], Meta(min_length=1, max_length=1000)]
+
+_TEXT = re.compile(
+    r"(?P<all>all)|random:(?P<random>[1-9]\d{0,3})|vertex:(?P<vertex>.+)|queue:(?P<queue>.+)",
+    re.DOTALL,
+)
+
+
+class OneAgent(NamedTuple):
+    """The agent of an id."""
+
+    id: int
+
+
+class AllAgents(NamedTuple):
+    """Every agent."""
+
+
+class RandomAgents(NamedTuple):
+    """Some agents, drawn from the seed."""
+
+    number: int
+
+
+class VertexAgent(NamedTuple):
+    """The agent that holds a vertex."""
+
+    name: str
+
+
+class QueueAgents(NamedTuple):
+    """The agents that hold a place of a queue."""
+
+    name: str
+
+
+ParsedSelector = OneAgent | AllAgents | RandomAgents | VertexAgent | QueueAgents
+
+
+class SelectorError(ValueError):
+    """A text that is no selector."""
+
+
+def parsed(selector: Selector) -> ParsedSelector:
+    """Return a selector's type. Raises SelectorError."""
+    if isinstance(selector, int):
+        return OneAgent(selector)
+    match = _TEXT.fullmatch(selector)
+    if match is None:
+        raise SelectorError(f"no selector: {selector!r}")
+    if match["random"]:
+        return RandomAgents(int(match["random"]))
+    if match["vertex"]:
+        return VertexAgent(match["vertex"])
+    if match["queue"]:
+        return QueueAgents(match["queue"])
+    return AllAgents()
