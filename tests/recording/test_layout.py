@@ -74,6 +74,7 @@ def test_series_are_named_after_their_agents(chunks: list[Chunk]) -> None:
 
 def test_a_kill_is_logged_as_a_warning(chunks: list[Chunk]) -> None:
     (log,) = [chunk.to_record_batch() for chunk in chunks if chunk.entity_path == "/log/events"]
-    assert log.column("TextLog:text").to_pylist() == [["a4 is killed; its vehicle hovers (scheduled)"]]
+    text = "a4 is killed; its vehicle hovers (scheduled)"
+    assert log.column("TextLog:text").to_pylist() == [[text]]
     assert log.column("TextLog:level").to_pylist() == [["WARN"]]
     assert log.column("tick").to_pylist() == [10]
