@@ -13,7 +13,7 @@ import msgspec
 
 from netem.faults import FaultOrder, Flap, Heal, Jam, LastingFault, Partition, Position
 from netem.link import LinkModel
-from netem.link_keys import RATE_KEYS, Conditions, LinkKeys
+from netem.link_parameters import RATE_KEYS, Conditions, LinkKeys
 from netem.wire.channels import CHANNELS
 
 _Keys = TypeVar("_Keys", bound=LinkKeys)

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, assert_never
 import msgspec
 from msgspec import Meta
 
-from netem.link_keys import Conditions, Table
+from netem.link_parameters import Conditions, Table
 from netem.wire.frame import AgentId, Count
 
 Metres = Annotated[float, Meta(ge=-1e6, le=1e6)]

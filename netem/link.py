@@ -12,7 +12,7 @@ from typing import Never
 import msgspec
 from msgspec.structs import force_setattr
 
-from netem.link_keys import DEFAULTS, GilbertElliott, LinkParameters, PathLoss
+from netem.link_parameters import DEFAULTS, GilbertElliott, LinkParameters, PathLoss
 from netem.random_draws import (
     GROUP_SIZE,
     SHAPES,

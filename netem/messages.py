@@ -11,7 +11,7 @@ import msgspec
 from msgspec import Meta
 
 from netem.faults import FaultOrder, Position
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from netem.wire.frame import AgentId, Count, unpack_typed
 
 MAX_TRUTH_B = 256 * 1024

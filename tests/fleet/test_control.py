@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from netem.faults import Flap, Jam, Partition, RadioEvent
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from worldsim.engine.operations import Operation
 from worldsim.engine.virtual import VirtualFleet
 from worldsim.fleet.control import MAX_REQUEST_B, Answer, Control, Request, RequestError

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from tests.recording.flights import straight_flight, wedge
 from worldsim.judge.connectivity import Connectivity, rounds_to_all
 from worldsim.judge.run_events import (

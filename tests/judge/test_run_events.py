@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from netem.conditions import NetworkConditions
 from netem.faults import FaultOrder, Flap, Heal, Jam, Partition, RadioEvent
-from netem.link_keys import Conditions, LinkKeys
+from netem.link_parameters import Conditions, LinkKeys
 from worldsim.judge.radio_events import applied, order_of
 from worldsim.judge.run_events import (
     Joined,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from netem.link import LinkModel, mean_loss
-from netem.link_keys import GilbertElliott, PathLoss
+from netem.link_parameters import GilbertElliott, PathLoss
 from worldsim.link_check.checks import Finding, findings
 from worldsim.link_check.intervals import kolmogorov_smirnov, loss_bound
 from worldsim.link_check.packets import Flight, conditions_of

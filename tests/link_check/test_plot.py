@@ -4,7 +4,7 @@ import pytest
 from matplotlib.axes import Axes
 
 from netem.link import LinkModel, reception_probability
-from netem.link_keys import GilbertElliott, PathLoss
+from netem.link_parameters import GilbertElliott, PathLoss
 from worldsim.link_check.intervals import share_bound
 from worldsim.link_check.parameter_sets import ParameterSet
 from worldsim.link_check.plot import DISTANCES, PACKETS, draw

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from netem.conditions import LinkModels, NetworkConditions, overlaid
 from netem.faults import Flap, Heal, Jam, Partition
 from netem.link import LinkModel
-from netem.link_keys import Conditions, DirectedLink, GilbertElliott, LinkKeys, PathLoss
+from netem.link_parameters import Conditions, DirectedLink, GilbertElliott, LinkKeys, PathLoss
 from netem.medium import Medium
 from netem.messages import MediumSetup
 from netem.wire.channels import LOCAL, MULTIHOP

@@ -5,7 +5,7 @@ import pytest
 
 from netem.fault_queue import FaultQueue
 from netem.faults import FaultOrder, Heal, Partition
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from netem.medium import Medium
 from netem.messages import FaultOrders, MediumSetup
 from netem.wire.frame import Outgoing, Transmission, WireError

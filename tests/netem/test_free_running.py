@@ -3,7 +3,7 @@
 import pytest
 
 from netem.free_running import Intake, Lateness
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from netem.messages import MediumSetup
 from netem.wire.frame import MAX_TRANSMISSION_B, Outgoing, Transmission, pack
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netem.free_running import Intake
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from netem.messages import MediumSetup
 from netem.wire.channels import MAX_PAYLOAD_B
 from netem.wire.frame import MAX_OUTGOING, MAX_TRANSMISSION_B, Outgoing, Transmission, pack

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netem.link_keys import Conditions, DirectedLink, LinkKeys
+from netem.link_parameters import Conditions, DirectedLink, LinkKeys
 from netem.medium import Medium
 from netem.messages import MediumSetup
 from netem.wire.channels import LOCAL, MULTIHOP

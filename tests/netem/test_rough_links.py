@@ -16,7 +16,7 @@ from netem.link import (
     plain_verdict,
     reception_probability,
 )
-from netem.link_keys import Conditions, DirectedLink, GilbertElliott, PathLoss
+from netem.link_parameters import Conditions, DirectedLink, GilbertElliott, PathLoss
 from netem.medium import Medium
 from netem.messages import MediumSetup
 from netem.random_draws import MAX_QUANTILE, SHAPES, FrameDraws, correlated_share

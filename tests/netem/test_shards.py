@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from netem.delivery_log import Digest, joined_pages
 from netem.faults import Flap, Heal, Jam, Partition
-from netem.link_keys import Conditions, DirectedLink, GilbertElliott, LinkKeys, PathLoss
+from netem.link_parameters import Conditions, DirectedLink, GilbertElliott, LinkKeys, PathLoss
 from netem.medium import Medium
 from netem.messages import MediumSetup
 from netem.wire.frame import Outgoing, Transmission

@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from netem.messages import MediumSetup
 from netem.wire.bus import Bus, RefusedError
 from netem.wire.keys import Keys

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from tests.recording.flights import record, straight_flight, verdict_parts, wedge
 from worldsim.judge.run_events import ConditionsChanged, Killed, SlotChanged
 from worldsim.judge.tick import Tick

@@ -6,8 +6,9 @@ from typing import Any
 import pytest
 
 from tests.small_scenario import SMALL
-from worldsim.campaign.pool import Result, finished, over_all
+from worldsim.campaign.pool import finished
 from worldsim.engine.virtual import fly
+from worldsim.results.overall import Result, over_all
 from worldsim.results.summary import Summary, summarise
 from worldsim.results.verdict_text import table, verdict
 from worldsim.scenario.file import parse

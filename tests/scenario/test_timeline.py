@@ -3,7 +3,7 @@
 from math import inf
 
 from netem.faults import Flap, Heal, Jam, Partition
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from worldsim.scenario.faults import Join, Kill, Leave, Pause, Resume
 from worldsim.scenario.file import parse
 from worldsim.scenario.tables import Scenario

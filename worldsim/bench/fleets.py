@@ -5,7 +5,7 @@ from time import process_time
 
 from agent.qstructure.formation import FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from worldsim.engine.virtual import VirtualFleet
 from worldsim.scenario.start import BoxStart
 from worldsim.scenario.tables import Fleet, Scenario

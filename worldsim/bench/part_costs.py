@@ -10,7 +10,7 @@ from agent.guidance.q_structure import QStructure
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation
 from agent.qstructure.target_frame import Frame
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from netem.medium import Medium
 from netem.wire.channels import LOCAL
 from netem.wire.frame import Outgoing, Transmission

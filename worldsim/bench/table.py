@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from worldsim.bench.fleets import EIGHT_IN_RANGE_M, flight_cpu_s, wedge
 from worldsim.bench.part_costs import control_step_us, frame_us
 from worldsim.bench.recording_cost import recording_mb, recording_us

@@ -7,23 +7,22 @@ has simulated so far; runs that have not begun leave nothing.
 import multiprocessing
 import os
 import signal
-import statistics
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple, TypedDict
+from typing import NamedTuple
 
 from netem.wire.shutdown import StopRequest
 from worldsim.engine.step import SlotLoop
 from worldsim.engine.virtual import Flight, fly
-from worldsim.results.provenance import provenance
+from worldsim.results.overall import Result
 from worldsim.results.run_folder import RunDirectory
 from worldsim.results.sinks import open_sinks
-from worldsim.results.summary import FinishedRun, Summary, summarise
+from worldsim.results.summary import FinishedRun, summarise
 from worldsim.scenario.tables import Scenario
 
 POLL_EVERY_S = 0.2
@@ -35,13 +34,6 @@ class Job(NamedTuple):
     scenario: Scenario
     folder: Path | None  # a new folder; None: one named after the scenario and the time
     recording: bool
-
-
-class Result(NamedTuple):
-    """One run that was made."""
-
-    folder: Path
-    summary: Summary
 
 
 def simulate(
@@ -123,92 +115,6 @@ def _result(future: Future[Result | None], stop: StopRequest) -> Result | None:
         if stop.requested:
             return None
         raise
-
-
-def over_all(results: Iterable[Result], interrupted: bool = False) -> dict[str, Any]:
-    """Return the summary over many runs: figures by scenario, and a row for each run."""
-    rows = [_row(result) for result in results]
-    rows.sort(key=lambda row: (row["scenario"], row["seed"]))
-    names = sorted({row["scenario"] for row in rows})
-    outcomes = [row["outcome"] for row in rows] + ["inconclusive"] * interrupted
-    return {
-        "schema": 1,
-        "mode": "virtual",
-        "runs": len(rows),
-        "outcome": next((bad for bad in ("fail", "inconclusive") if bad in outcomes), "pass"),
-        "reason": "interrupted" if interrupted else None,
-        "scenarios": [_of_scenario(name, rows) for name in names],
-        "rows": rows,
-        **provenance(),
-    }
-
-
-class Row(TypedDict):
-    """A run's row in the summary over many runs, under the keys of summary.json."""
-
-    run: str  # its folder's name
-    scenario: str
-    seed: int
-    outcome: str
-    reason: str | None
-    min_separation_m: float | None
-    converge_s: float | None  # of several formations the slowest
-    residual_m: float | None  # of several formations the largest
-    turns_over_limit_fraction: float | None
-    real_time_factor: float | None
-    trace_sha256: str | None
-
-
-def _row(result: Result) -> Row:
-    summary = result.summary
-    phases = summary["phases"]
-    return {
-        "run": result.folder.name,
-        "scenario": summary["scenario"],
-        "seed": summary["seed"],
-        "outcome": summary["outcome"],
-        "reason": summary["reason"],
-        "min_separation_m": summary["min_separation_m"],
-        "converge_s": _worst([phase["converge_s"] for phase in phases]),
-        "residual_m": _worst([phase["residual_m"] for phase in phases]),
-        "turns_over_limit_fraction": summary["turns_over_limit_fraction"],
-        "real_time_factor": summary["real_time_factor"],
-        "trace_sha256": summary["trace_sha256"],
-    }
-
-
-def _of_scenario(name: str, rows: list[Row]) -> dict[str, Any]:
-    own = [row for row in rows if row["scenario"] == name]
-    return {
-        "scenario": name,
-        "runs": len(own),
-        **{
-            outcome: sum(row["outcome"] == outcome for row in own)
-            for outcome in ("pass", "fail", "inconclusive")
-        },
-        "min_separation_m": _spread([row["min_separation_m"] for row in own]),
-        "converge_s": _spread([row["converge_s"] for row in own]),
-        "residual_m": _spread([row["residual_m"] for row in own]),
-        "turns_over_limit_fraction": _spread([row["turns_over_limit_fraction"] for row in own]),
-    }
-
-
-def _worst(values: list[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return max(known) if len(known) == len(values) and known else None
-
-
-def _spread(values: list[float | None]) -> dict[str, float] | None:
-    """Return minimum, median and maximum over the runs that measured a value; None: no run did."""
-    known = [value for value in values if value is not None]
-    if not known:
-        return None
-    return {
-        "min": min(known),
-        "median": statistics.median(known),
-        "max": max(known),
-        "measured": len(known),
-    }
 
 
 @contextmanager

@@ -4,8 +4,9 @@ from collections import Counter
 from pathlib import Path
 
 from netem.wire.shutdown import StopRequest, stop_requests
-from worldsim.campaign.pool import Job, Result, over_all, simulate, sweep
+from worldsim.campaign.pool import Job, simulate, sweep
 from worldsim.results.exit_status import EXIT_STATUS, INTERRUPTED
+from worldsim.results.overall import Result, over_all
 from worldsim.results.progress_line import ProgressLine
 from worldsim.results.run_folder import RunDirectoryError, make_folder, write_json
 from worldsim.results.verdict_text import table, verdict

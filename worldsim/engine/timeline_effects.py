@@ -10,7 +10,7 @@ from typing import Literal, assert_never
 from agent.qstructure.formation import Formation, FormationSpec
 from netem.conditions import NetworkConditions
 from netem.faults import FaultOrder, Flap, Heal, Jam, Partition, RadioEvent, RadioFault
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from worldsim.engine.membership import Membership
 from worldsim.engine.missions import Missions
 from worldsim.engine.operations import (

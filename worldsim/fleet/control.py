@@ -12,7 +12,7 @@ import numpy as np
 import zenoh
 
 from netem.faults import FaultOrder, RadioEvent
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from netem.wire.bus import Bus, Handler, drain
 from worldsim.engine.operations import (
     AdmitAgents,

@@ -20,7 +20,7 @@ from netem.faults import (
     RadioEvent,
     RadioFault,
 )
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from worldsim.judge.run_events import (
     By,
     ConditionsChanged,

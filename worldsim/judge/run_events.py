@@ -10,7 +10,7 @@ import msgspec
 from agent.messages import FramePath
 from agent.qstructure.formation import FormationSpec
 from netem.faults import Flap, Group, Jam, PartitionKind
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 
 By = Literal["operator"] | None
 """The source of an event; None: the timeline."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from netem.delivery_log import entries
 from netem.link import Cause, LinkModel
-from netem.link_keys import Conditions, LinkKeys
+from netem.link_parameters import Conditions, LinkKeys
 from netem.medium import Medium
 from netem.messages import MediumSetup
 from netem.wire.channels import Channel

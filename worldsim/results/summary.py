@@ -47,7 +47,7 @@ class FinishedRun:
     cut_off_by: str | None = None  # what ended the run before its time; None: it is complete
     failure: str | None = None  # an error during the run
     rejected_by_world: Mapping[str, int] = field(default_factory=dict)  # messages by cause
-    delivery: dict[str, Any] | None = None  # see ArrivalBook.summary
+    delivery: "DeliveryRow | None" = None  # of frames that agents used
 
     @property
     def duration_s(self) -> float:
@@ -90,6 +90,35 @@ class RecoveryRow(TypedDict):
     reformed_s: float | None  # from the change until the formation is whole again
 
 
+class DirectLinksRow(TypedDict):
+    """Number of neighbours that each agent hears directly; row i = agent i."""
+
+    mean: list[float | None]
+    most: list[int | None]
+
+
+class InvariantRow(TypedDict):
+    """How often an invariant was evaluated and violated [ticks]."""
+
+    ticks: int
+    violations: int
+
+
+class ChannelDeliveryRow(TypedDict):
+    """The extra delay of one channel's frames."""
+
+    frames: int
+    within_fraction: float
+    excess_ms: dict[str, float]
+
+
+class DeliveryRow(ChannelDeliveryRow):
+    """The extra delay of all frames."""
+
+    bound_ms: float  # one slot and one tick
+    channels: dict[str, ChannelDeliveryRow | None]
+
+
 class Summary(Provenance):
     """The content of summary.json; None for what was not measured."""
 
@@ -110,10 +139,10 @@ class Summary(Provenance):
     turns_over_limit_fraction: float | None  # of moving steps
     packets: dict[str, int | None]  # by fate
     rejected_by_cause: dict[str, dict[str, int]]  # messages, by component and cause
-    direct_links: dict[str, Any]  # of each agent: mean and most
+    direct_links: DirectLinksRow
     bytes_per_s: dict[str, list[float | None]] | None  # by channel, of each agent
-    invariants: dict[str, dict[str, int]]  # ticks evaluated and violations
-    delivery: dict[str, Any] | None  # extra delay of frames
+    invariants: dict[str, InvariantRow]
+    delivery: DeliveryRow | None
     delivery_late_ms: dict[str, float] | None  # how late the radio's batches left
     late_tick_fraction: float | None
     real_time_factor: float | None
@@ -125,6 +154,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
     judge, counters = run.loop.judge, run.medium_counters
     rejected = _rejected(run)
     expectations, invariants = judge.expectations(), judge.invariants()
+    links = run.loop.radio_use.links()
     outcome, reason = _outcome(run, expectations, invariants)
     summary: Summary = {
         "schema": SCHEMA,
@@ -144,9 +174,12 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "packets": _packets(counters, rejected),
         "rejected_by_cause": rejected,
-        "direct_links": msgspec.to_builtins(run.loop.radio_use.links()),
+        "direct_links": {"mean": links.mean, "most": links.most},
         "bytes_per_s": run.loop.radio_use.bytes_per_s(counters),
-        "invariants": msgspec.to_builtins(invariants),
+        "invariants": {
+            name: {"ticks": tally.ticks, "violations": tally.violations}
+            for name, tally in invariants.items()
+        },
         "delivery": run.delivery,
         "delivery_late_ms": _delivery_late_ms(counters),
         "late_tick_fraction": run.late_tick_fraction,

@@ -4,7 +4,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from worldsim.results.summary import ExpectationRow, Summary
+from worldsim.results.overall import Overall, Row, ScenarioRow
+from worldsim.results.summary import DeliveryRow, ExpectationRow, Summary
 
 if TYPE_CHECKING:
     from worldsim.recording.verify import Verification
@@ -30,7 +31,7 @@ def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
     return "\n".join(lines)
 
 
-def table(overall: dict[str, Any], folder: Path) -> str:
+def table(overall: Overall, folder: Path) -> str:
     """Return a row for each of many runs, and for each scenario minimum, median and maximum."""
     width = max((len(row["run"]) for row in overall["rows"]), default=3)
     head = f"{'run':{width}}  separation  converged in  slot error  over turn limit  outcome"
@@ -105,7 +106,7 @@ def _accuracy(summary: Summary) -> str:
     )
 
 
-def _delivery(delivery: dict[str, Any] | None) -> list[str]:
+def _delivery(delivery: DeliveryRow | None) -> list[str]:
     """Return a line on how much later than due frames were used; none if not measured."""
     if delivery is None:
         return []
@@ -130,7 +131,7 @@ def _causes(causes: dict[str, int]) -> str:
     return ", ".join(f"{count} {words}" for count, words in counts)
 
 
-def _run(row: dict[str, Any], width: int) -> str:
+def _run(row: Row, width: int) -> str:
     reason = f" ({row['reason']})" if row["reason"] else ""
     return (
         f"{row['run']:{width}}  {_figure(row['min_separation_m'], 'm', 3):>10}"
@@ -140,7 +141,7 @@ def _run(row: dict[str, Any], width: int) -> str:
     )
 
 
-def _scenario(scenario: dict[str, Any]) -> list[str]:
+def _scenario(scenario: ScenarioRow) -> list[str]:
     spreads = (
         ("separation", scenario["min_separation_m"], "m", 3),
         ("converged in", scenario["converge_s"], "s", 2),

@@ -12,7 +12,7 @@ from agent.codec import encode_formation
 from agent.messages import MAX_ORDER_B
 from agent.qstructure.formation import FormationError, FormationSpec
 from netem.faults import Flap, Heal, Jam, Partition
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from worldsim.scenario.events import ACTIONS, UNDOABLE, EventTable
 from worldsim.scenario.faults import Join, Kill, Leave, Pause, Restart, Resume, SensorFault
 from worldsim.scenario.foreseen_fleet import FleetNow, ForeseenFleet

@@ -8,7 +8,7 @@ from typing import NamedTuple, assert_never
 
 from agent.qstructure.formation import Formation, FormationSpec
 from netem.faults import Flap, Heal, Jam, Partition
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from worldsim.scenario.faults import (
     Join,
     Kill,

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import assert_never
 
 from netem.faults import Flap, Heal, Jam, Partition, RadioEvent
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from worldsim.scenario.problem import Problem
 
 

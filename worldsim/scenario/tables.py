@@ -24,7 +24,7 @@ from agent.config import (
 from agent.guidance.potential import TARGET_FLOOR_M
 from agent.messages import AgentId
 from agent.qstructure.formation import FormationSpec
-from netem.link_keys import Conditions
+from netem.link_parameters import Conditions
 from netem.messages import MediumSetup
 from worldsim.scenario.events import EventTable
 from worldsim.scenario.obstacle_tables import ObstacleField, Obstacles

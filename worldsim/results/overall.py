@@ -1,0 +1,135 @@
+"""summary.json over many runs: a row for each run, and the spread of each scenario's figures."""
+
+import statistics
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple, TypedDict
+
+from worldsim.results.provenance import Provenance, provenance
+from worldsim.results.summary import Summary
+
+
+class Result(NamedTuple):
+    """One run that was made."""
+
+    folder: Path
+    summary: Summary
+
+
+class Spread(TypedDict):
+    """A figure over the runs that measured it."""
+
+    min: float
+    median: float
+    max: float
+    measured: int  # number of runs
+
+
+class Row(TypedDict):
+    """A run's row in the summary over many runs, under the keys of summary.json."""
+
+    run: str  # its folder's name
+    scenario: str
+    seed: int
+    outcome: str
+    reason: str | None
+    min_separation_m: float | None
+    converge_s: float | None  # of several formations the slowest
+    residual_m: float | None  # of several formations the largest
+    turns_over_limit_fraction: float | None
+    real_time_factor: float | None
+    trace_sha256: str | None
+
+
+class ScenarioRow(TypedDict("Outcomes", {"pass": int, "fail": int, "inconclusive": int})):
+    """A scenario's row: its runs by outcome, and the spread of each figure."""
+
+    scenario: str
+    runs: int
+    min_separation_m: Spread | None
+    converge_s: Spread | None
+    residual_m: Spread | None
+    turns_over_limit_fraction: Spread | None
+
+
+class Overall(Provenance):
+    """The summary over many runs."""
+
+    schema: int
+    mode: str
+    runs: int
+    outcome: str
+    reason: str | None
+    scenarios: list[ScenarioRow]
+    rows: list[Row]
+
+
+def over_all(results: Iterable[Result], interrupted: bool = False) -> Overall:
+    """Return the summary over many runs: figures by scenario, and a row for each run."""
+    rows = [_row(result) for result in results]
+    rows.sort(key=lambda row: (row["scenario"], row["seed"]))
+    names = sorted({row["scenario"] for row in rows})
+    outcomes = [row["outcome"] for row in rows] + ["inconclusive"] * interrupted
+    return {
+        "schema": 1,
+        "mode": "virtual",
+        "runs": len(rows),
+        "outcome": next((bad for bad in ("fail", "inconclusive") if bad in outcomes), "pass"),
+        "reason": "interrupted" if interrupted else None,
+        "scenarios": [_of_scenario(name, rows) for name in names],
+        "rows": rows,
+        **provenance(),
+    }
+
+
+def _row(result: Result) -> Row:
+    summary = result.summary
+    phases = summary["phases"]
+    return {
+        "run": result.folder.name,
+        "scenario": summary["scenario"],
+        "seed": summary["seed"],
+        "outcome": summary["outcome"],
+        "reason": summary["reason"],
+        "min_separation_m": summary["min_separation_m"],
+        "converge_s": _worst([phase["converge_s"] for phase in phases]),
+        "residual_m": _worst([phase["residual_m"] for phase in phases]),
+        "turns_over_limit_fraction": summary["turns_over_limit_fraction"],
+        "real_time_factor": summary["real_time_factor"],
+        "trace_sha256": summary["trace_sha256"],
+    }
+
+
+def _of_scenario(name: str, rows: list[Row]) -> ScenarioRow:
+    own = [row for row in rows if row["scenario"] == name]
+    outcomes = Counter(row["outcome"] for row in own)
+    return {
+        "scenario": name,
+        "runs": len(own),
+        "pass": outcomes["pass"],
+        "fail": outcomes["fail"],
+        "inconclusive": outcomes["inconclusive"],
+        "min_separation_m": _spread([row["min_separation_m"] for row in own]),
+        "converge_s": _spread([row["converge_s"] for row in own]),
+        "residual_m": _spread([row["residual_m"] for row in own]),
+        "turns_over_limit_fraction": _spread([row["turns_over_limit_fraction"] for row in own]),
+    }
+
+
+def _worst(values: list[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return max(known) if len(known) == len(values) and known else None
+
+
+def _spread(values: list[float | None]) -> Spread | None:
+    """Return minimum, median and maximum over the runs that measured a value; None: no run did."""
+    known = [value for value in values if value is not None]
+    if not known:
+        return None
+    return {
+        "min": min(known),
+        "median": statistics.median(known),
+        "max": max(known),
+        "measured": len(known),
+    }
