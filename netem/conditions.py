@@ -141,10 +141,8 @@ class NetworkConditions:
                 self._in_force.pop(order.number, None)
             case Heal():
                 self._end_partitions()
-            case Conditions() | Partition() | Jam() | Flap():
-                self._in_force[order.number] = InForce(order.at_s, fault)
             case _:
-                assert_never(fault)
+                self._in_force[order.number] = InForce(order.at_s, fault)
         self._refresh()
 
     def ends(self, order: FaultOrder) -> bool:

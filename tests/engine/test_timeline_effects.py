@@ -5,7 +5,8 @@ from tests.scenario.test_timeline import LINE, scenario
 from worldsim.engine.operations import GiveMission, Operation
 from worldsim.engine.step import SlotLoop, world_of
 from worldsim.engine.virtual import Flight, fly
-from worldsim.judge.run_events import Flapped, Healed, Jammed, RunEvent, as_row
+from worldsim.judge.radio_events import Flapped, Healed, Jammed
+from worldsim.judge.run_events import RunEvent, as_row
 
 JAM = "jam = { centre_m = [0, 0, 0], radius_m = 50 }"
 

@@ -12,7 +12,9 @@ from netem.link_parameters import Conditions
 from worldsim.engine.operations import Operation
 from worldsim.engine.virtual import VirtualFleet
 from worldsim.fleet.control import MAX_REQUEST_B, Answer, Control, Request, RequestError
-from worldsim.judge.run_events import By, ConditionsChanged, FormationGiven, FrameGiven
+from worldsim.judge.event import By
+from worldsim.judge.radio_events import ConditionsChanged
+from worldsim.judge.run_events import FormationGiven, FrameGiven
 from worldsim.scenario.file import formation_tables, load
 
 DEPLOY = Path("deploy")

@@ -9,13 +9,8 @@ import pytest
 from netem.link_parameters import Conditions
 from tests.recording.flights import straight_flight, wedge
 from worldsim.judge.connectivity import Connectivity, rounds_to_all
-from worldsim.judge.run_events import (
-    ConditionsChanged,
-    Healed,
-    Partitioned,
-    RoleChanged,
-    RunEvent,
-)
+from worldsim.judge.radio_events import ConditionsChanged, Healed, Partitioned
+from worldsim.judge.run_events import RoleChanged, RunEvent
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge
 

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from netem.link_parameters import Conditions
 from tests.recording.flights import record, straight_flight, verdict_parts, wedge
-from worldsim.judge.run_events import ConditionsChanged, Killed, SlotChanged
+from worldsim.judge.radio_events import ConditionsChanged
+from worldsim.judge.run_events import Killed, SlotChanged
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge
 from worldsim.recording.readback import read_run

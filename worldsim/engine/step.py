@@ -18,7 +18,8 @@ from worldsim.engine.operations import Operation, StartProcesses
 from worldsim.engine.telemetry import FleetTelemetry
 from worldsim.engine.timeline_effects import TimelineEffects
 from worldsim.engine.trace import Trace
-from worldsim.judge.run_events import By, QueueChanged, RoleChanged, RunEvent, SlotChanged
+from worldsim.judge.event import By
+from worldsim.judge.run_events import QueueChanged, RoleChanged, RunEvent, SlotChanged
 from worldsim.judge.tick import Packets, Tick
 from worldsim.judge.verdict import Figures, Judge
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario

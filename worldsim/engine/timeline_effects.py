@@ -9,8 +9,7 @@ from typing import Literal, assert_never
 
 from agent.qstructure.formation import Formation, FormationSpec
 from netem.conditions import NetworkConditions
-from netem.faults import FaultOrder, Flap, Heal, Jam, Partition, RadioEvent, RadioFault
-from netem.link_parameters import Conditions
+from netem.faults import FaultOrder, RadioEvent, RadioFault
 from worldsim.engine.membership import Membership
 from worldsim.engine.missions import Missions
 from worldsim.engine.operations import (
@@ -24,9 +23,9 @@ from worldsim.engine.operations import (
     StartProcesses,
 )
 from worldsim.engine.selection import Claims
+from worldsim.judge.event import By
 from worldsim.judge.radio_events import applied
 from worldsim.judge.run_events import (
-    By,
     FormationGiven,
     FrameGiven,
     Joined,
@@ -99,9 +98,9 @@ class TimelineEffects:
     def operation(self, step: Step) -> Operation | None:
         """Return the operation of a step now; None where there is nothing to do or to undo."""
         action, number = step.event.action, step.number
+        if isinstance(action, RadioFault):
+            return self._fault_order(step, action)
         match action:
-            case Conditions() | Partition() | Jam() | Flap() | Heal():
-                return self._fault_order(step, action)
             case Kill() | Leave() | Restart() | Pause() | Resume() | Join():
                 return self._process_operation(step, action)
             case SensorFault():

@@ -25,7 +25,8 @@ from worldsim.engine.operations import (
     StartProcesses,
 )
 from worldsim.engine.step import SlotLoop
-from worldsim.judge.run_events import By, RunEvent
+from worldsim.judge.event import By
+from worldsim.judge.run_events import RunEvent
 from worldsim.scenario.decoding import decode
 from worldsim.scenario.event_checks import problem_now
 from worldsim.scenario.events import EventTable

@@ -36,7 +36,8 @@ from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.pacing import LatenessCounter, Pacer
 from worldsim.fleet.progress import ProgressReporter
 from worldsim.fleet.startup import Startup
-from worldsim.judge.run_events import By, LateStart
+from worldsim.judge.event import By
+from worldsim.judge.run_events import LateStart
 from worldsim.judge.tick import Packets
 from worldsim.scenario.tables import Scenario
 

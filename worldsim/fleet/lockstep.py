@@ -49,7 +49,7 @@ from worldsim.fleet.ipc import AgentProcess, ProcessAction, names_of
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.progress import ProgressReporter, StallReporter
 from worldsim.fleet.startup import Startup
-from worldsim.judge.run_events import By
+from worldsim.judge.event import By
 from worldsim.judge.tick import Packets
 from worldsim.scenario.tables import Scenario
 

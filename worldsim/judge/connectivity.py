@@ -15,8 +15,7 @@ from netem.conditions import NetworkConditions
 from netem.link import burst_variance_factor, mean_loss
 from netem.random_draws import MAX_QUANTILE
 from netem.wire.channels import MULTIHOP
-from worldsim.judge.radio_events import order_of
-from worldsim.judge.run_events import RadioRunEvent
+from worldsim.judge.radio_events import RadioRunEvent, order_of
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
 

@@ -3,23 +3,25 @@
 from collections.abc import Sequence
 from typing import assert_never
 
-from worldsim.judge.radio_events import radio_sentence
-from worldsim.judge.run_events import (
+from worldsim.judge.event import PlannedEvent
+from worldsim.judge.radio_events import (
     ConditionsChanged,
+    Jammed,
+    Partitioned,
+    RadioRunEvent,
+    radio_sentence,
+)
+from worldsim.judge.run_events import (
     FormationGiven,
     FrameGiven,
-    Jammed,
     Joined,
     Killed,
     LateStart,
     Left,
     LossEvent,
     MissionRunEvent,
-    Partitioned,
     Paused,
-    PlannedEvent,
     QueueChanged,
-    RadioRunEvent,
     Restarted,
     Resumed,
     ReturnEvent,

@@ -21,18 +21,14 @@ from agent.messages import Place
 from worldsim.judge.connectivity import Components, Connectivity
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.phase import Phase
+from worldsim.judge.radio_events import RadioRunEvent
 from worldsim.judge.run_events import (
-    ConditionsChanged,
-    Flapped,
     FormationGiven,
     FrameGiven,
-    Healed,
-    Jammed,
     Joined,
     Killed,
     LateStart,
     Left,
-    Partitioned,
     Paused,
     QueueChanged,
     Restarted,
@@ -112,15 +108,16 @@ class Invariants:
 
     def handle_event(self, event: RunEvent) -> None:
         """Take an event; events come in order."""
+        if isinstance(event, RadioRunEvent):
+            self._connectivity.handle_event(event)
+            self._fault(event.t_s, event.t_s)
+            return
         match event:
             case RoleChanged():
                 self._count_role_change(event)
             case Restarted() | Joined():
                 self._fault(event.t_s, event.t_s + self._boot_s)
             case Killed() | Left() | Paused() | Resumed() | FormationGiven() | FrameGiven():
-                self._fault(event.t_s, event.t_s)
-            case Partitioned() | Healed() | Jammed() | Flapped() | ConditionsChanged():
-                self._connectivity.handle_event(event)
                 self._fault(event.t_s, event.t_s)
             case SlotChanged() | QueueChanged() | SensorChanged() | LateStart():
                 pass

@@ -13,25 +13,89 @@ from netem.conditions import NetworkConditions
 from netem.faults import (
     FaultOrder,
     Flap,
+    Group,
     Heal,
     Jam,
     LastingFault,
     Partition,
+    PartitionKind,
     RadioEvent,
     RadioFault,
 )
 from netem.link_parameters import Conditions
-from worldsim.judge.run_events import (
-    By,
-    ConditionsChanged,
-    Flapped,
-    FlapWindow,
-    Healed,
-    Jammed,
-    Partitioned,
-    RadioRunEvent,
-)
+from worldsim.judge.event import By, PlannedEvent
 
+
+class RadioFaultEvent(PlannedEvent, frozen=True, kw_only=True):
+    """A radio fault began or ended."""
+
+    number: int
+    """The fault's number."""
+
+
+class Partitioned(RadioFaultEvent, frozen=True, kw_only=True, tag="partition"):
+    """A partition began."""
+
+    groups: tuple[Group, ...]
+    """The ids of each group."""
+    parted: PartitionKind
+    """The partition's kind."""
+    bridge: tuple[int, ...]
+    """Ids; for the kind "bridge"."""
+
+
+class Healed(PlannedEvent, frozen=True, kw_only=True, tag="heal"):
+    """One partition ended, or all."""
+
+    number: int | None = None
+    """The number of the partition that ended; None: all ended."""
+
+
+class Jammed(RadioFaultEvent, frozen=True, kw_only=True, tag="jam"):
+    """A jam began or ended."""
+
+    jam: Jam | None
+    """None: the jam ended."""
+
+
+class FlapWindow(Flap, frozen=True):
+    """A flap and its start."""
+
+    from_s: float = 0.0
+    """[s; simulated time]"""
+
+
+class Flapped(RadioFaultEvent, frozen=True, kw_only=True, tag="flap"):
+    """A flap began or ended."""
+
+    flap: FlapWindow | None
+    """None: the flap ended."""
+
+
+class ConditionsChanged(
+    Conditions, frozen=True, kw_only=True, omit_defaults=True, tag_field="kind", tag="netem"
+):
+    """Link conditions changed: to its link keys, or back where a change was undone."""
+
+    t_s: float
+    """[s; simulated time]"""
+    agent: int | None
+    planned: bool
+    by: By = None
+    number: int
+    """The change's number."""
+    conditions: Conditions
+    """All conditions in force from now on."""
+    undone: Conditions | None = None
+    """The change that ended."""
+
+    @property
+    def kind(self) -> str:
+        """The event's key."""
+        return "netem"
+
+
+RadioRunEvent = Partitioned | Healed | Jammed | Flapped | ConditionsChanged
 _CONDITION_KEYS = Conditions.__struct_fields__
 
 

@@ -9,35 +9,8 @@ import msgspec
 
 from agent.messages import FramePath
 from agent.qstructure.formation import FormationSpec
-from netem.faults import Flap, Group, Jam, PartitionKind
-from netem.link_parameters import Conditions
-
-By = Literal["operator"] | None
-"""The source of an event; None: the timeline."""
-
-
-class Event(
-    msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="kind", gc=False
-):
-    """Something that happened at a time."""
-
-    t_s: float
-    """[s; simulated time]"""
-    agent: int | None
-    """The agent that it happened to; None where there is no single one."""
-
-    @property
-    def kind(self) -> str:
-        """The event's key."""
-        return str(self.__struct_config__.tag)
-
-
-class PlannedEvent(Event, frozen=True, kw_only=True):
-    """An event that the timeline or an operator caused, or an unplanned exit."""
-
-    planned: bool
-    """False for an unplanned exit."""
-    by: By = None
+from worldsim.judge.event import Event, PlannedEvent
+from worldsim.judge.radio_events import RadioRunEvent
 
 
 class ProcessEvent(PlannedEvent, frozen=True, kw_only=True):
@@ -82,75 +55,6 @@ class Restarted(StartEvent, frozen=True, tag="restart"):
 
 class Joined(StartEvent, frozen=True, tag="join"):
     """A new agent started."""
-
-
-class RadioFaultEvent(PlannedEvent, frozen=True, kw_only=True):
-    """A radio fault began or ended."""
-
-    number: int
-    """The fault's number."""
-
-
-class Partitioned(RadioFaultEvent, frozen=True, kw_only=True, tag="partition"):
-    """A partition began."""
-
-    groups: tuple[Group, ...]
-    """The ids of each group."""
-    parted: PartitionKind
-    """The partition's kind."""
-    bridge: tuple[int, ...]
-    """Ids; for the kind "bridge"."""
-
-
-class Healed(PlannedEvent, frozen=True, kw_only=True, tag="heal"):
-    """One partition ended, or all."""
-
-    number: int | None = None
-    """The number of the partition that ended; None: all ended."""
-
-
-class Jammed(RadioFaultEvent, frozen=True, kw_only=True, tag="jam"):
-    """A jam began or ended."""
-
-    jam: Jam | None
-    """None: the jam ended."""
-
-
-class FlapWindow(Flap, frozen=True):
-    """A flap and its start."""
-
-    from_s: float = 0.0
-    """[s; simulated time]"""
-
-
-class Flapped(RadioFaultEvent, frozen=True, kw_only=True, tag="flap"):
-    """A flap began or ended."""
-
-    flap: FlapWindow | None
-    """None: the flap ended."""
-
-
-class ConditionsChanged(
-    Conditions, frozen=True, kw_only=True, omit_defaults=True, tag_field="kind", tag="netem"
-):
-    """Link conditions changed: to its link keys, or back where a change was undone."""
-
-    t_s: float
-    """[s; simulated time]"""
-    agent: int | None
-    planned: bool
-    by: By = None
-    number: int
-    """The change's number."""
-    conditions: Conditions
-    """All conditions in force from now on."""
-    undone: Conditions | None = None
-    """The change that ended."""
-
-    @property
-    def kind(self) -> str:
-        """The event's key."""
-        return "netem"
 
 
 class SensorChanged(PlannedEvent, frozen=True, kw_only=True, tag="sensor"):
@@ -211,7 +115,6 @@ class LateStart(Event, frozen=True, kw_only=True, tag="late"):
     detail: str
 
 
-RadioRunEvent = Partitioned | Healed | Jammed | Flapped | ConditionsChanged
 LossEvent = Killed | Left | Paused
 ReturnEvent = Restarted | Joined | Resumed
 LOSS_KINDS = frozenset({str(event.__struct_config__.tag) for event in get_args(LossEvent)})

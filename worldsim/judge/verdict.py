@@ -19,20 +19,16 @@ from worldsim.judge.metrics import Separation, conserved
 from worldsim.judge.obstacle_clearance import ObstacleClearance
 from worldsim.judge.phase import Phase
 from worldsim.judge.queue_convergence import QueueConvergence
+from worldsim.judge.radio_events import ConditionsChanged, Flapped, Healed, Jammed, Partitioned
 from worldsim.judge.recovery import Recoveries, Recovery
 from worldsim.judge.run_events import (
-    ConditionsChanged,
-    Flapped,
     FormationGiven,
     FrameGiven,
-    Healed,
-    Jammed,
     Joined,
     Killed,
     LateStart,
     Left,
     MissionRunEvent,
-    Partitioned,
     Paused,
     QueueChanged,
     Restarted,

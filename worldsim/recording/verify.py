@@ -12,10 +12,11 @@ from typing import Any
 
 import msgspec
 
+from worldsim.judge.event import PlannedEvent
 from worldsim.judge.invariants import InvariantTally
 from worldsim.judge.phase import Phase
 from worldsim.judge.recovery import Recovery
-from worldsim.judge.run_events import PlannedEvent, RunEvent
+from worldsim.judge.run_events import RunEvent
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Expectation, Judge
 from worldsim.recording.layout import RECORDING_FILE, SUMMARY_FILE

@@ -11,7 +11,7 @@ from typing import NamedTuple, assert_never
 from agent.codec import encode_formation
 from agent.messages import MAX_ORDER_B
 from agent.qstructure.formation import FormationError, FormationSpec
-from netem.faults import Flap, Heal, Jam, Partition
+from netem.faults import RadioFault
 from netem.link_parameters import Conditions
 from worldsim.scenario.events import ACTIONS, UNDOABLE, EventTable
 from worldsim.scenario.faults import Join, Kill, Leave, Pause, Restart, Resume, SensorFault
@@ -122,11 +122,11 @@ class EventChecks:
 
     def _begin_problems(self, event: EventTable) -> Iterator[Problem]:
         action = event.action
+        if isinstance(action, RadioFault):
+            return self._radio(event)
         match action:
             case Kill() | Leave() | Pause() | Restart() | Resume() | SensorFault():
                 return self._selection(event.kind, action)
-            case Partition() | Jam() | Flap() | Conditions() | Heal():
-                return self._radio(event)
             case Join():
                 return self._join(action)
             case FrameChange():

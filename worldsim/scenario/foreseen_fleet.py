@@ -7,8 +7,7 @@ that they select, only the number is foreseen.
 from typing import NamedTuple, assert_never
 
 from agent.qstructure.formation import Formation, FormationSpec
-from netem.faults import Flap, Heal, Jam, Partition
-from netem.link_parameters import Conditions
+from netem.faults import Heal, Partition, RadioFault
 from worldsim.scenario.faults import (
     Join,
     Kill,
@@ -84,11 +83,10 @@ class ForeseenFleet:
     def apply(self, step: Step) -> None:
         """Apply a valid step."""
         action = step.event.action
+        if isinstance(action, RadioFault):
+            self._apply_radio(step, action)
+            return
         match action:
-            case Partition():
-                (self._partitions.discard if step.ends else self._partitions.add)(step.number)
-            case Heal():
-                self._partitions.clear()
             case Kill() | Leave() | Pause():
                 self._change_team(action.selectors, back=step.ends)
             case Restart() | Resume():
@@ -100,10 +98,17 @@ class ForeseenFleet:
                 self.frame = changed_frame(self.frame, action, step.at_s)
             case FormationSpec():
                 self.spec, self.formation = action, self.made(action)
-            case Conditions() | Jam() | Flap() | SensorFault():
+            case SensorFault():
                 pass
             case _:
                 assert_never(action)
+
+    def _apply_radio(self, step: Step, fault: RadioFault) -> None:
+        """Of the radio's faults only partitions matter: a heal needs one."""
+        if isinstance(fault, Heal):
+            self._partitions.clear()
+        elif isinstance(fault, Partition):
+            (self._partitions.discard if step.ends else self._partitions.add)(step.number)
 
     def _change_team(self, selectors: Selectors, back: bool) -> None:
         """Remove the selected agents from the team, or bring them back."""
