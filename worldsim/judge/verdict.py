@@ -19,7 +19,7 @@ from worldsim.judge.metrics import Separation, conserved
 from worldsim.judge.obstacle_clearance import ObstacleClearance
 from worldsim.judge.phase import Phase
 from worldsim.judge.queue_convergence import QueueConvergence
-from worldsim.judge.radio_events import ConditionsChanged, Flapped, Healed, Jammed, Partitioned
+from worldsim.judge.radio_events import RadioRunEvent
 from worldsim.judge.recovery import Recoveries, Recovery
 from worldsim.judge.run_events import (
     FormationGiven,
@@ -108,6 +108,8 @@ class Judge:
         """Take an event; events come in order."""
         if self._allocation is not None:
             self._allocation.handle_event(event)
+        if isinstance(event, RadioRunEvent):
+            return
         match event:
             case FormationGiven() | FrameGiven():
                 self._open_phase(event)
@@ -116,8 +118,6 @@ class Judge:
             case Killed() | Left() | Paused() | Resumed():
                 if event.nobody is None:
                     self._recoveries.handle_event(event)
-            case Partitioned() | Healed() | Jammed() | Flapped() | ConditionsChanged():
-                pass
             case SensorChanged() | SlotChanged() | QueueChanged() | RoleChanged() | LateStart():
                 pass
             case _:

@@ -89,5 +89,6 @@ _RADIO = RadioEvent.__struct_fields__
 _OTHERS = (key for key in EventTable.__struct_fields__ if key not in (*_TIMES, *_RADIO))
 ACTIONS = (*_OTHERS, *_RADIO)
 """The keys of all actions."""
-UNDOABLE = ("kill", "leave", "pause", "partition", "jam", "flap", "netem", "sensor")
+_LASTING = tuple(key for key in _RADIO if key != "heal")
+UNDOABLE = ("kill", "leave", "pause", *_LASTING, "sensor")
 """The keys of the actions that ``for_s`` can undo."""
