@@ -36,11 +36,11 @@ class LockstepMedium:
     """
 
     def __init__(
-        self, bus: Bus, setup: MediumSetup, shard: int, unwanted: Callable[[], bool]
+        self, bus: Bus, setup: MediumSetup, shard: int, should_stop: Callable[[], bool]
     ) -> None:
         agents = range(setup.agents)
         self._setup = setup
-        self._unwanted = unwanted
+        self._should_stop = should_stop
         self._slot = 0
         self._medium = Medium(setup, setup.receivers)
         self._own = frozenset(agents if setup.receivers is None else setup.receivers)
@@ -106,7 +106,9 @@ class LockstepMedium:
         """Wait for a participant's transmission, and send its frames."""
         slot = slot_input.truth.slot
         what = f"agent-{sender}'s transmission of slot {slot}"
-        transmission = _unpacked(what, await_message(self._senders[sender], what, self._unwanted))
+        transmission = _unpacked(
+            what, await_message(self._senders[sender], what, self._should_stop)
+        )
         check_slot(what, transmission.slot, slot)
         if transmission.incarnation != slot_input.incarnations[sender]:
             raise LockstepError(f"{what} is of its incarnation {transmission.incarnation}")

@@ -83,11 +83,11 @@ class SetupServer:
 
 
 def run(
-    endpoint: str, shard: int = 0, patient: bool = False, guard: AccessControl | None = None
+    endpoint: str, shard: int = 0, long_lease: bool = False, access: AccessControl | None = None
 ) -> int:
     """Serve at an endpoint; print an error as one line. Return the exit status."""
     try:
-        return serve(endpoint, shard, patient, guard)
+        return serve(endpoint, shard, long_lease, access)
     except (AccessError, SessionError) as error:
         return _failed(shard, error, 2)
     except (SilenceError, LockstepError) as error:
@@ -100,16 +100,17 @@ def _failed(shard: int, error: Exception, status: int) -> int:
 
 
 def serve(
-    endpoint: str, shard: int = 0, patient: bool = False, guard: AccessControl | None = None
+    endpoint: str, shard: int = 0, long_lease: bool = False, access: AccessControl | None = None
 ) -> int:
     """Serve as the medium of the first run that asks; return 0 at its end.
 
-    Shard 0 listens as the router at the endpoint; the others connect to it. patient: keep silent
-    peers connected for longer. guard: the access rules of the router. Raises SessionError when it
-    cannot listen or connect, AccessError without a password, SilenceError when the world is gone,
-    LockstepError when a message is missing or of another slot.
+    Shard 0 listens as the router at the endpoint; the others connect to it. long_lease: keep the
+    sessions of processes that are silent for long. access: None allows everything.
+
+    Raises SessionError when it cannot listen or connect, AccessError without a password,
+    SilenceError when the world is gone, LockstepError when a message is missing or of another slot.
     """
-    with _opened(endpoint, shard, patient, guard) as session:
+    with _opened(endpoint, shard, long_lease, access) as session:
         stop = StopRequest()
         state = "is connected to" if shard else "listens at"
         print(f"{medium_name(shard)} {state} {endpoint}, for one run", flush=True)
@@ -121,11 +122,13 @@ def serve(
     return 0
 
 
-def _opened(endpoint: str, shard: int, patient: bool, guard: AccessControl | None) -> zenoh.Session:
+def _opened(
+    endpoint: str, shard: int, long_lease: bool, access: AccessControl | None
+) -> zenoh.Session:
     if not shard:
-        return open_router(endpoint, patient, guard)
-    login = guard.login(medium_name(shard)) if guard is not None else None
-    return open_client(endpoint, long_lease=patient, login=login)
+        return open_router(endpoint, long_lease, access)
+    login = access.login(medium_name(shard)) if access is not None else None
+    return open_client(endpoint, long_lease=long_lease, login=login)
 
 
 def _serve_run(bus: Bus, server: SetupServer, setup: MediumSetup, stop: StopRequest) -> None:

@@ -47,7 +47,7 @@ def simulate(
     directory = RunDirectory.create(job.folder, scenario)
     sinks = open_sinks(directory, scenario, directory.path.name, "virtual", job.recording)
     try:
-        flight = fly(scenario, sinks, on_progress=on_progress, unwanted=lambda: stop.requested)
+        flight = fly(scenario, sinks, on_progress=on_progress, should_stop=lambda: stop.requested)
     finally:
         sinks.close()
     summary = summarise(scenario, finished(flight, scenario))

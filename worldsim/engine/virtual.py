@@ -147,13 +147,13 @@ def fly(
     recorder: Recorder | None = None,
     on_event: Callable[[RunEvent], None] | None = None,
     on_progress: Callable[[SlotLoop], None] | None = None,
-    unwanted: Callable[[], bool] = lambda: False,
+    should_stop: Callable[[], bool] = lambda: False,
 ) -> Flight:
-    """Fly a scenario in virtual time to its end, or until ``unwanted`` returns True."""
+    """Fly a scenario in virtual time to its end, or until ``should_stop`` returns True."""
     fleet = VirtualFleet(scenario, recorder)
     wall, cpu = perf_counter(), process_time()
     reported, progress_at = 0, wall + PROGRESS_EVERY_S
-    while fleet.loop.world.slot < scenario.slots and not unwanted():
+    while fleet.loop.world.slot < scenario.slots and not should_stop():
         fleet.slot()
         while on_event is not None and reported < len(fleet.loop.events):
             on_event(fleet.loop.events[reported])

@@ -221,12 +221,12 @@ class AwaitedActions:
         startup: Startup,
         launcher: LauncherLink,
         watch: Callable[[], None],
-        unwanted: Callable[[], bool],
+        should_stop: Callable[[], bool],
     ) -> None:
         self._startup = startup
         self._launcher = launcher
         self._watch = watch
-        self._unwanted = unwanted
+        self._should_stop = should_stop
         self._orders: list[FaultOrder] = []
 
     def carry_out(self, operation: Operation, incarnations: Sequence[int]) -> None:
@@ -281,7 +281,7 @@ class AwaitedActions:
     def _until(self, there: Callable[[], bool], what: str) -> None:
         waited_s, stall = 0.0, StallReporter(what, self._launcher)
         while not there():
-            if self._unwanted():
+            if self._should_stop():
                 raise RunOverError
             if waited_s > ANSWER_TIMEOUT_S:
                 raise LockstepError(f"{what} has not come within {ANSWER_TIMEOUT_S:g} s")
