@@ -1,6 +1,6 @@
 """Configuration of one agent: the scenario's tables, as they stand there."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, assert_never, get_args
 
 import msgspec
 from msgspec import Meta
@@ -13,6 +13,13 @@ Hertz = Annotated[float, Meta(gt=0, le=1000)]
 Noise = Annotated[float, Meta(ge=0, le=1)]
 VehicleKind = Literal["kinematic", "accelerating", "forward"]
 AvoidanceKind = Literal["constellation", "direct", "none"]
+
+
+ScannerKind = Literal["laser", "sonar"]
+SCANNERS: tuple[ScannerKind, ...] = get_args(ScannerKind)
+"""Scanning sensors; a Scan's ``kind`` is an index of this."""
+SensorKind = Literal["proximity", ScannerKind]
+"""Every kind of sensor that a vehicle may carry."""
 
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -39,7 +46,7 @@ class Vehicle(Table, frozen=True):
     max_turn_left_deg: Annotated[float, Meta(gt=0, le=90)] | None = None
     max_turn_right_deg: Annotated[float, Meta(gt=0, le=90)] | None = None
     max_tilt_deg: Annotated[float, Meta(ge=0, le=90)] = 0.0
-    sensors: tuple[Literal["proximity", "laser", "sonar"], ...] = ("proximity",)
+    sensors: tuple[SensorKind, ...] = ("proximity",)
 
 
 class Proximity(Table, frozen=True):
@@ -88,6 +95,15 @@ class Sensors(Table, frozen=True):
     proximity: Proximity = Proximity()
     laser: Laser = Laser()
     sonar: Sonar = Sonar()
+
+    def scanner(self, kind: ScannerKind) -> Laser | Sonar:
+        """Return the properties of a scanning sensor."""
+        match kind:
+            case "laser":
+                return self.laser
+            case "sonar":
+                return self.sonar
+        assert_never(kind)
 
 
 DEFAULT_CAST_FAR_M = 0.5

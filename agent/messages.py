@@ -131,7 +131,7 @@ PROXIMITY_RANGE_M = 2.0
 class Scan(Message, frozen=True):
     """One scan of a scanning sensor: the range of each ray or beam, in the order of its pattern."""
 
-    kind: Annotated[int, Meta(ge=0, lt=8)]  # index of agent.sensing.ray_pattern.SCANNERS
+    kind: Annotated[int, Meta(ge=0, lt=8)]  # index of agent.config.SCANNERS
     ranges: Annotated[bytes, Meta(max_length=60_000)]
     """Unsigned 16-bit little-endian [mm]; NO_ECHO_MM: nothing within the sensor's range."""
 

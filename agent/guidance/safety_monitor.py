@@ -9,7 +9,7 @@ from collections.abc import Callable
 from math import hypot, radians
 from typing import assert_never
 
-from agent.config import AgentSetup, VehicleKind
+from agent.config import SCANNERS, AgentSetup, VehicleKind
 from agent.controller import Senses
 from agent.guidance.cone import cone_of
 from agent.guidance.evasion import evasive_velocity
@@ -26,7 +26,6 @@ from agent.guidance.safety_filter import (
     shortened,
 )
 from agent.messages import ZERO, Vector
-from agent.sensing.ray_pattern import SCANNERS
 from agent.sensing.surface_motion import SurfaceMotion
 
 BRAKING_SHARE = 0.25

@@ -1,9 +1,9 @@
 """Obstacle perception: points of near obstacles, whichever sensors an agent carries."""
 
-from agent.config import AgentSetup, Sensors
+from agent.config import SCANNERS, AgentSetup, Sensors
 from agent.messages import Observation, Vector
 from agent.sensing.point_map import PointMap
-from agent.sensing.ray_pattern import SCANNERS, pattern_of
+from agent.sensing.ray_pattern import pattern_of
 from agent.sensing.sensor_health import PROXIMITY, SensorHealth
 
 
@@ -42,9 +42,6 @@ class ObstaclePerception:
 
 def _noisy(sensors: Sensors) -> frozenset[int]:
     """Return the sensors whose readings have noise: indices of SCANNERS, and PROXIMITY."""
-    noise_m = {
-        PROXIMITY: sensors.proximity.noise_m,
-        SCANNERS.index("laser"): sensors.laser.noise_m,
-        SCANNERS.index("sonar"): sensors.sonar.noise_m,
-    }
+    noise_m = {index: sensors.scanner(kind).noise_m for index, kind in enumerate(SCANNERS)}
+    noise_m[PROXIMITY] = sensors.proximity.noise_m
     return frozenset(kind for kind, noise in noise_m.items() if noise > 0.0)

@@ -4,18 +4,15 @@ The body frame has x ahead, y to the left and z up.
 """
 
 from math import cos, pi, radians, sin
-from typing import Literal, NamedTuple, assert_never
+from typing import NamedTuple, assert_never
 
-from agent.config import Laser, Sensors, Sonar
+from agent.config import SCANNERS, Laser, ScannerKind, Sensors, Sonar
 from agent.messages import Vector
 
 IN_BEAM = 6
 """Rays on each of a beam's two rings about its axis."""
 SAME_RAY_RAD = 0.03
 """A ray within this angle of a point looks at the point, not past it."""
-ScannerKind = Literal["laser", "sonar"]
-SCANNERS: tuple[ScannerKind, ...] = ("laser", "sonar")
-"""Scanning sensors; a Scan's ``kind`` is an index of this."""
 
 
 class Grid(NamedTuple):

@@ -6,9 +6,9 @@ from math import pi
 import numpy as np
 import pytest
 
-from agent.config import Laser, Sensors, Sonar, Vehicle
+from agent.config import SCANNERS, Laser, Sensors, Sonar, Vehicle
 from agent.messages import NO_ECHO_MM
-from agent.sensing.ray_pattern import SCANNERS, pattern_of
+from agent.sensing.ray_pattern import pattern_of
 from worldsim.scenario.obstacle_tables import Sphere, Wall
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.scanning_sensors import ScanningSensors

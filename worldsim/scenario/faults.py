@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from agent.config import Table
+from agent.config import SensorKind, Table
 from agent.qstructure.formation import FormationSpec
 from netem.faults import RadioFault
 from worldsim.scenario.selectors import Selectors
@@ -58,7 +58,7 @@ class SensorFault(Table, frozen=True):
 
     agents: Selectors
     mode: FailureMode
-    kind: Literal["proximity", "laser", "sonar"] | None = None
+    kind: SensorKind | None = None
 
 
 ProcessFault = Kill | Leave | Restart | Pause | Resume | Join

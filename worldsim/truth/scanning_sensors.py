@@ -6,13 +6,12 @@ on other scans.
 
 from collections.abc import Sequence
 from math import cos, sin
-from typing import assert_never
 
 import numpy as np
 
-from agent.config import Laser, Sensors, Sonar, Vehicle
+from agent.config import SCANNERS, Sensors, Vehicle
 from agent.messages import NO_ECHO_MM, Scan
-from agent.sensing.ray_pattern import SCANNERS, Pattern, ScannerKind, pattern_of
+from agent.sensing.ray_pattern import Pattern, pattern_of
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.raycast import cast, cast_at_spheres
 from worldsim.truth.vehicle import Floats
@@ -24,7 +23,7 @@ class ScanningSensor:
     def __init__(
         self, pattern: Pattern, sensors: Sensors, seed: int, radius: Floats, obstacles: Obstacles
     ) -> None:
-        settings = _settings(SCANNERS[pattern.kind], sensors)
+        settings = sensors.scanner(SCANNERS[pattern.kind])
         self._pattern = pattern
         self._rays = np.array(pattern.beams).reshape(-1, 3)
         self._rays_per_beam = len(pattern.beams[0])
@@ -84,15 +83,6 @@ class ScanningSensor:
         millimetres = np.rint(1000.0 * np.where(hits, np.maximum(ranges, 0.0), 0.0))
         measured = np.where(hits, np.minimum(millimetres, NO_ECHO_MM - 1), NO_ECHO_MM)
         return measured.astype("<u2").tobytes()
-
-
-def _settings(kind: ScannerKind, sensors: Sensors) -> Laser | Sonar:
-    match kind:
-        case "laser":
-            return sensors.laser
-        case "sonar":
-            return sensors.sonar
-    assert_never(kind)
 
 
 class ScanningSensors:

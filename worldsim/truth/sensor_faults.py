@@ -7,8 +7,8 @@ from typing import assert_never
 
 import numpy as np
 
+from agent.config import SCANNERS
 from agent.messages import PROXIMITY_RANGE_M, Scan, Vector
-from agent.sensing.ray_pattern import SCANNERS
 from worldsim.scenario.faults import FailureMode
 from worldsim.truth.proximity_sensor import NO_READING, ProximityReading
 
