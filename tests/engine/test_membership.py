@@ -111,7 +111,7 @@ def test_a_paused_agent_is_alive_but_does_not_step_until_it_resumes() -> None:
     members.apply(begin(members, 1, Resume((4,))), 11.0)
     assert members.end_operation(0, Pause((4,)), positions(), 12.0) == ResumeProcesses(0, (0,), ())
     members.apply(begin(members, 2, Kill((0,))), 12.0)
-    assert members.end_operation(0, Pause((4,)), positions(), 12.0) == ResumeProcesses(0, (), ())
+    assert members.end_operation(0, Pause((4,)), positions(), 12.0) is None
 
 
 def test_joining_agents_get_the_next_ids_and_start_clear_of_present_vehicles() -> None:

@@ -9,6 +9,7 @@ from typing import assert_never
 
 import numpy as np
 
+from worldsim.engine.fault_holds import FaultHolds
 from worldsim.engine.operations import (
     AdmitAgents,
     EndProcesses,
@@ -39,7 +40,7 @@ from worldsim.scenario.faults import (
     Resume,
     SensorFault,
 )
-from worldsim.scenario.selectors import Selectors
+from worldsim.scenario.selectors import AllAgents, OneAgent, Selectors, parsed
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.timeline import SLACK_S
 from worldsim.truth.start_positions import StartError
@@ -56,8 +57,9 @@ class Membership:
         self._states = [State.RUNNING] * agents + [State.ABSENT] * (rows - agents)
         self._boots_s: dict[int, float] = {}
         """When each booting agent has booted [s; simulated time]."""
-        self._affected: dict[int, tuple[int, ...]] = {}
-        """The agents that an event affected, by its number."""
+        self._ended_by, self._paused_by = FaultHolds(), FaultHolds()
+        self._sensors_of: dict[int, tuple[int, ...]] = {}
+        """The agents whose sensors a fault struck, by its number."""
         self.alive = np.arange(rows) < agents
         """(N,): whether the process is running or paused."""
         self.running = self.alive.copy()
@@ -103,13 +105,16 @@ class Membership:
         match fault:
             case Kill():
                 agents = self._selected(number, fault.selectors, STARTED, claims)
-                return EndProcesses(number, agents, fault.selectors, leaves=False)
+                ended = self._named(fault.selectors, ENDED)
+                return EndProcesses(number, agents, ended, fault.selectors, leaves=False)
             case Leave():
                 agents = self._selected(number, fault.selectors, STARTED, claims)
-                return EndProcesses(number, agents, fault.selectors, leaves=True)
+                ended = self._named(fault.selectors, ENDED)
+                return EndProcesses(number, agents, ended, fault.selectors, leaves=True)
             case Pause():
                 agents = self._selected(number, fault.selectors, {State.RUNNING}, claims)
-                return PauseProcesses(number, agents, fault.selectors)
+                paused = self._named(fault.selectors, {State.PAUSED})
+                return PauseProcesses(number, agents, paused, fault.selectors)
             case Resume():
                 agents = self._selected(number, fault.selectors, {State.PAUSED}, claims)
                 return ResumeProcesses(number, agents, fault.selectors)
@@ -126,11 +131,11 @@ class Membership:
         """Return the operation that undoes a fault; None where there is nothing to undo."""
         match fault:
             case Kill() | Leave():
-                agents = self._still_affected(number, ENDED)
-                return self._restart(number, agents, position, time_s)
+                agents = self._among(self._ended_by.end(number), ENDED)
+                return self._restart(number, agents, position, time_s) if agents else None
             case Pause():
-                agents = self._still_affected(number, {State.PAUSED})
-                return ResumeProcesses(number, agents, ())
+                agents = self._among(self._paused_by.end(number), {State.PAUSED})
+                return ResumeProcesses(number, agents, ()) if agents else None
             case Resume() | Restart() | Join():
                 return None
         assert_never(fault)
@@ -140,23 +145,26 @@ class Membership:
     ) -> SetSensorMode:
         """Return the operation that begins or ends a sensor fault now."""
         if ends:
-            return SetSensorMode(number, self._affected.get(number, ()), fault.kind, None)
+            return SetSensorMode(number, self._sensors_of.pop(number, ()), fault.kind, None)
         agents = self._selected(number, fault.agents, KNOWN, claims)
-        self._affected[number] = agents
+        self._sensors_of[number] = agents
         return SetSensorMode(number, agents, fault.kind, fault.mode)
 
     def apply(self, operation: ProcessOperation, time_s: float) -> None:
         """Apply an operation that was carried out at a time [s] to the states."""
         match operation:
-            case EndProcesses(number=number, agents=agents):
-                self._affected[number] = agents
+            case EndProcesses(agents=agents):
+                self._ended_by.begin(operation.number, agents + operation.ended_before)
                 self._move(agents, "leave" if operation.leaves else "kill")
-            case PauseProcesses(number=number, agents=agents):
-                self._affected[number] = agents
+            case PauseProcesses(agents=agents):
+                self._paused_by.begin(operation.number, agents + operation.paused_before)
                 self._move(agents, "pause")
             case ResumeProcesses(agents=agents):
+                self._paused_by.release(agents)
                 self._move(agents, "resume")
             case StartProcesses(incarnations=incarnations):
+                self._ended_by.release(tuple(incarnations))
+                self._paused_by.release(tuple(incarnations))
                 self.incarnations = [
                     incarnations.get(a, before) for a, before in enumerate(self.incarnations)
                 ]
@@ -184,10 +192,16 @@ class Membership:
     def _in(self, states: AbstractSet[State]) -> list[int]:
         return [agent for agent in range(self.id_count) if self._states[agent] in states]
 
-    def _still_affected(self, number: int, states: AbstractSet[State]) -> tuple[int, ...]:
-        """Return the agents that an event affected and that are in one of the states now."""
-        agents = self._in(states)
-        return tuple(agent for agent in self._affected.get(number, ()) if agent in agents)
+    def _among(self, agents: tuple[int, ...], states: AbstractSet[State]) -> tuple[int, ...]:
+        """Return those of some agents that are in one of the states."""
+        return tuple(agent for agent in agents if self._states[agent] in states)
+
+    def _named(self, selectors: Selectors, states: AbstractSet[State]) -> tuple[int, ...]:
+        """Return the agents in a state that are selected by id or by "all"."""
+        kinds = [parsed(selector) for selector in selectors]
+        ids = {kind.id for kind in kinds if isinstance(kind, OneAgent)}
+        everyone = any(isinstance(kind, AllAgents) for kind in kinds)
+        return tuple(agent for agent in self._in(states) if everyone or agent in ids)
 
     def _selected(
         self,

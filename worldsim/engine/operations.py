@@ -29,6 +29,8 @@ class EndProcesses(NamedTuple):
     """The event's number."""
     agents: tuple[int, ...]
     """In ascending order."""
+    ended_before: tuple[int, ...]
+    """Agents that have ended already and that this fault holds down too."""
     selectors: Selectors
     """The event's own, for its report."""
     leaves: bool
@@ -42,6 +44,8 @@ class PauseProcesses(NamedTuple):
     """The event's number."""
     agents: tuple[int, ...]
     """In ascending order."""
+    paused_before: tuple[int, ...]
+    """Agents that are paused already and that this fault holds too."""
     selectors: Selectors
     """The event's own, for its report."""
 

@@ -196,7 +196,12 @@ class TimelineEffects:
     def _set_sensors(self, operation: SetSensorMode, by: By) -> None:
         sensor, mode = operation.sensor or "all", operation.mode or "works again"
         for agent in operation.agents:
-            self._world.sensor_faults.set(agent, operation.sensor, operation.mode)
+            if operation.mode is None:
+                self._world.sensor_faults.end(operation.number, agent)
+            else:
+                self._world.sensor_faults.begin(
+                    operation.number, agent, operation.sensor, operation.mode
+                )
             self._emit(
                 SensorChanged(
                     t_s=self._t_s, agent=agent, planned=True, by=by, sensor=sensor, mode=mode

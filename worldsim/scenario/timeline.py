@@ -27,7 +27,7 @@ def steps(scenario: Scenario) -> list[Step]:
     """Return the steps of all events in order of time; at one time, ends before beginnings."""
     begun = [Step(event.at_s, i, event, False) for i, event in enumerate(scenario.event)]
     ended = [
-        Step(event.at_s + event.for_s, i, event, True)
+        Step(_sum(event.at_s, event.for_s), i, event, True)
         for i, event in enumerate(scenario.event)
         if event.for_s is not None
     ]
@@ -67,5 +67,10 @@ class Timeline:
     def end_later(self, begun: Step) -> None:
         """Add the end of an operator's event, where it has one."""
         if begun.event.for_s is not None:
-            step = begun._replace(at_s=begun.at_s + begun.event.for_s, ends=True)
+            step = begun._replace(at_s=_sum(begun.at_s, begun.event.for_s), ends=True)
             insort(self._steps, step, lo=self._next, key=lambda each: each.at_s)
+
+
+def _sum(at_s: float, for_s: float) -> float:
+    """Return the time of an end [s] to the microsecond: 1.1 s and 2.2 s make 3.3 s, exactly."""
+    return round(at_s + for_s, 6)

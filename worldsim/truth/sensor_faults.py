@@ -17,10 +17,15 @@ KEY_SALT = 1 << 60
 
 
 class SensorFaults:
-    """Which sensors of which agents have failed, and the readings at which they are stuck."""
+    """Which sensors of which agents have failed, and the readings at which they are stuck.
+
+    Of several faults of a sensor the latest acts; when it ends, the one before acts again.
+    """
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
+        self._faults: dict[tuple[int, str], dict[int, FailureMode]] = {}
+        """Faults in force by number, in the order in which they began."""
         self._modes: dict[tuple[int, str], FailureMode] = {}
         self._stuck_readings: dict[int, ProximityReading] = {}
         self._stuck_scans: dict[tuple[int, str], Scan] = {}
@@ -28,15 +33,27 @@ class SensorFaults:
     def __bool__(self) -> bool:
         return bool(self._modes)
 
-    def set(self, agent: int, sensor: str | None, mode: FailureMode | None) -> None:
-        """Let an agent's sensor (None: all of them) fail in a mode, or with None work again."""
+    def begin(self, number: int, agent: int, sensor: str | None, mode: FailureMode) -> None:
+        """Begin a fault of an agent's sensor (None: of all its sensors)."""
         for name in SENSORS if sensor is None else (sensor,):
-            self._modes.pop((agent, name), None)
-            self._stuck_scans.pop((agent, name), None)
-            if name == "proximity":
-                self._stuck_readings.pop(agent, None)
-            if mode is not None:
-                self._modes[agent, name] = mode
+            self._faults.setdefault((agent, name), {})[number] = mode
+            self._act(agent, name)
+
+    def end(self, number: int, agent: int) -> None:
+        """End a fault of an agent's sensors."""
+        for name in SENSORS:
+            if self._faults.get((agent, name), {}).pop(number, None) is not None:
+                self._act(agent, name)
+
+    def _act(self, agent: int, name: str) -> None:
+        """Let the latest fault in force act on a sensor, from its present reading on."""
+        self._modes.pop((agent, name), None)
+        self._stuck_scans.pop((agent, name), None)
+        if name == "proximity":
+            self._stuck_readings.pop(agent, None)
+        modes = list(self._faults[agent, name].values())
+        if modes:
+            self._modes[agent, name] = modes[-1]
 
     def reading(self, agent: int, true: ProximityReading, slot: int) -> ProximityReading:
         """Return the reading of an agent's proximity sensor, given the true one."""
