@@ -165,7 +165,7 @@ def test_ctrl_c_ends_a_lockstep_run(start: Start, scenario: Write, run: Path) ->
 def test_contradicting_options_are_one_line(start: Start, scenario: Write, run: Path) -> None:
     fast = lockstep(start, scenario(6.0), run, "--speed", "2")
     assert fast.status(10.0) == 2
-    assert "--speed: not beside --lockstep" in fast.text
+    assert "--speed: cannot be combined with --lockstep" in fast.text
     sharded = start(*QSWARM, "run", scenario(6.0), "--shards", "2", "--out", str(run))
     assert sharded.status(10.0) == 2
     assert "--shards: needs --lockstep" in sharded.text
