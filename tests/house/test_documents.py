@@ -13,7 +13,28 @@ from worldsim.scenario.file import load
 ROOT = generated_docs.ROOT
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 LINK = re.compile(r"\]\((?!https?://|#)([^)#]+)(?:#[^)]*)?\)")
+COMMENTED_KEY = re.compile(r"^# (\w+) =", re.MULTILINE)
 NAMED = re.compile(r"`((?:netem|agent|worldsim|tests|deploy|docs)/[\w./-]+\.\w+)`")
+
+
+def _toml_blocks(name: str) -> list[str]:
+    found: list[str] = re.findall(r"```toml\n(.*?)```", (ROOT / name).read_text(), re.DOTALL)
+    return found
+
+
+def _shown_scenario(name: str) -> str:
+    (shown,) = [block for block in _toml_blocks(name) if "[fleet]" in block]
+    return shown
+
+
+def _saved(text: str, folder: Path) -> Path:
+    """Save a scenario in a folder, beside the formations that it names by path or by name."""
+    formations = shutil.copytree(ROOT / "deploy" / "formations", folder / "formations")
+    for formation in formations.glob("*.toml"):
+        shutil.copy(formation, folder / formation.stem)
+    file = folder / "scenario.toml"
+    file.write_text(text)
+    return file
 
 
 def test_the_parts_that_are_generated_are_in_the_documents() -> None:
@@ -43,13 +64,22 @@ def test_the_readme_is_short() -> None:
 
 @pytest.mark.parametrize("name", ["README.md", "docs/scenario.md"])
 def test_the_scenario_that_a_document_shows_can_be_flown(name: str, tmp_path: Path) -> None:
-    blocks = re.findall(r"```toml\n(.*?)```", (ROOT / name).read_text(), re.DOTALL)
-    (shown,) = [block for block in blocks if "[fleet]" in block]
-    shutil.copytree(ROOT / "deploy" / "formations", tmp_path / "formations")
-    folder = tmp_path / "scenarios" if '"../formations' in shown else tmp_path
-    folder.mkdir(exist_ok=True)
-    file = folder / "shown.toml"
-    file.write_text(shown)
+    file = _saved(_shown_scenario(name), tmp_path)
     scenario = load(file)
     admit(scenario, file, PROCESS_COMMAND_TICKS)
     assert scenario.event
+
+
+@pytest.mark.parametrize("key", COMMENTED_KEY.findall(_shown_scenario("docs/scenario.md")))
+def test_each_key_that_the_example_comments_out_can_be_switched_on(
+    key: str, tmp_path: Path
+) -> None:
+    text = _shown_scenario("docs/scenario.md").replace(f"\n# {key} =", f"\n{key} =")
+    load(_saved(text, tmp_path))
+
+
+def test_the_formation_that_a_document_shows_is_a_whole_file(tmp_path: Path) -> None:
+    (shown,) = [block for block in _toml_blocks("docs/scenario.md") if "[vertices]" in block]
+    (tmp_path / "shown.toml").write_text(shown)
+    text = '[fleet]\nagents = 5\n[formation]\nfile = "shown.toml"\n'
+    assert load(_saved(text, tmp_path)).formation.name == "arrow"
