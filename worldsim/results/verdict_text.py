@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from worldsim.recording.layout import SUMMARY_FILE
 from worldsim.results.overall import Overall, Row, ScenarioRow
 from worldsim.results.summary import DeliveryRow, ExpectationRow, Summary
 
@@ -48,16 +49,24 @@ def verified(verification: "Verification") -> str:
         for row in verification.expectations
     )
     cut = "" if verification.whole else f" of {verification.duration_s:g} s"
+    none = f"  no {SUMMARY_FILE} to compare with"
     agreement = [
         f"  DIFFERS  {each.key}: {each.summary} in summary.json, {each.recording} in the recording"
         for each in verification.differences
-    ] or ["  summary.json agrees" if verification.summary else "  no summary.json to compare with"]
+    ] or [f"  {SUMMARY_FILE} agrees" if verification.summary else none]
     head = (
         f"{verification.scenario}, judged from the recording alone:"
         f" {verification.ticks} ticks, {verification.until_s:g} s{cut}"
     )
-    outcome = "met" if verification.held else "NOT MET"
-    return "\n".join([head, *map(_expectation, rows), *agreement, f"{outcome}  {verification.run}"])
+    outcome = f"{_verified_outcome(verification)}  {verification.run}"
+    return "\n".join([head, *map(_expectation, rows), *agreement, outcome])
+
+
+def _verified_outcome(verification: "Verification") -> str:
+    doubt = verification.inconclusive
+    if doubt is not None:
+        return f"inconclusive ({doubt})"
+    return "met" if verification.held else "NOT MET"
 
 
 def _head(summary: Summary) -> str:
@@ -146,8 +155,9 @@ def _scenario(scenario: ScenarioRow) -> list[str]:
         ("separation", scenario["min_separation_m"], "m", 3),
         ("converged in", scenario["converge_s"], "s", 2),
     )
+    doubtful = f", {scenario['inconclusive']} inconclusive" if scenario["inconclusive"] else ""
     return [
-        f"{scenario['scenario']}: {scenario['pass']} of {scenario['runs']} runs passed",
+        f"{scenario['scenario']}: {scenario['pass']} of {scenario['runs']} runs passed{doubtful}",
         *(
             f"  {name:12}  min {_figure(spread['min'], unit, digits)},"
             f" median {_figure(spread['median'], unit, digits)},"
