@@ -8,7 +8,7 @@ import pytest
 from tests.small_scenario import SMALL
 from worldsim.campaign.pool import finished
 from worldsim.engine.virtual import fly
-from worldsim.results.overall import Result, over_all
+from worldsim.results.overall import FailedRun, Result, over_all
 from worldsim.results.summary import Summary, summarise
 from worldsim.results.verdict_text import table, verdict
 from worldsim.scenario.file import parse
@@ -96,7 +96,7 @@ def test_an_outcome_has_its_reason(summary: Summary) -> None:
 
 
 def test_many_runs_are_a_table_with_spreads(summary: Summary) -> None:
-    results = [Result(Path(f"many/small-seed{k}"), {**summary, "seed": k}) for k in (2, 1)]
+    results = [Result(Path(f"many/small-seed{k}"), {**summary, "seed": k}) for k in (1, 2)]
     lines = table(over_all(results), Path("many")).splitlines()
     assert lines[0].split("  ")[0] == "run"
     assert [line.split()[0] for line in lines[1:3]] == ["small-seed1", "small-seed2"]
@@ -104,3 +104,28 @@ def test_many_runs_are_a_table_with_spreads(summary: Summary) -> None:
     assert lines[4] == "small: 2 of 2 runs passed"
     assert lines[5] == "  separation    min 1.000 m, median 1.000 m, max 1.000 m (2 runs)"
     assert lines[-1] == "pass  many/summary.json"
+
+
+def test_scenarios_stand_in_the_order_given_and_a_controller_error_is_a_row(
+    summary: Summary,
+) -> None:
+    error = "controller 'x:Y' of agent 0 failed at 1 s: ValueError: lost"
+    results = [
+        Result(Path("many/zig-seed1"), {**summary, "scenario": "zig"}),
+        FailedRun(Path("many/arc-seed4"), "arc", 4, error),
+    ]
+    overall = over_all(results)
+    assert [row["seed"] for row in overall["rows"]] == [1, 4]
+    lines = table(overall, Path("many")).splitlines()
+    assert [line.split()[0] for line in lines[1:3]] == ["zig-seed1", "arc-seed4"]
+    assert lines[2].endswith(f"  fail ({error})")
+    assert [line.split(":")[0] for line in lines if "runs passed" in line] == ["zig", "arc"]
+    assert lines[-1] == "fail  many/summary.json"
+
+
+def test_interrupted_runs_say_how_many_were_made(summary: Summary) -> None:
+    cut: Any = {**summary, "outcome": "inconclusive", "reason": "interrupted after 2.0 s"}
+    results = [Result(Path("many/small-seed1"), summary), Result(Path("many/small-seed2"), cut)]
+    lines = table(over_all(results, interrupted_of=6), Path("many")).splitlines()
+    assert "small: 1 of 2 runs passed, 1 inconclusive" in lines
+    assert lines[-1] == "inconclusive (interrupted: 2 of 6 runs made)  many/summary.json"
