@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from agent.qstructure.formation import FormationSpec
 from tests.commands.conftest import Command
 from worldsim.scenario.file import parse
 from worldsim.scenario.library import FORMATIONS, SCENARIOS, find_formation, find_scenario
@@ -74,6 +75,34 @@ def test_formations_are_found_by_name_too(elsewhere: Path) -> None:
         find_formation("pyramidal-wegde")
     (elsewhere / "helix.toml").write_text("mine")
     assert find_formation("helix.toml") == Path("helix.toml")
+
+
+def test_a_scenario_names_a_formation_of_the_library_or_a_file(elsewhere: Path) -> None:
+    event = "[[event]]\nat_s = 5\nformation = 'three-horizontal-lines'\n"
+    text = f"fleet = {{ agents = 9 }}\n[formation]\nfile = 'pyramidal-wedge'\n{event}"
+    scenario = parse(text)
+    assert scenario.formation.name == "pyramidal-wedge"
+    assert isinstance(scenario.event[0].formation, FormationSpec)
+    assert scenario.event[0].formation.name == "three-horizontal-lines"
+    own = (FORMATIONS / "helix.toml").read_text().replace('name = "helix"', 'name = "own"')
+    (elsewhere / "pyramidal-wedge").write_text(own)
+    assert parse(text, elsewhere / "mine.toml").formation.name == "own"
+
+
+def test_a_formation_that_does_not_exist_is_one_error_with_the_closest_names() -> None:
+    with pytest.raises(ScenarioError) as caught:
+        parse("fleet = { agents = 9 }\nformation = { file = 'helx' }\n")
+    assert str(caught.value).startswith(
+        "scenario.toml: formation.file: no such file: helx, and no such formation in the library;"
+        " closest: helix; they are in "
+    )
+
+
+def test_names_that_are_not_similar_are_not_suggested(qswarm: Command) -> None:
+    printed = qswarm("sim", "nosuch")
+    assert printed.err == (
+        "nosuch: no such file, and no such scenario in the library; qswarm run --list shows all\n"
+    )
 
 
 def test_an_installation_without_scenarios_is_an_error(tmp_path: Path) -> None:
