@@ -91,6 +91,13 @@ def test_many_seeds_have_a_folder_each_and_a_summary_over_all(
         assert own["min_separation_m"] == row["min_separation_m"]
 
 
+def test_a_folder_of_many_runs_is_not_verified(small: Path, qswarm: Command) -> None:
+    qswarm("sim", small, "--no-recording", "--seeds", "0:2", "--jobs", "1", "--out", "many")
+    printed = qswarm("verify", "many")
+    assert (printed.status, printed.out) == (2, "")
+    assert printed.err == "many: a folder of many runs; name one of them\n"
+
+
 def test_one_failed_seed_fails_all(small: Path, qswarm: Command) -> None:
     other = small.with_name("hard.toml")
     other.write_text(small.read_text().replace('"small"', '"hard"'))

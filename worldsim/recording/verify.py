@@ -115,6 +115,8 @@ class Verification:
 def verify(run: Path) -> Verification:
     """Judge a run's recording again; ``run`` is its folder, or the recording itself."""
     recording = run / RECORDING_FILE if run.is_dir() else run
+    if not recording.is_file() and any(run.glob("*/scenario.toml")):
+        return Verification(run, problem=f"{run}: a folder of many runs; name one of them")
     try:
         judged = _judged(run, recording)
         return _compared(judged, recording.with_name(SUMMARY_FILE))
