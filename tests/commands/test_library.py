@@ -1,5 +1,6 @@
 """The library from the command line: --list, and scenarios by name from any folder."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -28,7 +29,10 @@ def test_list_prints_each_name_and_what_the_scenario_shows(
     printed = qswarm(command, "--list")
     assert (printed.status, printed.err) == (0, "")
     rows = [line.split("  ", 1) for line in printed.out.splitlines()]
-    assert [name.strip() for name, _ in rows] == [file.stem for file in FILES]
+    names = [name.strip() for name, _ in rows]
+    assert sorted(names) == sorted(file.stem for file in FILES)
+    wedges = [name for name in names if re.fullmatch(r"wedge-\d+", name)]
+    assert wedges == ["wedge-9", "wedge-20", "wedge-50", "wedge-100"]
     assert all(shows.strip() for _, shows in rows)
     assert list(elsewhere.iterdir()) == []
 
@@ -53,7 +57,10 @@ def test_commands_take_a_name(qswarm: Command) -> None:
     assert "wedge-9, seed 1, virtual time" in qswarm("sim", "wedge-9", *short).out
     two = qswarm("sim", "wedge-9", "head-on-1", "--out", "two", *short)
     assert {path.name for path in Path("two").iterdir()} >= {"wedge-9-seed1", "head-on-1-seed1"}
-    assert two.err == ""
+    assert [line.split(": warning: ")[0] for line in two.err.splitlines()] == [
+        "wedge-9: expect.converge_within_s",
+        "head-on-1: expect.converge_within_s",
+    ]
     printed = qswarm("netem", "check", "wedge-9", "--plot", "radio.png")
     assert (printed.status, printed.out.splitlines()[-1]) == (
         0,

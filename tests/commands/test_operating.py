@@ -51,3 +51,16 @@ def test_a_fleet_that_has_ended_is_an_error(small: Path, qswarm: Command) -> Non
     Path("run/fleet.json").write_text(json.dumps(fleet))
     printed = qswarm("fault", "run", "kill", "2")
     assert (printed.status, printed.err) == (2, "run: the run has ended\n")
+
+
+def test_ps_has_a_header_and_a_row_for_each_process(small: Path, qswarm: Command) -> None:
+    Path("run").mkdir()
+    rows = [{"name": name, "pid": os.getpid(), "started": 1} for name in ("world", "zygote")]
+    fleet = {"run": "small", "endpoint": "tcp/127.0.0.1:9", "processes": rows}
+    Path("run/fleet.json").write_text(json.dumps(fleet))
+    printed = qswarm("ps", "run")
+    assert [line.split() for line in printed.out.splitlines()] == [
+        ["name", "pid", "state"],
+        ["world", str(os.getpid()), "gone"],
+        ["zygote", str(os.getpid()), "gone"],
+    ]

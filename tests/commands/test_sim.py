@@ -35,6 +35,13 @@ def test_a_recording_is_made_and_verified(small: Path, qswarm: Command) -> None:
     assert "summary.json agrees" in printed.out
 
 
+@pytest.mark.parametrize("more", [(), ("--seeds", "0:2", "--jobs", "1")])
+def test_a_warning_is_printed_once(small: Path, qswarm: Command, more: tuple[str, ...]) -> None:
+    printed = qswarm("sim", small, "--no-recording", "--set", "netem.range_m=0.9", *more)
+    assert printed.err.startswith(f"{small}: netem.range_m: warning: ")
+    assert printed.err.count(": warning: ") == 1
+
+
 def test_without_out_the_folder_is_named_after_scenario_and_time(
     small: Path, qswarm: Command
 ) -> None:

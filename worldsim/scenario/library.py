@@ -4,6 +4,7 @@ In a checkout they are in ``deploy``; a wheel holds a copy beside the code, in `
 """
 
 import os
+import re
 from difflib import get_close_matches
 from pathlib import Path
 from typing import NamedTuple
@@ -99,7 +100,13 @@ def _closest(name: str, files: dict[str, Path]) -> str:
 
 
 def _files(folder: Path) -> dict[str, Path]:
-    return {file.stem: file for file in sorted(folder.rglob("*.toml"))}
+    return {file.stem: file for file in sorted(folder.rglob("*.toml"), key=_by_number)}
+
+
+def _by_number(file: Path) -> list[tuple[int, str]]:
+    """Return a key that sorts the numbers in names by their size: wedge-9 before wedge-20."""
+    parts = re.split(r"([0-9]+)", file.stem)
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]
 
 
 def _shown(path: Path) -> Path:
