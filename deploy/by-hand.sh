@@ -1,9 +1,22 @@
 #!/usr/bin/env bash
 # A fleet without the launcher: netem, the world and the agents, each started by a plain command.
 #   deploy/by-hand.sh [SCENARIO [DIR]]
-# The commands can also be typed into different shells. QSWARM_PORT sets a port other than 7447.
+# SCENARIO: a scenario file or a name of the library, by default wedge-9. DIR: a new folder, by
+# default in runs. QSWARM_PORT sets a port other than 7447. The commands can also be typed into
+# different shells.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+
+case ${1-} in
+    -h | --help)
+        sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' deploy/by-hand.sh
+        exit 0
+        ;;
+    -*)
+        echo "$1: no such option; deploy/by-hand.sh [SCENARIO [DIR]]" >&2
+        exit 2
+        ;;
+esac
 
 scenario=${1:-deploy/scenarios/wedge-9.toml}
 python=.venv/bin/python

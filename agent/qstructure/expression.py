@@ -66,6 +66,8 @@ class Expression:
         try:
             result = self._evaluator.eval(self.text, previously_parsed=self._tree)
             number = math.nan if isinstance(result, complex) else float(result)
+        except OverflowError as error:
+            raise ExpressionError(f"{self._at(value)}: the result is too large") from error
         except (ArithmeticError, ValueError, TypeError, RecursionError) as error:
             raise ExpressionError(f"{self._at(value)}: {error}") from error
         except InvalidExpression as error:

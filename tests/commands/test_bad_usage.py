@@ -8,28 +8,33 @@ import pytest
 
 from tests.commands.conftest import Command
 
-NO_SUCH_NAME = "no such file, and no such scenario in the library; closest: "
+NO_SUCH_NAME = "no such file, and no such scenario in the library; "
+NO_SUCH_BUT = f"{NO_SUCH_NAME}closest: "
+AGENTS = "qswarm: --agents: got 'many'; a whole number is needed (see qswarm sim --help)\n"
 BAD = [
     ((), "Missing command"),
-    (("fly",), "No such command 'fly'"),
+    (("fly",), "qswarm: No such command 'fly' (see qswarm --help)"),
     (("sim",), "Missing argument 'SCENARIO'"),
     (("sim", "none.toml"), "none.toml: no such file"),
     (("run", "none.toml"), "none.toml: no such file"),
     (("check", "none.toml"), "none.toml: no such file"),
-    (("sim", "wegde-9"), f"wegde-9: {NO_SUCH_NAME}wedge-9, "),
-    (("run", "wegde-9"), f"wegde-9: {NO_SUCH_NAME}wedge-9, "),
-    (("check", "wegde-9"), f"wegde-9: {NO_SUCH_NAME}wedge-9, "),
-    (("netem", "check", "wegde-9"), f"wegde-9: {NO_SUCH_NAME}wedge-9, "),
+    (("sim", "wegde-9"), f"wegde-9: {NO_SUCH_BUT}wedge-9, "),
+    (("run", "wegde-9"), f"wegde-9: {NO_SUCH_BUT}wedge-9, "),
+    (("check", "wegde-9"), f"wegde-9: {NO_SUCH_BUT}wedge-9, "),
+    (("netem", "check", "wegde-9"), f"wegde-9: {NO_SUCH_BUT}wedge-9, "),
     (("sim", "%&"), f"%&: {NO_SUCH_NAME}"),
     (("sim", "wedge-9.toml"), "wedge-9.toml: no such file; the library has 'wedge-9'"),
     (("sim", "a/wedge-9.toml"), "a/wedge-9.toml: no such file; the library has 'wedge-9'"),
     (("sim", "."), ".: cannot be read: Is a directory"),
     (("sim", "small.toml", "--bogus"), "No such option: --bogus"),
-    (("sim", "small.toml", "--agents", "many"), "'--agents'"),
+    (("sim", "small.toml", "--agents", "many"), AGENTS),
     (("sim", "small.toml", "--agents", "0"), "small.toml: fleet.agents: got 0"),
     (("sim", "small.toml", "--agents", "3"), "small.toml: fleet.start.positions_m: 2 positions"),
     (("sim", "small.toml", "--seed", "-1"), "small.toml: seed: got -1"),
-    (("sim", "small.toml", "--duration", "nan"), "small.toml: duration_s: nan is not allowed"),
+    (
+        ("sim", "small.toml", "--duration", "nan"),
+        "small.toml: duration_s: got nan; must be a finite number",
+    ),
     (("sim", "small.toml", "--set", "netem.loss_percent"), "write it as netem.loss_percent=50"),
     (("sim", "small.toml", "--set", "=50"), "write it as netem.loss_percent=50"),
     (("sim", "small.toml", "--set", "netem.loss=50"), "netem.loss: unknown key"),
@@ -41,8 +46,8 @@ BAD = [
     (("sim", "small.toml", "--seeds", "0:9999999"), "at most 1000000"),
     (("sim", "small.toml", "--seeds", "0:2", "--seed", "1"), "cannot be combined with --seed"),
     (("sim", "small.toml", "small.toml"), "small-seed1: would be written twice"),
-    (("sim", "small.toml", "--jobs", "0"), "'--jobs'"),
-    (("run", "small.toml", "--speed", "0"), "'--speed'"),
+    (("sim", "small.toml", "--jobs", "0"), "--jobs: got 0; at least 1 is needed"),
+    (("run", "small.toml", "--speed", "0"), "--speed: got 0; at least 0.01 is needed"),
     (("run", "small.toml", "--speed", "inf"), "--speed"),
     (("run", "small.toml", "--speed", "2", "--lockstep"), "cannot be combined with --lockstep"),
     (("run", "small.toml", "--shards", "2"), "needs --lockstep"),
@@ -52,7 +57,16 @@ BAD = [
     (("sim", "small.toml", "--seeds", "0:2", "--out", "."), "exists"),
     (("netem", "check", "small.toml", "--plot", "radio.txt"), "'radio.txt'; must end in .png"),
     (("verify", "none"), "none: no such"),
-    (("ps", "none"), "none: not a process run (no fleet.json)"),
+    (("ps", "none"), "none: no such folder"),
+    (("ps", "."), ".: not a process run (no fleet.json)"),
+    (("netem", "check", "a", "b"), "SCENARIO: got 2 scenarios; check takes one"),
+    (("netem", "check"), "SCENARIO: got 0 scenarios; check takes one"),
+    (("netem", "check", "small.toml", "--for", "3"), "--for: check undoes nothing; omit it"),
+    (("bench", "--json", "nowhere/x.json"), "nowhere/x.json: cannot be written: no such folder"),
+    (
+        ("bench", "--repeats", "1000"),
+        "--repeats: got 1000; at most 100 is allowed (see qswarm bench",
+    ),
 ]
 
 

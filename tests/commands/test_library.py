@@ -1,10 +1,12 @@
 """The library from the command line: --list, and scenarios by name from any folder."""
 
+import re
 import tomllib
 from pathlib import Path
 
 import pytest
 
+from agent.qstructure.formation import FormationSpec
 from tests.commands.conftest import Command
 from worldsim.scenario.file import parse
 from worldsim.scenario.library import FORMATIONS, SCENARIOS, find_formation, find_scenario
@@ -27,7 +29,10 @@ def test_list_prints_each_name_and_what_the_scenario_shows(
     printed = qswarm(command, "--list")
     assert (printed.status, printed.err) == (0, "")
     rows = [line.split("  ", 1) for line in printed.out.splitlines()]
-    assert [name.strip() for name, _ in rows] == [file.stem for file in FILES]
+    names = [name.strip() for name, _ in rows]
+    assert sorted(names) == sorted(file.stem for file in FILES)
+    wedges = [name for name in names if re.fullmatch(r"wedge-\d+", name)]
+    assert wedges == ["wedge-9", "wedge-20", "wedge-50", "wedge-100"]
     assert all(shows.strip() for _, shows in rows)
     assert list(elsewhere.iterdir()) == []
 
@@ -52,7 +57,10 @@ def test_commands_take_a_name(qswarm: Command) -> None:
     assert "wedge-9, seed 1, virtual time" in qswarm("sim", "wedge-9", *short).out
     two = qswarm("sim", "wedge-9", "head-on-1", "--out", "two", *short)
     assert {path.name for path in Path("two").iterdir()} >= {"wedge-9-seed1", "head-on-1-seed1"}
-    assert two.err == ""
+    assert [line.split(": warning: ")[0] for line in two.err.splitlines()] == [
+        "wedge-9: expect.converge_within_s",
+        "head-on-1: expect.converge_within_s",
+    ]
     printed = qswarm("netem", "check", "wedge-9", "--plot", "radio.png")
     assert (printed.status, printed.out.splitlines()[-1]) == (
         0,
@@ -74,6 +82,34 @@ def test_formations_are_found_by_name_too(elsewhere: Path) -> None:
         find_formation("pyramidal-wegde")
     (elsewhere / "helix.toml").write_text("mine")
     assert find_formation("helix.toml") == Path("helix.toml")
+
+
+def test_a_scenario_names_a_formation_of_the_library_or_a_file(elsewhere: Path) -> None:
+    event = "[[event]]\nat_s = 5\nformation = 'three-horizontal-lines'\n"
+    text = f"fleet = {{ agents = 9 }}\n[formation]\nfile = 'pyramidal-wedge'\n{event}"
+    scenario = parse(text)
+    assert scenario.formation.name == "pyramidal-wedge"
+    assert isinstance(scenario.event[0].formation, FormationSpec)
+    assert scenario.event[0].formation.name == "three-horizontal-lines"
+    own = (FORMATIONS / "helix.toml").read_text().replace('name = "helix"', 'name = "own"')
+    (elsewhere / "pyramidal-wedge").write_text(own)
+    assert parse(text, elsewhere / "mine.toml").formation.name == "own"
+
+
+def test_a_formation_that_does_not_exist_is_one_error_with_the_closest_names() -> None:
+    with pytest.raises(ScenarioError) as caught:
+        parse("fleet = { agents = 9 }\nformation = { file = 'helx' }\n")
+    assert str(caught.value).startswith(
+        "scenario.toml: formation.file: no such file: helx, and no such formation in the library;"
+        " closest: helix; they are in "
+    )
+
+
+def test_names_that_are_not_similar_are_not_suggested(qswarm: Command) -> None:
+    printed = qswarm("sim", "nosuch")
+    assert printed.err == (
+        "nosuch: no such file, and no such scenario in the library; qswarm run --list shows all\n"
+    )
 
 
 def test_an_installation_without_scenarios_is_an_error(tmp_path: Path) -> None:

@@ -65,6 +65,12 @@ def test_an_invalid_name_is_rejected(small: Path, qswarm: Command, name: str) ->
     assert list(small.parent.iterdir()) == [small]
 
 
+def test_a_name_may_end_in_toml(small: Path, qswarm: Command) -> None:
+    assert qswarm("new", "mine.toml").status == 0
+    assert parse((small.parent / "mine.toml").read_text()).name == "mine"
+    assert not small.with_name("mine.toml.toml").exists()
+
+
 def test_nothing_is_overwritten(small: Path, qswarm: Command) -> None:
     before = small.read_text()
     printed = qswarm("new", "small")

@@ -21,6 +21,7 @@ from tests.commands.conftest import Command
             ("netem", "run", "explode"),
             "ACTION: 'explode'; allowed: show, set, partition, heal, jam, flap",
         ),
+        (("netem", "run", "partition"), "partition: write groups, e.g. 0,1/2,3 (see qswarm netem"),
         (("netem", "run", "partition", "a,b"), "'a'; a whole number from 0"),
         (("netem", "run", "set", "loss"), "'loss'; write it as KEY=VALUE"),
         (("netem", "run", "set", "=3"), "'=3'; write it as KEY=VALUE"),
@@ -30,8 +31,8 @@ from tests.commands.conftest import Command
         (("mission", "run", "there.toml", "--frame", "yaw_deg=1"), "exactly one of them"),
         (("mission", "run", "missing.toml"), "missing.toml: no such file"),
         (("mission", "run", "helx"), "no such formation in the library; closest: helix"),
-        (("netem", "run", "show"), "run: not a process run (no fleet.json)"),
-        (("fault", "run", "kill", "2"), "run: not a process run (no fleet.json)"),
+        (("netem", "run", "show"), "run: no such folder"),
+        (("fault", "run", "kill", "2"), "run: no such folder"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(
@@ -50,3 +51,16 @@ def test_a_fleet_that_has_ended_is_an_error(small: Path, qswarm: Command) -> Non
     Path("run/fleet.json").write_text(json.dumps(fleet))
     printed = qswarm("fault", "run", "kill", "2")
     assert (printed.status, printed.err) == (2, "run: the run has ended\n")
+
+
+def test_ps_has_a_header_and_a_row_for_each_process(small: Path, qswarm: Command) -> None:
+    Path("run").mkdir()
+    rows = [{"name": name, "pid": os.getpid(), "started": 1} for name in ("world", "zygote")]
+    fleet = {"run": "small", "endpoint": "tcp/127.0.0.1:9", "processes": rows}
+    Path("run/fleet.json").write_text(json.dumps(fleet))
+    printed = qswarm("ps", "run")
+    assert [line.split() for line in printed.out.splitlines()] == [
+        ["name", "pid", "state"],
+        ["world", str(os.getpid()), "gone"],
+        ["zygote", str(os.getpid()), "gone"],
+    ]

@@ -25,6 +25,16 @@ def test_a_script_passes_bash_and_shellcheck(script: Path) -> None:
         assert (done.returncode, done.stdout + done.stderr) == (0, "")
 
 
+def test_by_hand_prints_its_usage_and_refuses_options() -> None:
+    script = ROOT / "deploy" / "by-hand.sh"
+    usage = subprocess.run([script, "--help"], capture_output=True, text=True, check=False)
+    assert (usage.returncode, usage.stderr) == (0, "")
+    assert "  deploy/by-hand.sh [SCENARIO [DIR]]" in usage.stdout.splitlines()
+    wrong = subprocess.run([script, "--bogus"], capture_output=True, text=True, check=False)
+    assert (wrong.returncode, wrong.stdout) == (2, "")
+    assert wrong.stderr == "--bogus: no such option; deploy/by-hand.sh [SCENARIO [DIR]]\n"
+
+
 def test_scripts_are_executable() -> None:
     sourced = ROOT / "deploy" / "setup.sh"
     assert all(os.access(script, os.X_OK) for script in SCRIPTS if script != sourced)

@@ -82,14 +82,21 @@ SENTENCES: list[tuple[dict[str, Any], str]] = [
             **{"kind": "netem", **NO_AGENT, "number": 1, "loss_percent": 50.0},
             **{"conditions": {"range_m": 6.0, "loss_percent": 50.0}, **SCHEDULED},
         },
-        "link conditions changed: loss_percent = 50.0 (scheduled)",
+        "link conditions changed: loss_percent = 50 (scheduled)",
+    ),
+    (
+        {
+            **{"kind": "netem", **NO_AGENT, "number": 1, "multihop": {"delay_ms": 200.0}},
+            **{"conditions": {"multihop": {"delay_ms": 200.0}}, **SCHEDULED},
+        },
+        "link conditions changed: multihop.delay_ms = 200 (scheduled)",
     ),
     (
         {
             **{"kind": "netem", **NO_AGENT, "number": 1, "undone": {"loss_percent": 50.0}},
             **{"conditions": {"range_m": 6.0}, **SCHEDULED},
         },
-        "link conditions restored: end of loss_percent = 50.0 (scheduled)",
+        "link conditions restored: end of loss_percent = 50 (scheduled)",
     ),
     (
         {

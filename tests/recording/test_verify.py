@@ -12,6 +12,7 @@ from worldsim.judge.invariants import InvariantTally
 from worldsim.judge.verdict import Judge
 from worldsim.recording.recorder import RunRecorder
 from worldsim.recording.verify import Difference, verify
+from worldsim.results.verdict_text import verified
 
 
 @pytest.fixture
@@ -45,13 +46,44 @@ def summary_of(judge: Judge) -> dict[str, Any]:
     }
 
 
-def test_without_a_summary_the_recording_is_still_judged(tmp_path: Path, judge: Judge) -> None:
+def write_summary(folder: Path, judge: Judge, **changes: object) -> None:
+    (folder / "summary.json").write_text(json.dumps({**summary_of(judge), **changes}))
+
+
+def test_without_a_summary_the_recording_is_judged_but_inconclusive(
+    tmp_path: Path, judge: Judge
+) -> None:
     verification = verify(tmp_path)
     assert not verification.summary
     assert verification.expectations == tuple(judge.expectations())
     assert verification.min_separation_m == judge.min_separation_m
     assert verification.phases[0].converge_s == judge.phases[0].converge_s
     assert verification.whole
+    assert verification.exit_status == 3
+    last = verified(verification).splitlines()[-1]
+    why = "no summary.json: the run has not finished, or was ended by force"
+    assert last == f"inconclusive ({why})  {tmp_path}"
+
+
+@pytest.mark.parametrize("reason", ["interrupted after 2.0 s", "the host was too slow"])
+def test_an_inconclusive_run_stays_inconclusive(tmp_path: Path, judge: Judge, reason: str) -> None:
+    write_summary(tmp_path, judge, outcome="inconclusive", reason=reason)
+    verification = verify(tmp_path)
+    assert verification.differences == ()
+    assert not verification.held
+    assert verification.exit_status == 3
+    last = verified(verification).splitlines()[-1]
+    assert last == f"inconclusive (summary.json: {reason})  {tmp_path}"
+
+
+def test_a_recording_that_ends_early_is_inconclusive(tmp_path: Path) -> None:
+    scenario = wedge(4)
+    recorder = RunRecorder(tmp_path / "run.rrd", scenario, "cut", mode="virtual")
+    judge = record(recorder, scenario, list(straight_flight(scenario))[:100])
+    write_summary(tmp_path, judge)
+    verification = verify(tmp_path)
+    assert (verification.whole, verification.held, verification.exit_status) == (False, False, 3)
+    assert "inconclusive (the recording ends at 4.95 s of 8 s)" in verified(verification)
 
 
 def test_a_true_summary_does_not_differ(tmp_path: Path, judge: Judge) -> None:
@@ -96,7 +128,8 @@ def test_held_is_exit_0_and_a_missed_expectation_1(tmp_path: Path) -> None:
     for name, scenario in (("calm", calm), ("short", short)):
         (tmp_path / name).mkdir()
         recorder = RunRecorder(tmp_path / name / "run.rrd", scenario, name, mode="virtual")
-        record(recorder, scenario, list(straight_flight(scenario)))
+        judge = record(recorder, scenario, list(straight_flight(scenario)))
+        write_summary(tmp_path / name, judge, outcome="pass" if name == "calm" else "fail")
     assert verify(tmp_path / "calm").exit_status == 0
     assert verify(tmp_path / "short").exit_status == 1
 
@@ -106,7 +139,7 @@ def test_missing_packets_are_found_in_the_recording(tmp_path: Path) -> None:
     *ticks, last = straight_flight(scenario)
     last.packets["in_flight"] -= 1
     recorder = RunRecorder(tmp_path / "run.rrd", scenario, "leaky", mode="virtual")
-    record(recorder, scenario, [*ticks, last])
+    write_summary(tmp_path, record(recorder, scenario, [*ticks, last]), outcome="fail")
     verification = verify(tmp_path)
     assert verification.invariants["I8"] == InvariantTally(len(ticks) + 1, 1)
     assert verification.exit_status == 1

@@ -13,10 +13,13 @@ from tests.small_scenario import SMALL
 from worldsim.campaign.pool import finished
 from worldsim.engine.step import SlotLoop, world_of
 from worldsim.engine.virtual import fly
+from worldsim.judge.hovering_vehicles import HoveringVehicles
+from worldsim.judge.invariants import Invariants
 from worldsim.results.exit_status import EXIT_STATUS
 from worldsim.results.provenance import provenance
-from worldsim.results.summary import FATES, FinishedRun, Summary, summarise
-from worldsim.scenario.file import parse
+from worldsim.results.summary import FATES, INVARIANT_WORDS, FinishedRun, Summary, summarise
+from worldsim.scenario.file import load, parse
+from worldsim.scenario.library import SCENARIOS
 
 KEYS = {
     *("schema", "scenario", "seed", "mode", "agents", "duration_s", "outcome", "expectations"),
@@ -79,7 +82,10 @@ def test_a_packet_without_a_fate_violates_i8(run: FinishedRun) -> None:
     loop.open()
     made = summary(run, loop=loop)
     assert made["invariants"]["I8"] == {"ticks": 1, "violations": 1}
-    assert (made["outcome"], made["reason"]) == ("fail", "violated: I8")
+    assert (made["outcome"], made["reason"]) == (
+        "fail",
+        "violated: I8 (the radio's counters of packets do not add up)",
+    )
 
 
 def test_late_batches_of_the_radio_are_in_ms(run: FinishedRun) -> None:
@@ -122,7 +128,16 @@ def test_few_late_ticks_leave_a_pass(run: FinishedRun, late: float | None) -> No
 def test_a_slow_host_does_not_excuse_a_collision(run: FinishedRun) -> None:
     run.loop.judge.invariants()["I1"].violations = 1
     made = summary(run, late_tick_fraction=0.5, cut_off_by="interrupted")
-    assert (made["outcome"], made["reason"]) == ("fail", "violated: I1")
+    assert made["outcome"] == "fail"
+    assert made["reason"] == (
+        "violated: I1 (two vehicles, or a vehicle and an obstacle, were too near)"
+    )
+
+
+def test_every_invariant_has_words() -> None:
+    nine = load(SCENARIOS / "wedge-9.toml")
+    tallies = Invariants(nine, HoveringVehicles(nine.control.spacing_m)).tallies
+    assert {"I1", *tallies, "I8"} == set(INVARIANT_WORDS)
 
 
 def test_an_error_during_the_run_is_a_failure(run: FinishedRun) -> None:
@@ -133,7 +148,10 @@ def test_an_error_during_the_run_is_a_failure(run: FinishedRun) -> None:
 def test_an_expectation_that_is_not_met_fails() -> None:
     strict = parse(SMALL, overrides={"expect.converge_within_s": "0.01"})
     made = summarise(strict, finished(fly(strict), strict))
-    assert (made["outcome"], made["reason"]) == ("fail", "not met: converge line")
+    assert made["outcome"] == "fail"
+    assert made["reason"] is not None
+    assert made["reason"].startswith("line: converged in ")
+    assert made["reason"].endswith(" s (limit 0.01 s)")
 
 
 def test_rejected_messages_are_counted_by_component_and_cause(run: FinishedRun) -> None:

@@ -8,7 +8,7 @@ import pytest
 from tests.small_scenario import SMALL
 from worldsim.campaign.pool import finished
 from worldsim.engine.virtual import fly
-from worldsim.results.overall import Result, over_all
+from worldsim.results.overall import FailedRun, Result, over_all
 from worldsim.results.summary import Summary, summarise
 from worldsim.results.verdict_text import table, verdict
 from worldsim.scenario.file import parse
@@ -37,7 +37,9 @@ def test_a_run_that_passes(summary: Summary) -> None:
     assert head == "small, seed 1, virtual time: 2 agents, 5 s simulated at 41.8 x real time"
     assert separation == "  met      minimum separation: 1.000 m (required >= 0.25 m)"
     assert converged == f"  met      line: converged in {converge_s:.3g} s (limit 3 s)"
-    assert accuracy.startswith("  largest slot error at the end: 0.")
+    assert accuracy.startswith(
+        "  largest slot error at the end: < 1 mm; steps over the turn limit: "
+    )
     assert outcome == "pass  runs/small/summary.json"
 
 
@@ -55,20 +57,29 @@ def test_the_viewer_is_named_where_there_is_a_recording(summary: Summary) -> Non
         ),
         (
             row("min_obstacle_distance_m", 0.4, None, False),
-            "  NOT MET  minimum obstacle distance: - (required >= 0.4 m)",
+            "  NOT MET  minimum obstacle distance: not measured (required >= 0.4 m)",
         ),
         (row("converge vee", 15.0, 11.8, True), "  met      vee: converged in 11.8 s (limit 15 s)"),
         (row("converge vee", None, 11.8, True), "  met      vee: converged in 11.8 s"),
-        (row("converge vee", 15.0, None, False), "  NOT MET  vee: did not converge (limit 15 s)"),
+        (row("converge vee", 4.0, None, False), "  NOT MET  vee did not converge within 4 s"),
+        (row("converge vee", None, None, False), "  NOT MET  vee did not converge in 5 s"),
+        (
+            row("converge vee", 15.0, None, False),
+            "  NOT MET  vee did not converge: the run ended after 5 s, before the limit of 15 s",
+        ),
+        (
+            row("min_separation_m", 0.25, None, True),
+            "  -        minimum separation: not measured (required >= 0.25 m)",
+        ),
         (
             row("reform_within_s", 10.0, 3.25, True),
             "  met      formation restored within 3.25 s of each team change (limit 10 s)",
         ),
         (
-            row("reform_within_s", 10.0, None, False),
-            "  NOT MET  formation not restored after a team change (limit 10 s)",
+            row("reform_within_s", 10.0, None, True),
+            "  -        formation after a team change: not tested, the team never changed"
+            " (limit 10 s)",
         ),
-        (row("reform_within_s", 10.0, None, True), "  met      no team change (limit 10 s)"),
         (row("added_later", 1, 2, True), "  met      added_later: 2 (required 1)"),
     ],
 )
@@ -78,8 +89,75 @@ def test_an_expectation_is_a_line_with_its_limit(
     assert text(summary, expectations=[expectation])[1] == line
 
 
+def change(t_s: float, kind: str, agents: list[int], reformed_s: float | None) -> dict[str, Any]:
+    return {"t_s": t_s, "kind": kind, "agents": agents, "reformed_s": reformed_s}
+
+
+@pytest.mark.parametrize(
+    ("recoveries", "got", "words"),
+    [
+        (
+            [change(1.0, "kill", [7], 2.0), change(3.0, "pause", [1, 2], 6.1)],
+            6.1,
+            "pause of a1, a2 at 3 s: re-formed after 6.1 s (limit 3 s)",
+        ),
+        (
+            [change(1.0, "kill", [7], None), change(1.5, "join", [9], 1.0)],
+            None,
+            "kill of a7 at 1 s: not re-formed within 3 s",
+        ),
+        (
+            [change(2.5, "leave", [0, 1, 2, 3, 4], None)],
+            None,
+            "leave of 5 agents at 2.5 s: not re-formed: the run ended after 2.5 s,"
+            " before the limit of 3 s",
+        ),
+    ],
+)
+def test_the_change_that_was_restored_worst_is_named(
+    summary: Summary, recoveries: list[dict[str, Any]], got: float | None, words: str
+) -> None:
+    expectation = row("reform_within_s", 3.0, got, False)
+    shown = text(summary, expectations=[expectation], recoveries=recoveries)[1]
+    assert shown == f"  NOT MET  {words}"
+
+
+def test_a_formation_that_was_replaced_names_the_next_mission(summary: Summary) -> None:
+    phases = [{**summary["phases"][0], "from_s": from_s} for from_s in (0.0, 2.0)]
+    rows = [row("converge a", 3.0, None, False), row("converge b", 3.0, None, False)]
+    assert text(summary, expectations=rows, phases=phases)[1:3] == [
+        "  NOT MET  a did not converge: the next mission came after 2 s, before the limit of 3 s",
+        "  NOT MET  b did not converge within 3 s",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("residual_m", "words"),
+    [
+        (None, "no agent in a place"),
+        (0.0002, "< 1 mm"),
+        (0.02516, "25.2 mm"),
+        (0.9244, "0.924 m"),
+    ],
+)
+def test_the_slot_error_has_a_fitting_unit(
+    summary: Summary, residual_m: float | None, words: str
+) -> None:
+    phases = [{**summary["phases"][0], "residual_m": residual_m}]
+    accuracy = text(summary, phases=phases)[-2]
+    assert accuracy.startswith(f"  largest slot error at the end: {words}; ")
+
+
+def test_one_agent_is_not_plural(summary: Summary) -> None:
+    assert ": 1 agent, 5 s simulated" in text(summary, agents=1)[0]
+
+
 def test_late_frames_and_rejected_messages_are_lines_where_there_are_any(summary: Summary) -> None:
-    rejected = {"agents": {"corrupt": 3}, "netem": {"ahead": 261, "stale": 4}, "world": {}}
+    rejected = {
+        "agents": {"corrupt": 3, "replay": 9},
+        "netem": {"ahead": 261, "stale": 4},
+        "world": {},
+    }
     excess = {"p50": 37.5, "p99": 62.5, "max": 80.0}
     delivery = {"excess_ms": excess, "within_fraction": 0.998, "bound_ms": 62.5}
     *_, delay, refused, _ = text(summary, delivery=delivery, rejected_by_cause=rejected)
@@ -87,7 +165,10 @@ def test_late_frames_and_rejected_messages_are_lines_where_there_are_any(summary
         "  extra delivery delay: median 37.5 ms, 99th percentile 62.5 ms;"
         " 99.80 % of frames within 62.5 ms (one slot and one tick)"
     )
-    assert refused == "  rejected messages: 3 corrupt (by agents); 261 early, 4 late (by netem)"
+    assert refused == (
+        "  rejected messages: 3 corrupt, 9 replay (older than one already used) by agents;"
+        " 261 ahead (too early), 4 stale (too late) by netem"
+    )
 
 
 def test_an_outcome_has_its_reason(summary: Summary) -> None:
@@ -96,7 +177,7 @@ def test_an_outcome_has_its_reason(summary: Summary) -> None:
 
 
 def test_many_runs_are_a_table_with_spreads(summary: Summary) -> None:
-    results = [Result(Path(f"many/small-seed{k}"), {**summary, "seed": k}) for k in (2, 1)]
+    results = [Result(Path(f"many/small-seed{k}"), {**summary, "seed": k}) for k in (1, 2)]
     lines = table(over_all(results), Path("many")).splitlines()
     assert lines[0].split("  ")[0] == "run"
     assert [line.split()[0] for line in lines[1:3]] == ["small-seed1", "small-seed2"]
@@ -104,3 +185,28 @@ def test_many_runs_are_a_table_with_spreads(summary: Summary) -> None:
     assert lines[4] == "small: 2 of 2 runs passed"
     assert lines[5] == "  separation    min 1.000 m, median 1.000 m, max 1.000 m (2 runs)"
     assert lines[-1] == "pass  many/summary.json"
+
+
+def test_scenarios_stand_in_the_order_given_and_a_controller_error_is_a_row(
+    summary: Summary,
+) -> None:
+    error = "controller 'x:Y' of agent 0 failed at 1 s: ValueError: lost"
+    results = [
+        Result(Path("many/zig-seed1"), {**summary, "scenario": "zig"}),
+        FailedRun(Path("many/arc-seed4"), "arc", 4, error),
+    ]
+    overall = over_all(results)
+    assert [row["seed"] for row in overall["rows"]] == [1, 4]
+    lines = table(overall, Path("many")).splitlines()
+    assert [line.split()[0] for line in lines[1:3]] == ["zig-seed1", "arc-seed4"]
+    assert lines[2].endswith(f"  fail ({error})")
+    assert [line.split(":")[0] for line in lines if " run passed" in line] == ["zig", "arc"]
+    assert lines[-1] == "fail  many/summary.json"
+
+
+def test_interrupted_runs_say_how_many_were_made(summary: Summary) -> None:
+    cut: Any = {**summary, "outcome": "inconclusive", "reason": "interrupted after 2.0 s"}
+    results = [Result(Path("many/small-seed1"), summary), Result(Path("many/small-seed2"), cut)]
+    lines = table(over_all(results, interrupted_of=6), Path("many")).splitlines()
+    assert "small: 1 of 2 runs passed, 1 inconclusive" in lines
+    assert lines[-1] == "inconclusive (interrupted: 2 of 6 runs made)  many/summary.json"

@@ -16,10 +16,11 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from agent.checked_controller import FaultyControllerError
 from netem.wire.shutdown import StopRequest
 from worldsim.engine.step import SlotLoop
 from worldsim.engine.virtual import Flight, fly
-from worldsim.results.overall import Result
+from worldsim.results.overall import FailedRun, Made, Result
 from worldsim.results.run_folder import RunDirectory
 from worldsim.results.sinks import open_sinks
 from worldsim.results.summary import FinishedRun, summarise
@@ -68,21 +69,30 @@ def finished(flight: Flight, scenario: Scenario) -> FinishedRun:
     )
 
 
-def sweep(jobs: list[Job], workers: int, stop: StopRequest) -> Iterator[Result]:
+def sweep(jobs: list[Job], workers: int, stop: StopRequest) -> Iterator[Made]:
     """Make many runs in up to ``workers`` processes; yield each result as soon as it is there.
 
-    After a stop request no further run begins.
+    A controller's error fails its run alone. After a stop request no further run begins.
     """
     if workers == 1 or len(jobs) == 1:
         for job in jobs:
             if not stop.requested:
-                yield simulate(job, stop)
+                yield _made(job, stop)
         return
     with _pool(min(workers, len(jobs))) as pool:
         yield from _results([pool.submit(_in_worker, job) for job in jobs], stop)
 
 
-def _results(pending: list[Future[Result | None]], stop: StopRequest) -> Iterator[Result]:
+def _made(job: Job, stop: StopRequest) -> Made:
+    """Make one run of many; return its result, or the controller's error that ended it."""
+    try:
+        return simulate(job, stop)
+    except FaultyControllerError as error:
+        assert job.folder is not None  # each of many runs has a folder of its own
+        return FailedRun(job.folder, job.scenario.name, job.scenario.seed, str(error))
+
+
+def _results(pending: list[Future[Made | None]], stop: StopRequest) -> Iterator[Made]:
     interrupted = False
     while pending:
         done, _ = wait(pending, POLL_EVERY_S, FIRST_COMPLETED)
@@ -97,14 +107,14 @@ def _results(pending: list[Future[Result | None]], stop: StopRequest) -> Iterato
             _interrupt(pending)
 
 
-def _interrupt(pending: list[Future[Result | None]]) -> None:
+def _interrupt(pending: list[Future[Made | None]]) -> None:
     for future in pending:
         future.cancel()
     for worker in multiprocessing.active_children():
         worker.terminate()
 
 
-def _result(future: Future[Result | None], stop: StopRequest) -> Result | None:
+def _result(future: Future[Made | None], stop: StopRequest) -> Made | None:
     """Return a worker's result; None for a run that did not begin before a stop request."""
     if future.cancelled():
         return None
@@ -137,9 +147,9 @@ def _stop_of_worker() -> StopRequest:
     return StopRequest()
 
 
-def _in_worker(job: Job) -> Result | None:
+def _in_worker(job: Job) -> Made | None:
     stop = _stop_of_worker()
-    return None if stop.requested else simulate(job, stop)
+    return None if stop.requested else _made(job, stop)
 
 
 def _begin_worker() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from netem.wire.shutdown import StopRequest, stop_requests
 from worldsim.campaign.pool import Job, simulate, sweep
 from worldsim.results.exit_status import EXIT_STATUS, INTERRUPTED
-from worldsim.results.overall import Result, over_all
+from worldsim.results.overall import Made, over_all
 from worldsim.results.progress_line import ProgressLine
 from worldsim.results.run_folder import RunDirectoryError, make_folder, write_json
 from worldsim.results.verdict_text import table, verdict
@@ -50,18 +50,19 @@ def simulate_many(
     ]
     with stop_requests() as stop:
         results = _results(jobs, workers, stop)
-    overall = over_all(results, stop.requested)
+    overall = over_all(results, len(jobs) if stop.requested else None)
     write_json(folder / "summary.json", overall)
     print(table(overall, folder))
     return INTERRUPTED if stop.requested else EXIT_STATUS[overall["outcome"]]
 
 
-def _results(jobs: list[Job], workers: int, stop: StopRequest) -> list[Result]:
+def _results(jobs: list[Job], workers: int, stop: StopRequest) -> list[Made]:
     line = ProgressLine()
-    results: list[Result] = []
+    results: list[Made] = []
     for result in sweep(jobs, workers, stop):
         results.append(result)
-        passed = sum(each.summary["outcome"] == "pass" for each in results)
+        passed = sum(each.outcome == "pass" for each in results)
         line.update(f"{len(results)} of {len(jobs)} runs done, {passed} passed")
     line.clear()
-    return results
+    order = {job.folder: index for index, job in enumerate(jobs)}
+    return sorted(results, key=lambda made: order[made.folder])

@@ -9,13 +9,14 @@ import os
 import sys
 import traceback
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer.main import get_command
 
 from worldsim.commands import bench, inspect, netem, operate, run, scenario
 from worldsim.commands.options import complain, examples
+from worldsim.commands.usage_errors import usage_text
 from worldsim.results.exit_status import BAD_INPUT, FAIL, INTERRUPTED, OUTPUT_CLOSED, PASS
 
 app = typer.Typer(
@@ -89,13 +90,15 @@ def command(arguments: list[str]) -> int:
     from worldsim.results.run_folder import RunDirectoryError, RunWriteError
     from worldsim.scenario.toml import ScenarioError
 
+    typed: Any = get_command(app)
+    names = tuple(typed.commands)
     try:
-        status = get_command(app)(arguments, prog_name="qswarm", standalone_mode=False)
+        status = typed(arguments, prog_name="qswarm", standalone_mode=False)
     except (ScenarioError, RunDirectoryError, ViewerError, OperatorError) as error:
         complain(str(error))
         return FAIL if isinstance(error, RunWriteError) else BAD_INPUT
     except typer.TyperException as error:
-        complain(f"qswarm: {' '.join(error.format_message().split())} (see qswarm --help)")
+        complain(usage_text(error, arguments, names))
         return BAD_INPUT
     except FaultyControllerError as error:
         traceback.print_exception(error.__cause__)

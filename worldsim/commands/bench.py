@@ -1,5 +1,6 @@
 """The command about speed: ``bench``."""
 
+import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -36,6 +37,8 @@ def bench(
 
     if json is not None and json.exists():
         raise ScenarioError(json, "", "exists; nothing is overwritten")
+    if json is not None and not os.access(json.parent, os.W_OK):
+        raise ScenarioError(json, "", "cannot be written: no such folder, or not writable")
     rows = []
     for row in measured(repeats):
         rows.append({**asdict(row), "reached": row.reached})

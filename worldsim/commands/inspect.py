@@ -15,7 +15,8 @@ commands = typer.Typer()
 def verify(run: RunFolder) -> int:
     """Recompute the verdict of a run from its recording alone.
 
-    The figures are compared with summary.json; any difference is printed and fails.
+    The figures are compared with summary.json; any difference is printed and fails. A run that has
+    not finished, or that proves nothing, is inconclusive: exit status 3.
     """
     from worldsim.recording.verify import verify as verify_run
     from worldsim.results.verdict_text import verified
@@ -52,9 +53,14 @@ def view(
 
 @commands.command(epilog=examples("qswarm ps runs/wedge-9-20260102T030405Z"))
 def ps(run: RunFolder) -> int:
-    """List the processes of a run: name, pid, alive or gone."""
+    """List the processes of a run: name, pid, alive or gone.
+
+    zygote is the process that starts the agents, as copies of itself.
+    """
     from worldsim.fleet.process_table import processes
 
-    for name, pid, alive in processes(run):
+    rows = processes(run)
+    print(f"{'name':12} {'pid':>8}  state")
+    for name, pid, alive in rows:
         print(f"{name:12} {pid:>8}  {'alive' if alive else 'gone'}")
     return PASS

@@ -52,13 +52,23 @@ def netem(
     measured, and draws a picture.
     """
     match words:
-        case ["check", scenario]:
+        case ["check", *scenarios]:
+            scenario = _only(scenarios)
+            if for_s is not None:
+                raise typer.BadParameter("check undoes nothing; omit it", param_hint="--for")
             return _check(scenario, overrides_of(settings, None, seed, None), plot)
         case [run, action, *rest]:
             return change_radio(Path(run), action, rest, for_s)
     raise typer.BadParameter(
         f"{' '.join(words)!r}; write check SCENARIO, or RUN ACTION", param_hint="netem"
     )
+
+
+def _only(scenarios: list[str]) -> str:
+    if len(scenarios) != 1:
+        detail = f"got {len(scenarios)} scenarios; check takes one"
+        raise typer.BadParameter(detail, param_hint="SCENARIO")
+    return scenarios[0]
 
 
 def _check(given: str, overrides: dict[str, str], plot: Path | None) -> int:

@@ -183,6 +183,8 @@ def _table(settings: list[str]) -> dict[str, Any]:
 
 def _groups(words: list[str]) -> list[list[int]]:
     """Return the groups of a partition written as 0,1/2,3."""
+    if not words:
+        raise typer.BadParameter("write groups, e.g. 0,1/2,3", param_hint="partition")
     groups = "".join(words).split("/")
     return [[_number(each, "partition") for each in group.split(",")] for group in groups]
 

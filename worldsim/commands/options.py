@@ -128,6 +128,14 @@ def load_scenario(given: str, overrides: Mapping[str, str], command_ticks: int) 
     return scenario
 
 
+def warn(given: str, scenario: "Scenario") -> None:
+    """Print what a scenario is allowed to ask for but should not."""
+    from worldsim.scenario.rules import warnings_for
+
+    for caution in warnings_for(scenario):
+        complain(f"{given}: {caution.key}: warning: {caution.detail}")
+
+
 def overrides_of(
     settings: list[str] | None, agents: int | None, seed: int | None, duration: float | None
 ) -> dict[str, str]:

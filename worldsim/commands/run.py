@@ -23,6 +23,7 @@ from worldsim.commands.options import (
     load_scenario,
     overrides_of,
     seeds_of,
+    warn,
 )
 
 commands = typer.Typer()
@@ -68,6 +69,7 @@ def run(
     overrides = overrides_of(settings, agents, seed, duration)
     command_ticks = VIRTUAL_COMMAND_TICKS if lockstep else PROCESS_COMMAND_TICKS
     loaded = load_scenario(scenario, overrides, command_ticks)
+    warn(scenario, loaded)
     directory = RunDirectory.create(out, loaded)
     terms = RunOptions(loaded.name, speed, not no_recording, lockstep, shards)
     return run_processes(loaded, directory, terms)
@@ -107,11 +109,12 @@ def sim(
 
     if seed is not None and seeds is not None:
         raise typer.BadParameter("cannot be combined with --seed", param_hint="--seeds")
-    loaded = [
-        load_scenario(given, overrides_of(settings, agents, each, duration), VIRTUAL_COMMAND_TICKS)
-        for given in scenarios
-        for each in (seeds_of(seeds) if seeds is not None else (seed,))
-    ]
+    loaded = []
+    for given in scenarios:
+        for each in seeds_of(seeds) if seeds is not None else (seed,):
+            overrides = overrides_of(settings, agents, each, duration)
+            loaded.append(load_scenario(given, overrides, VIRTUAL_COMMAND_TICKS))
+        warn(given, loaded[-1])
     if seeds is None and len(scenarios) == 1:
         return simulate_one(loaded[0], out, not no_recording)
     return simulate_many(loaded, out, not no_recording, jobs or len(os.sched_getaffinity(0)))

@@ -16,6 +16,7 @@ from worldsim.commands.options import (
     examples,
     load_scenario,
     overrides_of,
+    warn,
 )
 from worldsim.results.exit_status import PASS
 
@@ -58,12 +59,11 @@ def check(
     """
     from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
     from worldsim.scenario.file import dump
-    from worldsim.scenario.rules import speed_problem, warnings_for
+    from worldsim.scenario.rules import speed_problem
 
     overrides = overrides_of(settings, agents, seed, duration)
     loaded = load_scenario(scenario, overrides, VIRTUAL_COMMAND_TICKS)
-    for caution in warnings_for(loaded):
-        complain(f"{scenario}: {caution.key}: warning: {caution.detail}")
+    warn(scenario, loaded)
     outrun = speed_problem(loaded, PROCESS_COMMAND_TICKS)
     if outrun is not None:
         complain(f"{scenario}: {outrun.key}: warning: 'qswarm run' rejects this: {outrun.detail}")

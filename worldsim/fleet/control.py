@@ -106,7 +106,7 @@ class Control:
         """Return a request's event, checked against the present fleet. Raises RequestError."""
         null = _null_key(keys)
         if null is not None:
-            raise RequestError(f"{null}: null or not finite; a value is needed")
+            raise RequestError(f"{null}: must be a finite number")
         try:
             event = decode({**keys, "at_s": self._loop.world.time_s}, EventTable, "")
         except ScenarioError as error:

@@ -101,7 +101,8 @@ def read_fleet(run: Path) -> Fleet:
     try:
         content = msgspec.json.decode(path.read_bytes(), type=FleetFile)
     except OSError as error:
-        raise RunDirectoryError(run, f"not a process run (no {FILE})") from error
+        detail = f"not a process run (no {FILE})" if run.is_dir() else "no such folder"
+        raise RunDirectoryError(run, detail) from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise RunDirectoryError(path, f"not a valid {FILE}: {error}") from error
     rows = [ProcessRow(entry.name, entry.pid, _alive(entry)) for entry in content.processes]

@@ -4,8 +4,8 @@ The world reports each order to the medium as an event. The judge turns the even
 again, so it knows the faults in force from a recording as well as from a run.
 """
 
-from collections.abc import Sequence
-from typing import assert_never
+from collections.abc import Iterator, Sequence
+from typing import Any, assert_never
 
 import msgspec
 
@@ -231,7 +231,16 @@ def _begun(event: RadioRunEvent) -> RadioFault | None:
 def _settings(conditions: Conditions | ConditionsChanged) -> str:
     keys = {name: getattr(conditions, name) for name in Conditions.__struct_fields__}
     given = msgspec.to_builtins(Conditions(**keys))
-    return ", ".join(f"{key} = {value}" for key, value in given.items())
+    return ", ".join(f"{key} = {value}" for key, value in _dotted(given, ""))
+
+
+def _dotted(table: dict[str, Any], prefix: str) -> Iterator[tuple[str, str]]:
+    """Yield the values of a table and its inner tables, by dotted key."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _dotted(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _list(values: Sequence[object]) -> str:

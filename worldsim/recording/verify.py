@@ -24,7 +24,8 @@ from worldsim.recording.readback import Readback, RecordingError, read_run
 
 EVENT_TIME_SLACK_S = 1e-6
 """Event times are rounded to the microsecond."""
-HELD, NOT_HELD, UNREADABLE = 0, 1, 2
+HELD, NOT_HELD, UNREADABLE, INCONCLUSIVE = 0, 1, 2, 3
+TIME_SLACK_S = 1e-9
 
 Figure = float | None
 
@@ -62,6 +63,8 @@ class Verification:
     """Time of the last recorded tick [s]."""
     duration_s: float = 0.0
     """Duration of the run as the scenario asks for it [s]."""
+    tick_s: float = 0.0
+    """Time between two ticks [s]."""
     expectations: tuple[Expectation, ...] = ()
     min_separation_m: Figure = None
     min_obstacle_distance_m: Figure = None
@@ -71,17 +74,27 @@ class Verification:
     invariants: dict[str, InvariantTally] = field(default_factory=dict)
     summary: bool = False
     """Whether there is a summary to compare with."""
+    doubt: str | None = None
+    """Why the recording proves nothing, from its summary; None: the summary gives no reason."""
     differences: tuple[Difference, ...] = ()
 
     @property
     def whole(self) -> bool:
         """Whether the recording reaches the end that its scenario asks for."""
-        return self.problem is None and self.until_s >= self.duration_s - 1e-9
+        last_s = self.duration_s - self.tick_s  # a duration need not end with a tick
+        return self.problem is None and self.until_s >= last_s - TIME_SLACK_S
+
+    @property
+    def inconclusive(self) -> str | None:
+        """Why the recording neither passes nor fails; None where it does."""
+        if self.doubt is None and not self.whole:
+            return f"the recording ends at {self.until_s:.4g} s of {self.duration_s:g} s"
+        return self.doubt
 
     @property
     def held(self) -> bool:
         """Whether the recorded run passes, and no figure differs from the summary's."""
-        return self.passes and not self.differences
+        return self.inconclusive is None and self.passes and not self.differences
 
     @property
     def passes(self) -> bool:
@@ -91,15 +104,19 @@ class Verification:
 
     @property
     def exit_status(self) -> int:
-        """0: held; 1: not held; 2: no such run, or no recording in it that can be read."""
+        """0: held; 1: not held; 2: no such run, or no readable recording; 3: inconclusive."""
         if self.problem is not None:
             return UNREADABLE
+        if self.inconclusive is not None:
+            return INCONCLUSIVE
         return HELD if self.held else NOT_HELD
 
 
 def verify(run: Path) -> Verification:
     """Judge a run's recording again; ``run`` is its folder, or the recording itself."""
     recording = run / RECORDING_FILE if run.is_dir() else run
+    if not recording.is_file() and any(run.glob("*/scenario.toml")):
+        return Verification(run, problem=f"{run}: a folder of many runs; name one of them")
     try:
         judged = _judged(run, recording)
         return _compared(judged, recording.with_name(SUMMARY_FILE))
@@ -116,6 +133,7 @@ def _judged(run: Path, recording: Path) -> Verification:
         ticks=judge.ticks,
         until_s=readback.ticks[-1].time_s if readback.ticks else 0.0,
         duration_s=readback.scenario.duration_s,
+        tick_s=1.0 / readback.scenario.fleet.tick_hz,
         expectations=tuple(judge.expectations()),
         min_separation_m=judge.min_separation_m,
         min_obstacle_distance_m=judge.min_obstacle_distance_m,
@@ -160,12 +178,22 @@ def _comes_before(event: RunEvent, tick: Tick) -> bool:
 
 def _compared(judged: Verification, file: Path) -> Verification:
     if not file.is_file():
-        return judged
+        doubt = f"no {SUMMARY_FILE}: the run has not finished, or was ended by force"
+        return replace(judged, doubt=doubt)
     try:
         summary = json.loads(file.read_text())
     except ValueError as error:
         raise RecordingError(f"{file}: cannot be read: {error}") from error
-    return replace(judged, summary=True, differences=tuple(_differences(summary, judged)))
+    differences = tuple(_differences(summary, judged))
+    return replace(judged, summary=True, doubt=_doubt(summary), differences=differences)
+
+
+def _doubt(summary: Any) -> str | None:
+    """Return why a run is inconclusive by its summary; None where it is not."""
+    if _value_at(summary, "outcome") != "inconclusive":
+        return None
+    reason = _value_at(summary, "reason")
+    return f"{SUMMARY_FILE}: {reason or 'inconclusive'}"
 
 
 def _differences(summary: Any, judged: Verification) -> Iterator[Difference]:

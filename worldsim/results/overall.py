@@ -4,10 +4,10 @@ import statistics
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple, TypedDict
+from typing import NamedTuple, TypedDict, assert_never
 
 from worldsim.results.provenance import Provenance, provenance
-from worldsim.results.summary import Summary
+from worldsim.results.summary import Outcome, Summary
 
 
 class Result(NamedTuple):
@@ -15,6 +15,29 @@ class Result(NamedTuple):
 
     folder: Path
     summary: Summary
+
+    @property
+    def outcome(self) -> Outcome:
+        """The run's outcome."""
+        return self.summary["outcome"]
+
+
+class FailedRun(NamedTuple):
+    """One run that its controller's error ended; it has no summary."""
+
+    folder: Path
+    scenario: str
+    seed: int
+    error: str
+
+    @property
+    def outcome(self) -> Outcome:
+        """The run's outcome."""
+        return "fail"
+
+
+Made = Result | FailedRun
+"""A run of many."""
 
 
 class Spread(TypedDict):
@@ -65,25 +88,55 @@ class Overall(Provenance):
     rows: list[Row]
 
 
-def over_all(results: Iterable[Result], interrupted: bool = False) -> Overall:
-    """Return the summary over many runs: figures by scenario, and a row for each run."""
+def over_all(results: Iterable[Made], interrupted_of: int | None = None) -> Overall:
+    """Return the summary over many runs: figures by scenario, and a row for each run, as given.
+
+    interrupted_of: number of runs that were asked for, where a stop request ended them.
+    """
     rows = [_row(result) for result in results]
-    rows.sort(key=lambda row: (row["scenario"], row["seed"]))
-    names = sorted({row["scenario"] for row in rows})
+    names = list(dict.fromkeys(row["scenario"] for row in rows))
+    interrupted = interrupted_of is not None
     outcomes = [row["outcome"] for row in rows] + ["inconclusive"] * interrupted
     return {
         "schema": 1,
         "mode": "virtual",
         "runs": len(rows),
         "outcome": next((bad for bad in ("fail", "inconclusive") if bad in outcomes), "pass"),
-        "reason": "interrupted" if interrupted else None,
+        "reason": f"interrupted: {len(rows)} of {interrupted_of} runs made"
+        if interrupted
+        else None,
         "scenarios": [_of_scenario(name, rows) for name in names],
         "rows": rows,
         **provenance(),
     }
 
 
-def _row(result: Result) -> Row:
+def _row(made: Made) -> Row:
+    match made:
+        case Result():
+            return _summary_row(made)
+        case FailedRun():
+            return _failed_row(made)
+    assert_never(made)
+
+
+def _failed_row(run: FailedRun) -> Row:
+    return {
+        "run": run.folder.name,
+        "scenario": run.scenario,
+        "seed": run.seed,
+        "outcome": run.outcome,
+        "reason": run.error,
+        "min_separation_m": None,
+        "converge_s": None,
+        "residual_m": None,
+        "turns_over_limit_fraction": None,
+        "real_time_factor": None,
+        "trace_sha256": None,
+    }
+
+
+def _summary_row(result: Result) -> Row:
     summary = result.summary
     phases = summary["phases"]
     return {

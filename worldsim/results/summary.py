@@ -14,6 +14,12 @@ from netem.messages import MediumCounters
 from worldsim.engine.step import SlotLoop
 from worldsim.judge.invariants import InvariantTally
 from worldsim.judge.verdict import Expectation, Judge
+from worldsim.results.expectation_text import (
+    Circumstances,
+    ExpectationRow,
+    RecoveryRow,
+    expectation_texts,
+)
 from worldsim.results.provenance import Provenance, provenance
 from worldsim.scenario.tables import Scenario
 
@@ -30,6 +36,17 @@ FATES = (
 )
 TOO_LATE_FRACTION = 0.01
 """From this share of late ticks on, the host is too slow for a verdict."""
+
+INVARIANT_WORDS = {
+    "I1": "two vehicles, or a vehicle and an obstacle, were too near",
+    "I2": "a vertex of the formation did not have exactly one agent",
+    "I3": "a queue's number of agents was not its share",
+    "I4": "two agents claimed one place for too long",
+    "I6": "an agent changed its role too often",
+    "I7": "an agent of a settled team changed its place",
+    "I8": "the radio's counters of packets do not add up",
+}
+"""The violation of each invariant, in words."""
 
 Mode = Literal["processes", "lockstep", "virtual"]
 Outcome = Literal["pass", "fail", "inconclusive"]
@@ -61,15 +78,6 @@ class FinishedRun:
         return late is not None and late >= TOO_LATE_FRACTION
 
 
-class ExpectationRow(TypedDict):
-    """One expectation, in the unit of its name."""
-
-    name: str
-    wanted: Any
-    got: Any
-    held: bool
-
-
 class PhaseRow(TypedDict):
     """How the team formed one formation."""
 
@@ -79,15 +87,6 @@ class PhaseRow(TypedDict):
     converge_s: float | None  # from the phase's start
     residual_m: float | None  # largest slot error at the last tick of the phase
     queues_converge_s: dict[str, float | None]  # by queue name
-
-
-class RecoveryRow(TypedDict):
-    """One change of the team."""
-
-    t_s: float
-    kind: str
-    agents: list[int]
-    reformed_s: float | None  # from the change until the formation is whole again
 
 
 class DirectLinksRow(TypedDict):
@@ -153,7 +152,8 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
     """Return the content of summary.json as plain JSON values."""
     judge, counters = run.loop.judge, run.medium_counters
     rejected = _rejected(run)
-    expectations, invariants = judge.expectations(), judge.invariants()
+    expectations = [_expectation_row(expectation) for expectation in judge.expectations()]
+    invariants = judge.invariants()
     links = run.loop.radio_use.links()
     outcome, reason = _outcome(run, expectations, invariants)
     summary: Summary = {
@@ -165,7 +165,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "duration_s": run.duration_s,
         "outcome": outcome,
         "reason": reason,
-        "expectations": [_expectation_row(expectation) for expectation in expectations],
+        "expectations": expectations,
         "min_separation_m": judge.min_separation_m,
         "min_obstacle_distance_m": judge.min_obstacle_distance_m,
         "phases": _phase_rows(judge),
@@ -192,7 +192,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
 
 
 def _outcome(
-    run: FinishedRun, expectations: list[Expectation], invariants: dict[str, InvariantTally]
+    run: FinishedRun, expectations: list[ExpectationRow], invariants: dict[str, InvariantTally]
 ) -> tuple[Outcome, str | None]:
     """Return the outcome and its reason.
 
@@ -202,17 +202,26 @@ def _outcome(
         return "fail", run.failure
     violated = [name for name, tally in invariants.items() if tally.violations]
     if violated:
-        return "fail", f"violated: {', '.join(violated)}"
+        return "fail", f"violated: {_with_words(violated)}"
     doubt = _doubt(run)
     if doubt is not None:
         return "inconclusive", doubt
     unseen = [name for name, tally in invariants.items() if not tally.ticks]
     if unseen:
         return "fail", f"never evaluated: {', '.join(unseen)}"
-    missed = [expectation.name for expectation in expectations if not expectation.held]
-    if missed:
-        return "fail", f"not met: {', '.join(missed)}"
-    return "pass", None
+    texts = expectation_texts(expectations, _circumstances(run))
+    missed = [text for text, row in zip(texts, expectations, strict=True) if not row["held"]]
+    return ("fail", "; ".join(missed)) if missed else ("pass", None)
+
+
+def _with_words(invariants: list[str]) -> str:
+    return ", ".join(f"{name} ({INVARIANT_WORDS[name]})" for name in invariants)
+
+
+def _circumstances(run: FinishedRun) -> Circumstances:
+    judge = run.loop.judge
+    starts_s = [phase.from_s for phase in judge.phases]
+    return Circumstances(run.duration_s, starts_s, _recovery_rows(judge))
 
 
 def _doubt(run: FinishedRun) -> str | None:

@@ -1,27 +1,40 @@
 """The verdict in words: of one run, of many runs, and of a recording that was judged again."""
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from worldsim.recording.layout import SUMMARY_FILE
+from worldsim.results.expectation_text import (
+    Circumstances,
+    ExpectationRow,
+    RecoveryRow,
+    expectation_texts,
+    figure,
+    was_tested,
+)
 from worldsim.results.overall import Overall, Row, ScenarioRow
-from worldsim.results.summary import DeliveryRow, ExpectationRow, Summary
+from worldsim.results.summary import DeliveryRow, Summary
 
 if TYPE_CHECKING:
     from worldsim.recording.verify import Verification
 
-CONVERGE = "converge "
-"""An expectation's name begins so where it is about a formation; the formation's name follows."""
 MODE_WORDS = {"processes": "processes", "lockstep": "lockstep", "virtual": "virtual time"}
-CAUSE_WORDS = {"ahead": "early", "stale": "late", "incarnation": "of a process that was replaced"}
+CAUSE_WORDS = {
+    "ahead": "ahead (too early)",
+    "stale": "stale (too late)",
+    "replay": "replay (older than one already used)",
+    "incarnation": "of a process that was replaced",
+}
 """Causes of rejection in words; the others are words already."""
+METRES_FROM_M = 0.1
+"""From this slot error on, it is shown in metres."""
 
 
 def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
     """Return the verdict of one run: its expectations, what it showed, and where its files are."""
     lines = [
         _head(summary),
-        *(_expectation(row) for row in summary["expectations"]),
+        *_expectations(summary["expectations"], _circumstances(summary)),
         f"  {_accuracy(summary)}",
         *_delivery(summary["delivery"]),
         *_rejected(summary["rejected_by_cause"]),
@@ -43,21 +56,30 @@ def table(overall: Overall, folder: Path) -> str:
 
 def verified(verification: "Verification") -> str:
     """Return what a recording shows by itself, and whether summary.json says the same."""
-    rows: Iterable[ExpectationRow] = (
+    rows: list[ExpectationRow] = [
         {"name": row.name, "wanted": row.wanted, "got": row.got, "held": row.held}
         for row in verification.expectations
-    )
+    ]
+    expectations = _expectations(rows, _recorded_circumstances(verification))
     cut = "" if verification.whole else f" of {verification.duration_s:g} s"
+    none = f"  no {SUMMARY_FILE} to compare with"
     agreement = [
         f"  DIFFERS  {each.key}: {each.summary} in summary.json, {each.recording} in the recording"
         for each in verification.differences
-    ] or ["  summary.json agrees" if verification.summary else "  no summary.json to compare with"]
+    ] or [f"  {SUMMARY_FILE} agrees" if verification.summary else none]
     head = (
         f"{verification.scenario}, judged from the recording alone:"
         f" {verification.ticks} ticks, {verification.until_s:g} s{cut}"
     )
-    outcome = "met" if verification.held else "NOT MET"
-    return "\n".join([head, *map(_expectation, rows), *agreement, f"{outcome}  {verification.run}"])
+    outcome = f"{_verified_outcome(verification)}  {verification.run}"
+    return "\n".join([head, *expectations, *agreement, outcome])
+
+
+def _verified_outcome(verification: "Verification") -> str:
+    doubt = verification.inconclusive
+    if doubt is not None:
+        return f"inconclusive ({doubt})"
+    return "met" if verification.held else "NOT MET"
 
 
 def _head(summary: Summary) -> str:
@@ -65,7 +87,7 @@ def _head(summary: Summary) -> str:
     pace = f" at {factor:.3g} x real time" if factor is not None else ""
     return (
         f"{summary['scenario']}, seed {summary['seed']}, {MODE_WORDS[summary['mode']]}:"
-        f" {summary['agents']} agents, {summary['duration_s']:g} s simulated{pace}"
+        f" {_counted(summary['agents'], 'agent')}, {summary['duration_s']:g} s simulated{pace}"
     )
 
 
@@ -74,36 +96,38 @@ def _outcome(summary: Any, file: Path) -> str:
     return f"{summary['outcome']}{reason}  {file}"
 
 
-def _expectation(row: ExpectationRow) -> str:
-    return f"  {'met' if row['held'] else 'NOT MET':9}{_shown(row)}"
+def _circumstances(summary: Summary) -> Circumstances:
+    starts_s = [phase["from_s"] for phase in summary["phases"]]
+    return Circumstances(summary["duration_s"], starts_s, summary["recoveries"])
 
 
-def _shown(row: ExpectationRow) -> str:
-    """Return what a run showed of an expectation, beside what was required."""
-    name, got, wanted = row["name"], row["got"], row["wanted"]
-    limit = f" (limit {wanted:g} s)" if wanted is not None else ""
-    match name:
-        case "min_separation_m" | "min_obstacle_distance_m":
-            what = name.removesuffix("_m").replace("min_", "minimum ").replace("_", " ")
-            return f"{what}: {_figure(got, 'm', 3)} (required >= {wanted:g} m)"
-        case "reform_within_s":
-            if got is not None:
-                return f"formation restored within {got:.3g} s of each team change{limit}"
-            how = "no team change" if row["held"] else "formation not restored after a team change"
-            return f"{how}{limit}"
-        case _ if name.startswith(CONVERGE):
-            how = f"converged in {got:.3g} s" if got is not None else "did not converge"
-            return f"{name.removeprefix(CONVERGE)}: {how}{limit}"
-    return f"{name}: {got} (required {wanted})"
+def _recorded_circumstances(verification: "Verification") -> Circumstances:
+    recoveries: list[RecoveryRow] = [
+        {"t_s": row.t_s, "kind": row.kind, "agents": row.agents, "reformed_s": row.reformed_s}
+        for row in verification.recoveries
+    ]
+    starts_s = [phase.from_s for phase in verification.phases]
+    return Circumstances(verification.until_s, starts_s, recoveries)
+
+
+def _expectations(rows: list[ExpectationRow], run: Circumstances) -> list[str]:
+    """Return a line for each expectation; "-" marks one that the run could not test."""
+    return [
+        f"  {_mark(row):9}{text}"
+        for row, text in zip(rows, expectation_texts(rows, run), strict=True)
+    ]
+
+
+def _mark(row: ExpectationRow) -> str:
+    if not was_tested(row):
+        return "-"
+    return "met" if row["held"] else "NOT MET"
 
 
 def _accuracy(summary: Summary) -> str:
-    residual = summary["phases"][-1]["residual_m"]
+    error = _slot_error(summary["phases"][-1]["residual_m"], "no agent in a place")
     turns = summary["turns_over_limit_fraction"]
-    return (
-        f"largest slot error at the end: {_figure(_mm(residual), 'mm', 2)};"
-        f" steps over the turn limit: {_percent(turns)}"
-    )
+    return f"largest slot error at the end: {error}; steps over the turn limit: {_percent(turns)}"
 
 
 def _delivery(delivery: DeliveryRow | None) -> list[str]:
@@ -121,7 +145,7 @@ def _delivery(delivery: DeliveryRow | None) -> list[str]:
 def _rejected(rejected: dict[str, dict[str, int]]) -> list[str]:
     """Return a line on rejected messages: how many by which component; none if there are none."""
     parts = [
-        f"{_causes(causes)} (by {component})" for component, causes in rejected.items() if causes
+        f"{_causes(causes)} by {component}" for component, causes in rejected.items() if causes
     ]
     return [f"  rejected messages: {'; '.join(parts)}"] if parts else []
 
@@ -134,9 +158,9 @@ def _causes(causes: dict[str, int]) -> str:
 def _run(row: Row, width: int) -> str:
     reason = f" ({row['reason']})" if row["reason"] else ""
     return (
-        f"{row['run']:{width}}  {_figure(row['min_separation_m'], 'm', 3):>10}"
-        f"  {_figure(row['converge_s'], 's', 2):>12}"
-        f"  {_figure(_mm(row['residual_m']), 'mm', 2):>10}"
+        f"{row['run']:{width}}  {figure(row['min_separation_m'], 'm', 3):>10}"
+        f"  {figure(row['converge_s'], 's', 2):>12}"
+        f"  {_slot_error(row['residual_m']):>10}"
         f"  {_percent(row['turns_over_limit_fraction']):>15}  {row['outcome']}{reason}"
     )
 
@@ -146,24 +170,31 @@ def _scenario(scenario: ScenarioRow) -> list[str]:
         ("separation", scenario["min_separation_m"], "m", 3),
         ("converged in", scenario["converge_s"], "s", 2),
     )
+    doubtful = f", {scenario['inconclusive']} inconclusive" if scenario["inconclusive"] else ""
+    made = _counted(scenario["runs"], "run")
     return [
-        f"{scenario['scenario']}: {scenario['pass']} of {scenario['runs']} runs passed",
+        f"{scenario['scenario']}: {scenario['pass']} of {made} passed{doubtful}",
         *(
-            f"  {name:12}  min {_figure(spread['min'], unit, digits)},"
-            f" median {_figure(spread['median'], unit, digits)},"
-            f" max {_figure(spread['max'], unit, digits)} ({spread['measured']} runs)"
+            f"  {name:12}  min {figure(spread['min'], unit, digits)},"
+            f" median {figure(spread['median'], unit, digits)},"
+            f" max {figure(spread['max'], unit, digits)} ({_counted(spread['measured'], 'run')})"
             for name, spread, unit, digits in spreads
             if spread is not None
         ),
     ]
 
 
-def _mm(metres: float | None) -> float | None:
-    return 1000.0 * metres if metres is not None else None
+def _counted(count: int, what: str) -> str:
+    """Return a number of things, such as "1 run" or "2 runs"."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
-def _figure(value: float | None, unit: str, digits: int) -> str:
-    return f"{value:.{digits}f} {unit}" if value is not None else "-"
+def _slot_error(metres: float | None, unmeasured: str = "-") -> str:
+    if metres is None:
+        return unmeasured
+    if metres >= METRES_FROM_M:
+        return f"{metres:.3g} m"
+    return f"{1000.0 * metres:.3g} mm" if metres >= 1e-3 else "< 1 mm"
 
 
 def _percent(fraction: float | None, digits: int = 1) -> str:

@@ -1,9 +1,9 @@
 """Error texts: what a type allows, and what was found instead."""
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Annotated, Any
 
-from msgspec import inspect
+from msgspec import Meta, inspect
 
 MAX_SHOWN = 60
 
@@ -15,9 +15,19 @@ def allowed(kind: Any) -> str:
 
 def tags(kind: Any) -> str:
     """Return the tags by which the tables of a union are distinguished."""
+    return " or ".join(map(repr, _tags_of(kind)))
+
+
+def tag_type(kind: Any) -> Any:
+    """Return the type of the key that distinguishes the tables of a union."""
+    return Annotated[str, Meta(description=tags(kind))]
+
+
+def _tags_of(kind: Any) -> list[str]:
     info = inspect.type_info(kind)
-    options = info.types if isinstance(info, inspect.UnionType) else (info,)
-    return " or ".join(_tags(options))
+    while isinstance(info, inspect.Metadata):
+        info = info.type
+    return _tags(info.types if isinstance(info, inspect.UnionType) else (info,))
 
 
 def got(value: Any) -> str:
@@ -70,7 +80,7 @@ def _nested(info: inspect.Type) -> str:
 def _union(info: inspect.UnionType) -> str:
     kinds = _tags(info.types)
     if kinds:
-        return f"a table with {_tag_field(info.types)} = {' or '.join(kinds)}"
+        return f"a table with {_tag_field(info.types)} = {' or '.join(map(repr, kinds))}"
     options = [option for option in info.types if not isinstance(option, inspect.NoneType)]
     return " or ".join(allowed_by(option) for option in options)
 
@@ -103,7 +113,7 @@ def _count(least: int | None, most: int | None) -> str:
 
 def _tags(options: Iterable[inspect.Type]) -> list[str]:
     return [
-        repr(option.tag)
+        str(option.tag)
         for option in options
         if isinstance(option, inspect.StructType) and option.tag is not None
     ]

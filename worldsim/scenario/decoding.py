@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar, Union, get_args, get_ori
 
 import msgspec
 
-from worldsim.scenario.allowed_values import allowed, got, tags
+from worldsim.scenario.allowed_values import allowed, got, tag_type, tags
 from worldsim.scenario.toml import ScenarioError
 
 T = TypeVar("T")
@@ -37,8 +37,7 @@ def decode(data: Any, kind: type[T], file: str | Path) -> T:
     """Return ``data`` as the tables of ``kind``, or raise ScenarioError."""
     for key, number in _numbers(data, ""):
         if not isfinite(number):
-            detail = f"{number} is not allowed; give a finite number, or omit the key for no limit"
-            raise ScenarioError(file, key, detail)
+            raise ScenarioError(file, key, f"got {number}; must be a finite number")
     try:
         return msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
@@ -73,7 +72,8 @@ def _explained(message: str, root: Spot) -> tuple[str, str]:
 
 
 def _unknown(name: str, known: list[str]) -> str:
-    close = get_close_matches(name, known, n=1)
+    begun = [key for key in known if key.startswith(f"{name}_")]
+    close = begun or get_close_matches(name, known, n=1)
     hint = f"did you mean {close[0]!r}? " if close else ""
     return f"unknown key; {hint}allowed: {', '.join(known)}"
 
@@ -100,7 +100,7 @@ def _inside(spot: Spot, field: str | None, index: str | None) -> Spot:
     kind = _chosen(spot.kind, spot.value)
     if field is not None:
         known = {each.encode_name: each.type for each in _fields(spot)}
-        inner = known.get(field, spot.kind)
+        inner = known[field] if field in known else tag_type(spot.kind)
         return Spot(_joined(spot.key, field), spot.value[field], inner)
     kinds = get_args(kind)
     if index == "...":

@@ -1,7 +1,7 @@
 """Scenario files: TOML in, a typed and checked scenario out, or an error with file and key.
 
 ``tables`` defines the format, ``rules`` the rules between keys. A path is relative to the file
-that contains it.
+that contains it. Where a formation's file is named, a name of the library is allowed too.
 """
 
 import re
@@ -15,6 +15,7 @@ import tomli_w
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from worldsim.scenario.decoding import decode
 from worldsim.scenario.event_checks import FormationSource, check_timeline
+from worldsim.scenario.library import formation_from
 from worldsim.scenario.obstacle_tables import resolve_field
 from worldsim.scenario.rules import check_rules, tilt_problem
 from worldsim.scenario.tables import Scenario
@@ -76,7 +77,9 @@ def _place_formation(data: Data, file: Path) -> FormationSource:
     if other is not None:
         raise ScenarioError(file, f"formation.{other}", "cannot be combined with file")
     if not isinstance(table["file"], str):
-        raise ScenarioError(file, "formation.file", "must be the path of a formation file, as text")
+        raise ScenarioError(
+            file, "formation.file", "must be text: a formation file, or a formation of the library"
+        )
     path, data["formation"] = _formation_file(file, "formation.file", table["file"])
     return FormationSource(path, "")
 
@@ -95,10 +98,11 @@ def _place_events(data: Data, file: Path) -> dict[int, FormationSource]:
 
 
 def _formation_file(file: Path, key: str, named: str) -> tuple[Path, Data]:
-    """Return the path and the tables of the formation file that a key names."""
-    path = file.parent / named
-    if "\0" in named or not path.is_file():
-        raise ScenarioError(file, key, f"no such file: {path}")
+    """Return the path and the tables of the formation that a key names, by path or library name."""
+    try:
+        path = formation_from(file.parent, named)
+    except FileNotFoundError as error:
+        raise ScenarioError(file, key, str(error)) from error
     return path, formation_tables(path)
 
 

@@ -4,7 +4,7 @@ In a checkout they are in ``deploy``; a wheel holds a copy beside the code, in `
 """
 
 import os
-from collections.abc import Iterator
+import re
 from difflib import get_close_matches
 from pathlib import Path
 from typing import NamedTuple
@@ -49,6 +49,22 @@ def find_formation(given: str) -> Path:
     return _find(given, FORMATIONS, "formation", f"they are in {_shown(FORMATIONS)}")
 
 
+def formation_from(folder: Path, given: str) -> Path:
+    """Return the file of a formation that a file in ``folder`` names, by path or library name.
+
+    An existing file wins over a name. Raises FileNotFoundError with the reason, in words.
+    """
+    path, files = folder / given, _files(FORMATIONS)
+    if _is_file(path):
+        return path
+    if given in files:
+        return files[given]
+    close = _closest(path.stem, files)
+    hint = f"they are in {_shown(FORMATIONS)}"
+    detail = f"no such file: {path}, and no such formation in the library; {close}{hint}"
+    raise FileNotFoundError(detail)
+
+
 def _find(given: str, folder: Path, what: str, hint: str) -> Path:
     path, files = Path(given), _files(folder)
     if _readable(path):
@@ -56,8 +72,7 @@ def _find(given: str, folder: Path, what: str, hint: str) -> Path:
     if given in files:
         return _shown(files[given])
     if path.name == given and path.suffix != ".toml":
-        close = ", ".join(_closest(given, files))
-        detail = f"no such file, and no such {what} in the library; closest: {close}; {hint}"
+        detail = f"no such file, and no such {what} in the library; {_closest(given, files)}{hint}"
         raise ScenarioError(given, "", detail)
     if path.stem in files and not path.exists():
         raise ScenarioError(path, "", f"no such file; the library has {path.stem!r}")
@@ -71,13 +86,27 @@ def _readable(path: Path) -> bool:
         return True  # reading it fails with the reason
 
 
-def _closest(name: str, files: dict[str, Path]) -> Iterator[str]:
-    """Yield the names nearest to a name, most similar first, and never none."""
-    yield from get_close_matches(name, files, n=CLOSEST, cutoff=0.4) or list(files)[:CLOSEST]
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that no file can have
+        return False
+
+
+def _closest(name: str, files: dict[str, Path]) -> str:
+    """Return the names that are similar to a name, most similar first, as part of an error."""
+    close = get_close_matches(name, files, n=CLOSEST)
+    return f"closest: {', '.join(close)}; " if close else ""
 
 
 def _files(folder: Path) -> dict[str, Path]:
-    return {file.stem: file for file in sorted(folder.rglob("*.toml"))}
+    return {file.stem: file for file in sorted(folder.rglob("*.toml"), key=_by_number)}
+
+
+def _by_number(file: Path) -> list[tuple[int, str]]:
+    """Return a key that sorts the numbers in names by their size: wedge-9 before wedge-20."""
+    parts = re.split(r"([0-9]+)", file.stem)
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]
 
 
 def _shown(path: Path) -> Path:

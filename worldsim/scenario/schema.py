@@ -12,7 +12,7 @@ from worldsim.scenario.tables import Scenario
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 FORMATION_FILE = {
     "title": "FormationFile",
-    "description": "A formation file; its path is relative to this file.",
+    "description": "A formation file, relative to this file, or a formation of the library.",
     "type": "object",
     "properties": {"file": {"type": "string"}},
     "required": ["file"],

@@ -107,7 +107,9 @@ class Scenario(Table, frozen=True, omit_defaults=False):
     """A resolved scenario: every default filled in, and the formation in place."""
 
     fleet: Fleet
-    formation: FormationSpec
+    formation: Annotated[
+        FormationSpec, Meta(description="a table of file, or of name, vertices, queue")
+    ]
     schema: Annotated[int, Meta(ge=1, le=1)] = 1
     name: RunName = "unnamed"
     seed: Annotated[int, Meta(ge=0, lt=2**53)] = 1

@@ -135,8 +135,10 @@ class Place(NamedTuple):
 def write(name: str) -> Path:
     """Write the template as NAME.toml in the current folder; return the file.
 
-    Raises ScenarioError for an invalid name, an existing file, or a failing disk.
+    name: with or without .toml. Raises ScenarioError for an invalid name, an existing file, or a
+    failing disk.
     """
+    name = name.removesuffix(".toml")
     file = Path(f"{name}.toml")
     decode(name, RunName, file)
     try:

@@ -69,6 +69,11 @@ def test_a_value_that_is_not_a_finite_number_is_an_error(text):
         Expression(text, "s")(0.0)
 
 
+def test_an_overflow_is_reported_in_words():
+    with pytest.raises(ExpressionError, match=r"at s = 0: the result is too large$"):
+        Expression("2.0**5000", "s")(0.0)
+
+
 ATOMS = st.sampled_from(["s", "pi", "e", "1", "0", "2.5", "1e9", "9" * 40, "t", "'x'", "sin"])
 
 

@@ -1,0 +1,127 @@
+"""Expectations in words: what a run showed of each, beside what was required."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple, TypedDict
+
+CONVERGE = "converge "
+"""An expectation's name begins so where it is about a formation; the formation's name follows."""
+MAX_NAMED = 4
+"""A change of more agents is described by their number."""
+
+
+class ExpectationRow(TypedDict):
+    """One expectation, in the unit of its name."""
+
+    name: str
+    wanted: Any
+    got: Any
+    held: bool
+
+
+class RecoveryRow(TypedDict):
+    """One change of the team."""
+
+    t_s: float
+    kind: str
+    agents: list[int]
+    reformed_s: float | None  # from the change until the formation is whole again
+
+
+class Circumstances(NamedTuple):
+    """What the words on an expectation depend on, beside its figures."""
+
+    ended_s: float  # end of the run [s; simulated time]
+    phase_starts_s: Sequence[float]  # start of each formation [s; simulated time]
+    recoveries: Sequence[RecoveryRow]
+
+
+class Span(NamedTuple):
+    """The time that a formation had."""
+
+    length_s: float
+    end: str  # what ended it, in words
+
+
+def expectation_texts(rows: Sequence[ExpectationRow], run: Circumstances) -> list[str]:
+    """Return what a run showed of each expectation, one text each, in their order."""
+    spans = _spans(run)
+    return [
+        _convergence(row, next(spans)) if row["name"].startswith(CONVERGE) else _other(row, run)
+        for row in rows
+    ]
+
+
+def was_tested(row: ExpectationRow) -> bool:
+    """Return whether a run could show anything of an expectation; without a test it is held."""
+    return row["got"] is not None or not row["held"]
+
+
+def figure(value: float | None, unit: str, digits: int) -> str:
+    """Return a figure with its unit; "-" where it was not measured."""
+    return f"{value:.{digits}f} {unit}" if value is not None else "-"
+
+
+def _spans(run: Circumstances) -> Iterator[Span]:
+    """Yield the time of each formation, in order."""
+    ends_s = [*run.phase_starts_s[1:], run.ended_s]
+    for index, (start_s, end_s) in enumerate(zip(run.phase_starts_s, ends_s, strict=True)):
+        last = index == len(ends_s) - 1
+        yield Span(end_s - start_s, "the run ended" if last else "the next mission came")
+
+
+def _convergence(row: ExpectationRow, span: Span) -> str:
+    name, got, wanted = row["name"].removeprefix(CONVERGE), row["got"], row["wanted"]
+    if got is not None:
+        return f"{name}: converged in {got:.3g} s{_limit(wanted)}"
+    if wanted is None:
+        return f"{name} did not converge in {span.length_s:.4g} s"
+    return f"{name} did not converge{_within(wanted, span)}"
+
+
+def _within(wanted_s: float, span: Span) -> str:
+    if span.length_s < wanted_s:
+        return f": {span.end} after {span.length_s:.4g} s, before the limit of {wanted_s:g} s"
+    return f" within {wanted_s:g} s"
+
+
+def _other(row: ExpectationRow, run: Circumstances) -> str:
+    name, got, wanted = row["name"], row["got"], row["wanted"]
+    match name:
+        case "min_separation_m" | "min_obstacle_distance_m":
+            what = name.removesuffix("_m").replace("min_", "minimum ").replace("_", " ")
+            measured = "not measured" if got is None else figure(got, "m", 3)
+            return f"{what}: {measured} (required >= {wanted:g} m)"
+        case "reform_within_s":
+            return _reform(row, run)
+    return f"{name}: {got} (required {wanted})"
+
+
+def _reform(row: ExpectationRow, run: Circumstances) -> str:
+    limit = _limit(row["wanted"])
+    if not was_tested(row):
+        return f"formation after a team change: not tested, the team never changed{limit}"
+    if row["held"]:
+        return f"formation restored within {row['got']:.3g} s of each team change{limit}"
+    worst = max(run.recoveries, key=_slowness)
+    reformed_s = worst["reformed_s"]
+    if reformed_s is not None:
+        return f"{_change(worst)}: re-formed after {reformed_s:.3g} s{limit}"
+    left = Span(run.ended_s - worst["t_s"], "the run ended")
+    return f"{_change(worst)}: not re-formed{_within(row['wanted'], left)}"
+
+
+def _slowness(recovery: RecoveryRow) -> tuple[bool, float]:
+    """Return a key that is largest for the slowest recovery: the earliest that never ended."""
+    reformed_s = recovery["reformed_s"]
+    return (True, -recovery["t_s"]) if reformed_s is None else (False, reformed_s)
+
+
+def _change(recovery: RecoveryRow) -> str:
+    agents = recovery["agents"]
+    names = ", ".join(f"a{agent}" for agent in agents)
+    who = names if 0 < len(agents) <= MAX_NAMED else f"{len(agents)} agents"
+    return f"{recovery['kind']} of {who} at {recovery['t_s']:.4g} s"
+
+
+def _limit(wanted_s: float | None) -> str:
+    return f" (limit {wanted_s:g} s)" if wanted_s is not None else ""
