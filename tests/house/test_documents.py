@@ -1,7 +1,6 @@
 """The documents: generated parts are up to date, links and named files exist, sizes hold."""
 
 import re
-import shutil
 from pathlib import Path
 
 import pytest
@@ -29,10 +28,6 @@ def _shown_scenario(name: str) -> str:
 
 
 def _saved(text: str, folder: Path) -> Path:
-    """Save a scenario in a folder, beside the formations that it names by path or by name."""
-    formations = shutil.copytree(ROOT / "deploy" / "formations", folder / "formations")
-    for formation in formations.glob("*.toml"):
-        shutil.copy(formation, folder / formation.stem)
     file = folder / "scenario.toml"
     file.write_text(text)
     return file
