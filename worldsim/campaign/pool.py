@@ -77,13 +77,13 @@ def sweep(jobs: list[Job], workers: int, stop: StopRequest) -> Iterator[Made]:
     if workers == 1 or len(jobs) == 1:
         for job in jobs:
             if not stop.requested:
-                yield _made(job, stop)
+                yield _simulate_or_fail(job, stop)
         return
     with _pool(min(workers, len(jobs))) as pool:
         yield from _results([pool.submit(_in_worker, job) for job in jobs], stop)
 
 
-def _made(job: Job, stop: StopRequest) -> Made:
+def _simulate_or_fail(job: Job, stop: StopRequest) -> Made:
     """Make one run of many; return its result, or the controller's error that ended it."""
     try:
         return simulate(job, stop)
@@ -149,7 +149,7 @@ def _stop_of_worker() -> StopRequest:
 
 def _in_worker(job: Job) -> Made | None:
     stop = _stop_of_worker()
-    return None if stop.requested else _made(job, stop)
+    return None if stop.requested else _simulate_or_fail(job, stop)
 
 
 def _begin_worker() -> None:

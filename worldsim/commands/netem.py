@@ -53,7 +53,7 @@ def netem(
     """
     match words:
         case ["check", *scenarios]:
-            scenario = _only(scenarios)
+            scenario = _one_scenario(scenarios)
             if for_s is not None:
                 raise typer.BadParameter("check undoes nothing; omit it", param_hint="--for")
             return _check(scenario, overrides_of(settings, None, seed, None), plot)
@@ -64,7 +64,7 @@ def netem(
     )
 
 
-def _only(scenarios: list[str]) -> str:
+def _one_scenario(scenarios: list[str]) -> str:
     if len(scenarios) != 1:
         detail = f"got {len(scenarios)} scenarios; check takes one"
         raise typer.BadParameter(detail, param_hint="SCENARIO")
