@@ -94,7 +94,8 @@ def test_installed_it_runs_the_library_in_an_empty_folder(target: Path, tmp_path
         )
 
     made = qswarm("sim", "wedge-9", "--no-recording", "--duration", "3", "--out", "run")
-    assert (made.returncode, made.stderr) == (1, ""), made.stderr
+    assert (made.returncode, made.stderr.count("\n")) == (1, 1), made.stderr
+    assert made.stderr.startswith("wedge-9: expect.converge_within_s: warning: ")
     assert "wedge-9, seed 1, virtual time: 9 agents, 3 s simulated" in made.stdout
     summary = json.loads((tmp_path / "run/summary.json").read_text())
     assert (summary["reason"], summary["commit"]) == (NOT_CONVERGED, SHA)
