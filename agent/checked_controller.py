@@ -14,6 +14,9 @@ NUMBERS = 13
 SMALL = min(MAX_SPEED_MPS, MAX_ANGLE_RAD)
 """Numbers whose absolute values add up to no more than this are within every bound."""
 
+FAILURES = (Exception, SystemExit, GeneratorExit)
+"""Failures of a controller: one that calls sys.exit must not end a run as if all were well."""
+
 
 class FaultyControllerError(RuntimeError):
     """A controller failed; the text names the controller, the agent, the time and the error."""
@@ -30,17 +33,17 @@ class CheckedController:
         controller_class = load(setup.control.controller)
         try:
             self._controller: Controller = controller_class(setup)
-        except Exception as error:
+        except FAILURES as error:
             raise self._fault("in its constructor", error) from error
 
     def decide(self, senses: Senses) -> Intent:
         """Return the controller's intent, in plain floats within the bounds of a command."""
         try:
             return plain(self._controller.decide(senses))
-        except Exception as error:
+        except FAILURES as error:
             raise self._fault(f"at {senses.now_s:g} s", error) from error
 
-    def _fault(self, when: str, error: Exception) -> FaultyControllerError:
+    def _fault(self, when: str, error: BaseException) -> FaultyControllerError:
         return FaultyControllerError(
             f"{self._label} failed {when}: {type(error).__name__}: {error}"
         )

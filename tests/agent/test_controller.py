@@ -43,7 +43,7 @@ class StubController:
             raise self.result
 
     def decide(self, senses: Senses) -> Intent:
-        if isinstance(self.result, Exception):
+        if isinstance(self.result, BaseException):
             raise self.result
         return self.result  # type: ignore[no-any-return]
 
@@ -210,3 +210,9 @@ def test_a_flock_aligns_its_velocities() -> None:
 
 def test_a_flock_keeps_the_limits_of_its_vehicles() -> None:
     assert hypot(*flock(heard(0.01)).wanted) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("exits", [SystemExit(0), SystemExit(3), GeneratorExit("over")])
+def test_a_controller_that_exits_has_failed(controller_with: Any, exits: BaseException) -> None:
+    with pytest.raises(FaultyControllerError, match=type(exits).__name__):
+        controller_with(exits).decide(SENSES)
