@@ -125,7 +125,7 @@ def test_a_killed_agent_is_reported_at_once_and_the_run_ends_with_a_verdict(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(5.0), run, "--no-recording")
-    fleet.wait_for_output("in place")
+    fleet.wait_for_output("least separation")
     os.kill(pids(run)["agent-2"], signal.SIGKILL)
     fleet.wait_for_output(
         f"agent-2 (pid {pids(run)['agent-2']}) was killed by signal 9 at about", 1.0
@@ -143,7 +143,7 @@ def test_ctrl_c_ends_everything_and_leaves_summary_and_recording(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(60.0), run)
-    fleet.wait_for_output("in place")
+    fleet.wait_for_output("least separation")
     fleet.kill_group(signal.SIGINT)
 
     assert fleet.status(8.0) == 130, fleet.text
@@ -160,7 +160,7 @@ def test_a_repeated_ctrl_c_does_not_cut_the_end_short(
     start: Start, scenario: Write, run: Path, number: signal.Signals
 ) -> None:
     fleet = launched(start, scenario(60.0), run, "--no-recording")
-    fleet.wait_for_output("in place")
+    fleet.wait_for_output("least separation")
     while fleet.process.poll() is None:
         fleet.kill_group(number)
         threading.Event().wait(0.02)
@@ -223,7 +223,7 @@ def test_kill_9_of_the_launcher_leaves_no_process_and_a_summary(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(60.0), run, "--no-recording")
-    fleet.wait_for_output("in place")
+    fleet.wait_for_output("least separation")
     started = pids(run)
     assert len(started) == 7
     fleet.process.kill()
@@ -235,7 +235,7 @@ def test_the_death_of_netem_ends_the_run_with_a_message(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(60.0), run, "--no-recording")
-    fleet.wait_for_output("in place")
+    fleet.wait_for_output("least separation")
     os.kill(pids(run)["netem"], signal.SIGKILL)
     assert fleet.status(10.0) == 3
     assert re.search(

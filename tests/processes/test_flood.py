@@ -20,7 +20,7 @@ def test_a_flood_of_an_agents_messages_does_not_disturb_the_fleet(
 ) -> None:
     run = tmp_path / "run"
     fleet = start(*QSWARM, "run", scenario(8.0), "--no-recording", "--out", str(run))
-    fleet.wait_for_output("in place")
+    fleet.wait_for_output("least separation")
     flood = start(sys.executable, "-m", "tests.processes.flooding", str(run), "1", "6.0")
     assert fleet.status(30.0) in (0, 3), fleet.text
     assert flood.status(15.0) == 0, flood.text
