@@ -149,3 +149,10 @@ def test_a_field_comes_after_the_list() -> None:
     scenario = with_field("count = 2", obstacle=f"[{{ {BALL}, centre_m = [0, 9, 0] }}]")
     assert scenario.obstacle[0] == Sphere(centre_m=(0, 9, 0), radius_m=0.5)
     assert len(scenario.obstacle) == 3
+
+
+def test_a_flat_field_has_no_cylinders_but_may_have_spheres() -> None:
+    flat = "{ centre_m = [9, 0, 0], size_m = [6, 6, 0], count = 3, shape = '%s' }"
+    with pytest.raises(ScenarioError, match=r"obstacle_field\.size_m\[2\]: must be above 0"):
+        load(WEDGE, {"obstacle_field": flat % "cylinder"})
+    assert len(load(WEDGE, {"obstacle_field": flat % "sphere"}).obstacle) == 3

@@ -84,3 +84,11 @@ def test_a_controller_that_breaks_while_imported(
 def test_a_box_without_room_is_refused_quickly(tmp_path: Path, agents: str) -> None:
     scenario = wedge(fleet__agents=agents, fleet__start__size_m="[0.5, 0.5, 0.5]")
     assert refusal(tmp_path, scenario).startswith("/s.toml: fleet.start: no room for ")
+
+
+def test_a_level_laser_has_one_ring() -> None:
+    with pytest.raises(ScenarioError, match=r"sensor\.laser\.rings: 9 rings need elevation_deg"):
+        wedge(sensor__laser__rings="9")
+    assert (
+        wedge(sensor__laser__rings="9", sensor__laser__elevation_deg="30").sensor.laser.rings == 9
+    )

@@ -138,6 +138,8 @@ def field_problem(field: ObstacleField) -> Problem | None:
         return Problem("count", "give count or density_per_m3; one of the two")
     if field.total > MAX_OBSTACLES:
         return Problem("density_per_m3", f"{field.total} obstacles; at most {MAX_OBSTACLES}")
+    if field.shape == "cylinder" and field.size_m[2] <= 0.0:
+        return Problem("size_m[2]", "must be above 0: it is the height of the field's cylinders")
     least, largest = field.radius_m
     if least > largest:
         detail = f"[{least:g}, {largest:g}]; the least first, then the largest"

@@ -264,6 +264,14 @@ def _formation_radius_m(scenario: Scenario) -> float:
     return max(hypot(slot.point[0], slot.point[1]) for slot in slots)
 
 
+def _laser_rings_apart(scenario: Scenario) -> Problem | None:
+    laser = scenario.sensor.laser
+    if laser.rings == 1 or laser.elevation_deg > 0.0:
+        return None
+    detail = f"{laser.rings} rings need elevation_deg above 0; without it a laser has one ring"
+    return Problem("sensor.laser.rings", detail)
+
+
 RULES = (
     _enough_agents,
     _at_least_one_tick,
@@ -274,6 +282,7 @@ RULES = (
     _known_links,
     _cast_zone_not_empty,
     _rates_up_to_tick_rate,
+    _laser_rings_apart,
     _frame_consistent,
     _obstacles_consistent,
 )
