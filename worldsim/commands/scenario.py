@@ -27,9 +27,9 @@ commands = typer.Typer()
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the new scenario.")],
 ) -> int:
-    """Write NAME.toml, a scenario with every key to start from.
+    """Write NAME.toml, a scenario to start from.
 
-    It holds each key with its default and its allowed values, and it runs as it is.
+    It holds the tables and their keys with defaults and allowed values, and it runs as it is.
     """
     from worldsim.scenario.template import write
 
