@@ -5,7 +5,7 @@ from typing import Annotated, Literal, assert_never, get_args
 import msgspec
 from msgspec import Meta
 
-from agent.messages import AT_HOME, AgentId, FramePath
+from agent.messages import AGENT_IDS, AT_HOME, AgentId, FramePath
 from agent.qstructure.formation import FormationSpec
 
 Positive = Annotated[float, Meta(gt=0, le=1e4)]
@@ -152,4 +152,6 @@ class AgentSetup(Table, frozen=True):
     formation: FormationSpec
     sensor: Sensors = Sensors()
     frame: FramePath = AT_HOME  # path of the target's frame until a mission sets another
+    team: Annotated[int, Meta(ge=0, le=AGENT_IDS)] = 0
+    """Number of agents that the fleet started with; their ids are 0 to ``team`` - 1."""
     lockstep: bool = False  # whether the process waits for the inbox of each of its slots

@@ -26,7 +26,6 @@ from agent.comms.unidentified_vehicles import (
 )
 from agent.config import AgentSetup
 from agent.controller import Intent, Peer, Senses
-from agent.guidance.safety_filter import NeighbourReport
 from agent.guidance.safety_monitor import SafetyMonitor
 from agent.messages import (
     CAUSES,
@@ -119,9 +118,7 @@ class Agent:
             self._accept_order(mission)
         senses = self._senses(observation)
         intent = self._intent = self._controller.decide(senses)
-        velocity = self._safety_monitor.safe_velocity(
-            intent.velocity, senses, lambda: self._neighbour_reports(senses)
-        )
+        velocity = self._safety_monitor.safe_velocity(intent.velocity, senses)
         if not self._perception.sensor_health.update(observation):
             velocity = ZERO
         command = self._command(observation.slot, intent, velocity)
@@ -164,6 +161,7 @@ class Agent:
             raise RejectedError("speed", f"agent {source} reports {hypot(u, v, w):.1f} m/s")
         self._neighbours.receive(beacon, now_s, self._broadcast.sent_s)
         self._table.adopt_beacon(beacon)
+        self._safety_monitor.hear(beacon)
         if beacon.drift is not None or beacon.frame_key != self._missions.frame_key:
             self._missions.receive_frame(beacon)
 
@@ -224,6 +222,7 @@ class Agent:
                 reports_vehicle=self._reports_vehicle(1 + len(team)),
             )
         )
+        self._safety_monitor.relay(self._table.newest())
         self._perception.sensor_health.compare(observation, beacons)
         self._neighbour_lacks_mission = self._neighbours.any_behind(self._missions.flown.key)
         self._blocked = self._table.blocked(self._missions.flown.key)
@@ -266,18 +265,6 @@ class Agent:
                 beacon.queue in own
                 or not own.isdisjoint(formation.queues_of((beacon.queue, beacon.rank)))
             )
-        ]
-
-    def _neighbour_reports(self, senses: Senses) -> list[NeighbourReport]:
-        """Return the last report of each neighbour, not extrapolated."""
-        x, y, z = senses.position
-        return [
-            NeighbourReport(
-                relative=(b.position[0] - x, b.position[1] - y, b.position[2] - z),
-                age_s=max(0.0, senses.now_s - b.stamp_s),
-                speed_cap=b.speed_cap,
-            )
-            for b in self._neighbours.beacons()
         ]
 
     def _command(self, slot: int, intent: Intent, velocity: Vector) -> Command:

@@ -124,6 +124,10 @@ class RecordTable:
             for newest in self._newest.values()
         ]
 
+    def newest(self) -> Collection[Beacon | Record]:
+        """Return the newest statement of each member."""
+        return self._newest.values()
+
     def blocked(self, mission: int) -> frozenset[Place]:
         """Return the places that others see taken by an unidentified vehicle (E18).
 

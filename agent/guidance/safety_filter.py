@@ -1,17 +1,16 @@
 """The safety filter: the last step before the vehicle, independent of why a velocity is wanted.
 
-It has two forms. With a ranging sensor, the approach speed towards each sensed vehicle is limited
-by the remaining gap. Each vehicle of a pair may close only its own share of the gap, so the gap
-never closes, whatever the phases of their steps and with a command's whole life as latency. A
+It has two forms. This one is for vehicles with a ranging sensor, and for surfaces;
+promise_filter.py is for vehicles without one. The approach speed towards each sensed vehicle is
+limited by the remaining gap. Each vehicle of a pair may close only its own share of the gap, so the
+gap never closes, whatever the phases of their steps and with a command's whole life as latency. A
 margin covers that the direction between two vehicles turns while a command is flown. Within the
 margin the speed across is limited too, or two vehicles that circle each other could use the margin
-up little by little. Without a ranging sensor, the limit follows from the neighbours' last reports
-and from the speeds that they promised not to exceed.
+up little by little. Noise of the sensor has a margin of its own.
 
 H is the longest time from a measurement to the expiry of the command made from it [s].
 """
 
-from collections import deque
 from collections.abc import Sequence
 from math import hypot, inf, sqrt
 from typing import NamedTuple
@@ -22,8 +21,6 @@ from agent.messages import ZERO, Vector
 
 SHARE = 0.18
 """Share of the gap that one vehicle of a pair may close within H: 2 * SHARE <= 1/e."""
-PROMISE_S = 3.0
-LEAST_CAP_MPS = 0.05
 PASSES = 3
 ROUNDING_MPS = 1e-12
 """Tolerance: a velocity that slides along a limit of zero exceeds it by rounding."""
@@ -44,10 +41,11 @@ class Bound(NamedTuple):
 class RangingFilter:
     """Limits the approach speed by the gap to each sensed vehicle or point.
 
-    d_ob: least distance between centres [m]; max_speed: of any vehicle [m/s]; horizon_s: H. share:
-    of the gap, closed within H at most; 2 * SHARE for what does not move. creep: speed across that
-    is always allowed [m/s], since noise shows points nearer than they are and must not hold the
-    vehicle for ever. latency_s: H without the braking time, for the margin; None: horizon_s.
+    d_ob: least measured distance between centres [m], with the sensor's margin; max_speed: of any
+    vehicle [m/s]; horizon_s: H. share: of the gap, closed within H at most; 2 * SHARE for what does
+    not move. creep: speed across that is always allowed [m/s], since noise shows points nearer than
+    they are and must not hold the vehicle for ever. latency_s: H without the braking time, for the
+    margin; None: horizon_s.
     """
 
     def __init__(
@@ -100,58 +98,6 @@ class RangingFilter:
             elif limit < self._max_speed:
                 away = (-x / r, -y / r, -z / r)
                 found.append(Bound(away, limit, surface_velocity=(u, v, w)))
-        return found
-
-
-class NeighbourReport(NamedTuple):
-    """What a neighbour last reported of itself."""
-
-    relative: Vector  # position relative to the own centre [m; world axes]
-    age_s: float  # [s]
-    speed_cap: float  # the promised speed [m/s]
-
-
-class PromiseFilter:
-    """Limits the approach speed by neighbours' reports, for vehicles without a ranging sensor.
-
-    Each beacon promises a speed for the next 3 s; a vehicle keeps its lowest promise of the last
-    3 s.
-    """
-
-    def __init__(self, d_ob: float, max_speed: float, horizon_s: float) -> None:
-        self._d_ob = d_ob
-        self._max_speed = max_speed
-        self._horizon_s = horizon_s
-        self._promises: deque[tuple[float, float]] = deque()
-
-    def promise(self, now_s: float, reports: Sequence[NeighbourReport]) -> float:
-        """Return the speed to promise now [m/s], and remember it."""
-        gap = min(
-            (hypot(*each.relative) - self._d_ob - self._max_speed * each.age_s for each in reports),
-            default=float("inf"),
-        )
-        cap = min(max(gap / 1.3, LEAST_CAP_MPS), self._max_speed)
-        self._promises.append((now_s, cap))
-        while self._promises[0][0] < now_s - PROMISE_S:
-            self._promises.popleft()
-        return cap
-
-    @property
-    def speed_cap(self) -> float:
-        """The lowest speed promised in the last 3 s [m/s]."""
-        return min((cap for _, cap in self._promises), default=LEAST_CAP_MPS)
-
-    def bounds(self, reports: Sequence[NeighbourReport]) -> list[Bound]:
-        """Return the bounds of neighbours; zero where one may already be too near."""
-        found = []
-        for relative, age_s, promised in reports:
-            r = hypot(*relative)
-            if r == 0.0:
-                continue
-            cap = promised if age_s <= PROMISE_S else self._max_speed
-            room = r - self._d_ob - cap * (age_s + self._horizon_s)
-            away = (-relative[0] / r, -relative[1] / r, -relative[2] / r)
-            found.append(Bound(away, max(0.0, room) / self._horizon_s))
         return found
 
 

@@ -5,35 +5,39 @@ Obstacles set bounds by their near points, from whichever sensor. The agent retr
 that approaches by itself only if it senses nearest points; scanned points count as at rest.
 """
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from math import hypot, radians
 from typing import assert_never
 
-from agent.config import SCANNERS, AgentSetup, VehicleKind
+from agent.comms.whereabouts import Whereabouts
+from agent.config import AgentSetup, VehicleKind
 from agent.controller import Senses
 from agent.guidance.cone import cone_of
 from agent.guidance.evasion import evasive_velocity
 from agent.guidance.nonholonomic import forward_evasion, forward_limited
+from agent.guidance.promise_filter import PromiseFilter
 from agent.guidance.safety_filter import (
     ROUNDING_MPS,
     SHARE,
     Bound,
-    NeighbourReport,
-    PromiseFilter,
     RangingFilter,
     approach_of,
     limited,
     shortened,
 )
-from agent.messages import ZERO, Vector
+from agent.guidance.sight import (
+    BRAKING_SHARE,
+    braking_of,
+    scanners_of,
+    speed_cap_mps,
+    surface_margin_m,
+    vehicle_margin_m,
+)
+from agent.messages import ZERO, Beacon, Record, Vector
 from agent.sensing.surface_motion import SurfaceMotion
 
-BRAKING_SHARE = 0.25
-"""Share of the gap that one vehicle of bounded acceleration may close until it stands."""
-SCAN_MARGIN_M = 0.05
-"""Extra distance to scanned points, for noise and a coarse pattern."""
 CREEP = 0.3
-"""Share of its speed at which a vehicle may always fly across a scanned point."""
+"""Share of its speed at which a vehicle may always fly across a point that noise may displace."""
 
 
 class SafetyMonitor:
@@ -43,50 +47,78 @@ class SafetyMonitor:
     """
 
     def __init__(self, setup: AgentSetup) -> None:
-        limits, control = setup.vehicle, setup.control
+        limits, control, sensor = setup.vehicle, setup.control, setup.sensor
         self._latency_s = setup.command_ticks / setup.tick_hz
+        self._braking = braking_of(limits, self._latency_s)
         self._kind = limits.kind
-        self._brake_mps2 = limits.max_accel_mps2
         self._turn = radians(limits.max_yaw_rate_dps) * self._latency_s
-        horizon_s = self._latency_s + self._stopping_s(setup.fleet_max_speed_mps)
-        self._horizon_s = horizon_s
+        self._speed_limit = speed_cap_mps(limits, control, sensor, self._braking)
+        fastest = min(setup.fleet_max_speed_mps, self._speed_limit)
+        horizon_s = self._horizon_s = self._braking.horizon_s(fastest)
         share = _share_of(limits.kind)
-        filtered = (control.separation_m, setup.fleet_max_speed_mps, horizon_s)
-        scans = any(kind in limits.sensors for kind in SCANNERS)
-        margin_m, creep = (SCAN_MARGIN_M, CREEP * limits.max_speed_mps) if scans else (0.0, 0.0)
         self._cone = cone_of(limits)
         self._speeds = limits.max_speed_mps, limits.max_climb_mps
-        self._motion = None if scans else SurfaceMotion(setup.sensor.proximity.noise_m)
-        self._ranging = None
-        if "proximity" in limits.sensors:
-            self._ranging = RangingFilter(*filtered, share, latency_s=self._latency_s)
+        self._motion = None if scanners_of(limits) else SurfaceMotion(sensor.proximity.noise_m)
+        surface_margin, vehicle_margin = surface_margin_m(limits, sensor), vehicle_margin_m(sensor)
+        creep = CREEP * limits.max_speed_mps
         self._clearing = RangingFilter(
-            control.clearance_m + margin_m,
+            control.clearance_m + surface_margin,
             limits.max_speed_mps,
             horizon_s,
             2.0 * share,
-            creep,
+            creep if surface_margin > 0.0 else 0.0,
             self._latency_s,
         )
-        self._promises = PromiseFilter(*filtered)
+        self._ranging = RangingFilter(
+            control.separation_m + vehicle_margin,
+            setup.fleet_max_speed_mps,
+            horizon_s,
+            share,
+            creep if vehicle_margin > 0.0 else 0.0,
+            self._latency_s,
+        )
+        self._promises, self._whereabouts = None, Whereabouts(setup.id, setup.team)
+        if "proximity" not in limits.sensors:
+            self._promises = PromiseFilter(
+                control.separation_m,
+                setup.fleet_max_speed_mps,
+                self._braking,
+                restarted=setup.incarnation > 0,
+            )
         self.speed_cap = limits.max_speed_mps
 
-    def safe_velocity(
-        self, wanted: Vector, senses: Senses, reports: Callable[[], list[NeighbourReport]]
-    ) -> Vector:
-        """Return the velocity that is safe to fly [m/s; world frame].
+    def hear(self, beacon: Beacon) -> None:
+        """Take a neighbour's newest beacon."""
+        if self._promises is not None:
+            self._whereabouts.hear(beacon)
 
-        reports: returns the neighbours' last reports; called only without a ranging sensor.
-        """
+    def relay(self, newest: Iterable[Beacon | Record]) -> None:
+        """Take the newest statements of all members."""
+        if self._promises is not None:
+            self._whereabouts.relay(newest)
+
+    def safe_velocity(self, wanted: Vector, senses: Senses) -> Vector:
+        """Return the velocity that is safe to fly [m/s; world frame]."""
         bounds = self._obstacle_bounds(senses) if senses.obstacles else []
-        if self._ranging is not None:
-            bounds += self._ranging.bounds(senses.vehicles)
-            return self._limited(wanted, bounds, senses)
-        known = reports()
-        self._promises.promise(senses.now_s, known)
-        self.speed_cap = self._promises.speed_cap
-        bounds += self._promises.bounds(known)
-        return shortened(self._limited(wanted, bounds, senses), self.speed_cap)
+        if self._promises is not None:
+            return self._promised(self._promises, wanted, bounds, senses)
+        bounds += self._ranging.bounds(senses.vehicles)
+        return shortened(self._limited(wanted, bounds, senses), self._speed_limit)
+
+    def _promised(
+        self, promises: PromiseFilter, wanted: Vector, bounds: list[Bound], senses: Senses
+    ) -> Vector:
+        """Return the velocity that is safe by what other vehicles reported [m/s; world frame]."""
+        now_s, velocity = senses.now_s, senses.velocity
+        reports = self._whereabouts.reports(senses.position, now_s)
+        self.speed_cap = promises.promise(now_s, hypot(*velocity), reports)
+        safe = ZERO
+        if self._whereabouts.complete and not promises.must_stand(velocity, reports):
+            bounds += promises.bounds(velocity, reports)
+            safe = self._limited(wanted, bounds, senses)
+            safe = shortened(safe, min(promises.speed_limit, self._speed_limit))
+        promises.command(now_s, hypot(*safe))
+        return safe
 
     def _obstacle_bounds(self, senses: Senses) -> list[Bound]:
         """Return the bounds of obstacles; negative where a surface approaches too fast."""
@@ -118,22 +150,12 @@ class SafetyMonitor:
 
     def _must_brake(self, velocity: Vector, bounds: list[Bound]) -> bool:
         """Whether a vehicle under way must brake straight: -n.v (H + |v|/2a) > 0.25 gap."""
-        needs_s = self._latency_s + self._stopping_s(hypot(*velocity))
+        needs_s = self._braking.horizon_s(hypot(*velocity))
         return any(
             approach_of(velocity, bound) * needs_s > bound.limit * self._horizon_s + ROUNDING_MPS
             for bound in bounds
             if bound.limit >= 0.0
         )
-
-    def _stopping_s(self, speed: float) -> float:
-        """Return |v|/2a: stopping distance over speed [s]; 0 for a vehicle that stops at once."""
-        match self._kind:
-            case "accelerating":
-                return 0.5 * speed / self._brake_mps2
-            case "kinematic" | "forward":
-                return 0.0
-            case _:
-                assert_never(self._kind)
 
 
 def _share_of(kind: VehicleKind) -> float:

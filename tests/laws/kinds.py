@@ -79,7 +79,7 @@ class Pair:
             mission=None,
             obstacles=near if self.standing else (),
         )
-        safe = self.safety_monitors[me].safe_velocity(wanted, senses, list)
+        safe = self.safety_monitors[me].safe_velocity(wanted, senses)
         yaw = self.random.uniform(-pi, pi)
         ends = slot + self.crafts[me].ticks * SLOTS
         self.coming[me].append((slot + self.late[me], safe, yaw, ends))

@@ -9,6 +9,7 @@ from agent.config import Vehicle
 from agent.guidance import safety_monitor
 from agent.guidance.nonholonomic import forward_limited
 from agent.guidance.safety_filter import Bound, approach_of
+from agent.guidance.sight import Braking
 from tests.laws.kinds import Craft, anything, least_distance, straight
 
 D_OB, CLEARANCE = 0.25, 0.5
@@ -51,7 +52,7 @@ def test_nobody_comes_nearer_to_what_stands_than_its_clearance(name):
 
 
 def test_without_reckoning_the_brakes_they_collide(monkeypatch):
-    monkeypatch.setattr(safety_monitor.SafetyMonitor, "_stopping_s", lambda self, speed: 0.0)
+    monkeypatch.setattr(safety_monitor, "braking_of", lambda _vehicle, late_s: Braking(late_s))
     crafts = [CRAFTS["fast"]] * 2
     assert min(least_distance(Random(seed), crafts)[1] for seed in range(60)) < D_OB - 0.01
 

@@ -211,6 +211,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
             sensor=self.sensor,
             formation=self.formation,
             frame=path_of(self.frame),
+            team=self.fleet.agents,
         )
 
     def _resolved_control(self) -> Control:

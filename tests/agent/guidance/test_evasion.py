@@ -60,7 +60,7 @@ def least_distance(random, speed, ticks, kind):
                 mission=None,
                 obstacles=seen,
             )
-            coming.append(monitor.safe_velocity(wish(random, point, slot), senses, list))
+            coming.append(monitor.safe_velocity(wish(random, point, slot), senses))
             flown = coming.pop(1)
         here = tuple(h + DT * v for h, v in zip(here, flown, strict=True))
     return least

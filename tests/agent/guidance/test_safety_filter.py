@@ -7,13 +7,9 @@ import pytest
 
 from agent.guidance.cone import Cone
 from agent.guidance.safety_filter import (
-    PROMISE_S,
     Bound,
-    NeighbourReport,
-    PromiseFilter,
     RangingFilter,
     limited,
-    shortened,
 )
 
 D_OB = 0.25
@@ -98,71 +94,6 @@ def test_without_the_filters_share_and_margin_they_collide():
             two.fly(slot)
         collided += dist(one.position, two.position) < D_OB
     assert collided > 0
-
-
-class BlindVehicle:
-    """A vehicle that knows the other only by its reports, late and with losses."""
-
-    def __init__(self, random, position, dt):
-        self.random = random
-        self.position = position
-        self.dt = dt
-        self.filter = PromiseFilter(D_OB, 0.5, dt)
-        self.heard = None
-        self.cap = 0.05
-
-    def think(self, now, inbox):
-        for message in inbox:
-            if self.heard is None or message[0] > self.heard[0]:
-                self.heard = message
-        stamp, position, cap = self.heard
-        relative = tuple(b - a for a, b in zip(self.position, position, strict=True))
-        reports = [NeighbourReport(relative=relative, age_s=now - stamp, speed_cap=cap)]
-        self.filter.promise(now, reports)
-        self.cap = self.filter.speed_cap
-        wanted = tuple(0.5 * x / max(hypot(*relative), 1e-9) for x in relative)
-        safe = limited(wanted, self.filter.bounds(reports), 0.0, Cone(pi, pi))
-        self.velocity = shortened(safe, self.cap)
-        return (now, self.position, self.cap)
-
-    def fly(self):
-        self.position = tuple(
-            p + self.dt * v for p, v in zip(self.position, self.velocity, strict=True)
-        )
-
-
-@pytest.mark.parametrize(("loss", "delay_s"), [(0.0, 0.0), (0.5, 0.2), (0.9, 0.5), (1.0, 0.0)])
-def test_promises_keep_blind_pairs_apart(loss, delay_s):
-    dt, least = 0.05, 1e9
-    for pair in range(40):
-        random = Random(pair)
-        one = BlindVehicle(random, (0.0, 0.0, 0.0), dt)
-        two = BlindVehicle(random, (random.uniform(0.4, 3.0), 0.0, 0.0), dt)
-        one.heard, two.heard = (0.0, two.position, 0.5), (0.0, one.position, 0.5)
-        flying = []
-        for tick in range(300):
-            now = tick * dt
-            for me, other in ((one, 1), (two, 0)):
-                due = [m for at, to, m in flying if to != other and at <= now]
-                flying = [f for f in flying if f[1] == other or f[0] > now]
-                message = me.think(now, due)
-                if random.random() >= loss:
-                    flying.append((now + delay_s + dt, other, message))
-            one.fly()
-            two.fly()
-            least = min(least, dist(one.position, two.position))
-    assert least >= D_OB - 1e-9
-
-
-def test_a_promise_is_kept_for_three_seconds():
-    promises = PromiseFilter(D_OB, 0.5, 0.05)
-    near = [NeighbourReport(relative=(0.4, 0.0, 0.0), age_s=0.0, speed_cap=0.5)]
-    low = promises.promise(0.0, near)
-    for tick in range(1, 60):
-        promises.promise(tick * 0.05, [])
-        assert promises.speed_cap == low
-    promises.promise(PROMISE_S + 0.05, [])
-    assert promises.speed_cap == 0.5
 
 
 def test_a_slide_that_leaves_the_cone_is_only_shortened():
