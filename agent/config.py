@@ -5,11 +5,15 @@ from typing import Annotated, Literal, assert_never, get_args
 import msgspec
 from msgspec import Meta
 
-from agent.messages import AGENT_IDS, AT_HOME, AgentId, FramePath
+from agent.messages import AGENT_IDS, AT_HOME, MAX_SPEED_MPS, AgentId, FramePath
 from agent.qstructure.formation import FormationSpec
 
-Positive = Annotated[float, Meta(gt=0, le=1e4)]
-Hertz = Annotated[float, Meta(gt=0, le=1000)]
+LEAST = 0.001
+"""Least value of a quantity that must be above 0, in the unit of its key: smaller ones have no use,
+and their squares and ratios leave the range of numbers."""
+Positive = Annotated[float, Meta(ge=LEAST, le=1e4)]
+Hertz = Annotated[float, Meta(ge=LEAST, le=1000)]
+FrameSpeed = Annotated[float, Meta(ge=LEAST, le=MAX_SPEED_MPS)]
 Noise = Annotated[float, Meta(ge=0, le=1)]
 VehicleKind = Literal["kinematic", "accelerating", "forward"]
 AvoidanceKind = Literal["constellation", "direct", "none"]
@@ -37,14 +41,14 @@ class Vehicle(Table, frozen=True):
     """
 
     kind: VehicleKind = "kinematic"
-    radius_m: Annotated[float, Meta(gt=0, le=100)] = 0.1
-    max_speed_mps: Annotated[float, Meta(gt=0, le=50)] = 0.5
-    max_climb_mps: Annotated[float, Meta(gt=0, le=50)] = 0.5
-    max_accel_mps2: Annotated[float, Meta(gt=0, le=100)] = 2.0
-    max_yaw_rate_dps: Annotated[float, Meta(gt=0, le=10_000)] = 180.0
-    max_turn_deg: Annotated[float, Meta(gt=0, le=90)] = 45.0
-    max_turn_left_deg: Annotated[float, Meta(gt=0, le=90)] | None = None
-    max_turn_right_deg: Annotated[float, Meta(gt=0, le=90)] | None = None
+    radius_m: Annotated[float, Meta(ge=LEAST, le=100)] = 0.1
+    max_speed_mps: Annotated[float, Meta(ge=LEAST, le=50)] = 0.5
+    max_climb_mps: Annotated[float, Meta(ge=LEAST, le=50)] = 0.5
+    max_accel_mps2: Annotated[float, Meta(ge=LEAST, le=100)] = 2.0
+    max_yaw_rate_dps: Annotated[float, Meta(ge=LEAST, le=10_000)] = 180.0
+    max_turn_deg: Annotated[float, Meta(ge=LEAST, le=90)] = 45.0
+    max_turn_left_deg: Annotated[float, Meta(ge=LEAST, le=90)] | None = None
+    max_turn_right_deg: Annotated[float, Meta(ge=LEAST, le=90)] | None = None
     max_tilt_deg: Annotated[float, Meta(ge=0, le=90)] = 0.0
     sensors: tuple[SensorKind, ...] = ("proximity",)
 
@@ -64,8 +68,8 @@ class Laser(Table, frozen=True):
     noise_m: normal, along the ray; dropout_percent: share of the echoes that are lost.
     """
 
-    range_m: Annotated[float, Meta(gt=0, le=60)] = 4.0
-    field_deg: Annotated[float, Meta(gt=0, le=350)] = 180.0
+    range_m: Annotated[float, Meta(ge=LEAST, le=60)] = 4.0
+    field_deg: Annotated[float, Meta(ge=LEAST, le=350)] = 180.0
     rays: Annotated[int, Meta(ge=1, le=720)] = 61
     elevation_deg: Annotated[float, Meta(ge=0, le=85)] = 0.0
     rings: Annotated[int, Meta(ge=1, le=64)] = 1
@@ -80,10 +84,10 @@ class Sonar(Table, frozen=True):
     Each measures the distance to the nearest surface within its beam, not the direction.
     """
 
-    range_m: Annotated[float, Meta(gt=0, le=60)] = 2.0
+    range_m: Annotated[float, Meta(ge=LEAST, le=60)] = 2.0
     ring: Annotated[int, Meta(ge=1, le=64)] = 16
     up_down: bool = False
-    beam_deg: Annotated[float, Meta(gt=0, le=120)] = 22.5
+    beam_deg: Annotated[float, Meta(ge=LEAST, le=120)] = 22.5
     rate_hz: Hertz = 10.0
     noise_m: Noise = 0.0
     dropout_percent: Annotated[float, Meta(ge=0, le=100)] = 0.0
@@ -154,4 +158,6 @@ class AgentSetup(Table, frozen=True):
     frame: FramePath = AT_HOME  # path of the target's frame until a mission sets another
     team: Annotated[int, Meta(ge=0, le=AGENT_IDS)] = 0
     """Number of agents that the fleet started with; their ids are 0 to ``team`` - 1."""
+    ids: Annotated[int, Meta(ge=1, le=AGENT_IDS)] = AGENT_IDS
+    """Number of agent ids in use: 0 to ids - 1, joining agents included."""
     lockstep: bool = False  # whether the process waits for the inbox of each of its slots

@@ -82,12 +82,14 @@ class Agent:
         self._command_slots = setup.command_ticks * setup.slots_per_tick
         self._controller = CheckedController(setup)
         self._neighbours = Neighbours(setup.id, comms.local_hz, self._slack_s)
-        self._table = RecordTable(setup.id, comms.multihop_hz)
+        self._table = RecordTable(setup.id, comms.multihop_hz, setup.ids)
         round_s = 1.0 / comms.multihop_hz if comms.multihop_hz > 0.0 else inf
         self._broadcast = Broadcast(setup.id, setup.incarnation, 1.0 / comms.local_hz, round_s)
         self._safety_monitor = SafetyMonitor(setup)
         self._perception = ObstaclePerception(setup)
-        self._missions = Missions(setup.id, setup.formation, setup.control.spacing_m, setup.frame)
+        self._missions = Missions(
+            setup.id, setup.formation, setup.control.spacing_m, setup.frame, setup.ids
+        )
         self._hierarchy = Hierarchy(setup.id)
         self._hierarchy_state = IN_DISTRESS
         self._unidentified_vehicles = UnidentifiedVehicles(setup.fleet_max_speed_mps)
@@ -171,7 +173,7 @@ class Agent:
             raise RejectedError("spoofed", f"gossip of agent {source} with the id {gossip.id}")
         self._table.adopt(gossip, now_s, self._slack_s)
         if gossip.piece is not None:
-            self._missions.receive(gossip.piece)
+            self._missions.receive(gossip.piece, now_s)
 
     def _senses(self, observation: Observation) -> Senses:
         now_s = observation.time_s
@@ -210,7 +212,7 @@ class Agent:
         departed = self._table.forget_silent(now_s, self._neighbours.ids, lost)
         beacons = self._neighbours.beacons()
         team = self._table.members(now_s)
-        self._record_age_s = max((member.age_s for member in team), default=0.0)
+        self._record_age_s = max((0.0, *(member.age_s for member in team)))
         self._unidentified = self._unidentified_vehicles.update(
             Surroundings(
                 now_s=now_s,

@@ -14,13 +14,26 @@ Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 
 MAX_M, MAX_SPEED_MPS, MAX_ANGLE_RAD, MAX_FORCE = 1e6, 100.0, 100.0, 1e9
+FRAME_M = 930e3
+"""The frame's origin lies within this distance of the world's, along each axis [m]."""
+REACH_M = 50e3
+"""A slot lies within this distance of the frame's origin [m]."""
+FLIGHT_M = 985e3
+"""The world's edge, along each axis [m]: vehicles start within it and cannot fly past it. It leaves
+room up to MAX_M for targets ahead of a vehicle."""
+LEAST_SPEED_MPS = 1e-3
 MAX_COST_MM = 2**31 - 1
 MAX_HEARD = 256
 """Most neighbours in one telemetry, and most vehicles in one observation."""
 AGENT_IDS = 2**16
 """Number of agent ids: 0 to AGENT_IDS - 1."""
 
+MAX_TEAM = 1024
+"""Most agents of a team."""
+
 Metres = Annotated[float, Meta(ge=-MAX_M, le=MAX_M)]
+FrameMetres = Annotated[float, Meta(ge=-FRAME_M, le=FRAME_M)]
+FlightMetres = Annotated[float, Meta(ge=-FLIGHT_M, le=FLIGHT_M)]
 Speed = Annotated[float, Meta(ge=-MAX_SPEED_MPS, le=MAX_SPEED_MPS)]
 Seconds = Annotated[float, Meta(ge=0, le=1e9)]
 Radians = Annotated[float, Meta(ge=-MAX_ANGLE_RAD, le=MAX_ANGLE_RAD)]
@@ -32,6 +45,10 @@ Index = Annotated[int, Meta(ge=-1, lt=2**15)]
 """A queue, a rank or a tier; -1 for none."""
 
 Position = tuple[Metres, Metres, Metres]
+FramePosition = tuple[FrameMetres, FrameMetres, FrameMetres]
+"""Of the frame's origin."""
+FlightPosition = tuple[FlightMetres, FlightMetres, FlightMetres]
+"""Where a vehicle may be."""
 Velocity = tuple[Speed, Speed, Speed]
 Cost = Annotated[int, Meta(ge=0, le=MAX_COST_MM)]
 MAX_PLACES = 8
@@ -67,9 +84,9 @@ class Message(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unk
 class Pose(NamedTuple):
     """Pose of the target's frame in the world frame."""
 
-    x: Metres  # [m]
-    y: Metres  # [m]
-    z: Metres  # [m]
+    x: FrameMetres  # [m]
+    y: FrameMetres  # [m]
+    z: FrameMetres  # [m]
     yaw: Radians  # [rad]
 
 
@@ -93,8 +110,9 @@ class FramePath(Message, frozen=True):
     to that direction. Otherwise ``yaw`` is the whole yaw.
     """
 
-    waypoints: Annotated[tuple[Position, ...], Meta(min_length=1, max_length=16)]  # [m; world]
-    speed: Annotated[float, Meta(gt=0, le=100)] = 0.25  # along the legs [m/s]
+    waypoints: Annotated[tuple[FramePosition, ...], Meta(min_length=1, max_length=16)]
+    """[m; world]"""
+    speed: Annotated[float, Meta(ge=LEAST_SPEED_MPS, le=100)] = 0.25  # along the legs [m/s]
     start_s: Seconds = 0.0  # departure from the first waypoint, in Observation time [s]
     yaw: Radians = 0.0  # [rad]
     turn_rate: Annotated[float, Meta(ge=0, le=100)] = 0.0  # [rad/s]

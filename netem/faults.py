@@ -10,7 +10,7 @@ from typing import Annotated, Literal, assert_never
 import msgspec
 from msgspec import Meta
 
-from netem.link_parameters import Conditions, Table
+from netem.link_parameters import LEAST, Conditions, Table
 from netem.wire.frame import AgentId, Count
 
 Metres = Annotated[float, Meta(ge=-1e6, le=1e6)]
@@ -43,7 +43,7 @@ class Jam(Table, frozen=True):
 
     centre_m: Position
     """[m; world frame]"""
-    radius_m: Annotated[float, Meta(gt=0, le=1e6)]
+    radius_m: Annotated[float, Meta(ge=LEAST, le=1e6)]
 
 
 class Flap(Table, frozen=True):

@@ -12,10 +12,12 @@ from msgspec import Meta
 
 from netem.wire.frame import AgentId
 
+LEAST = 0.001
+"""Least value of a quantity that must be above 0, in the unit of its key."""
 MIN_RATE_KBIT = 0.001
 """A byte takes 8 s; at a lower rate a frame would be on the air longer than any flight."""
 
-Metres = Annotated[float, Meta(gt=0, le=1e6)]
+Metres = Annotated[float, Meta(ge=LEAST, le=1e6)]
 Milliseconds = Annotated[float, Meta(ge=0, le=60_000)]
 Percent = Annotated[float, Meta(ge=0, le=100)]
 Correlation = Annotated[float, Meta(ge=0, lt=100)]
@@ -64,11 +66,11 @@ class PathLoss(Table, frozen=True):
     shadowing_db: the standard deviation of the shadowing.
     """
 
-    exponent: Annotated[float, Meta(gt=0, le=10)]
+    exponent: Annotated[float, Meta(ge=LEAST, le=10)]
     reference_loss_db: Annotated[float, Meta(ge=0, le=300)]
     budget_db: Annotated[float, Meta(ge=0, le=300)]
     reference_distance_m: Metres = 1.0
-    shadowing_db: Annotated[float, Meta(gt=0, le=50)] = 4.0
+    shadowing_db: Annotated[float, Meta(ge=LEAST, le=50)] = 4.0
 
 
 class LinkParameters(msgspec.Struct, Generic[Absent], frozen=True, forbid_unknown_fields=True):

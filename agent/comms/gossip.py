@@ -1,9 +1,11 @@
 """Gossip: a table of single-writer records, the newest of each subject, passed on (E24).
 
-A record is adopted only if its (incarnation, version) exceeds the last one ever adopted for that
-subject, and that number outlives the record; otherwise departed agents would circulate as ghosts.
-The version of a record is its subject's beacon sequence, so a beacon heard directly counts as a
-record too.
+A record is adopted only if it supersedes the last one ever adopted for that subject, as
+:class:`~agent.comms.neighbours.Version` says. That version outlives the record; otherwise departed
+agents would circulate as ghosts. It goes by the stamp, which cannot run ahead, so the subject's own
+records supersede whatever another agent invents. A record's version is its subject's beacon
+sequence, so a beacon heard directly counts as a record too. Records of ids that the run does not
+have are ignored, which bounds the table.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -12,10 +14,10 @@ from types import MappingProxyType
 from typing import assert_never
 
 from agent.codec import CHECKSUM_B, add_checksum, encode
-from agent.comms.neighbours import NO_VERSION
+from agent.comms.neighbours import NEVER_HEARD, Version
 from agent.comms.unidentified_vehicles import DepartedMember, MemberPosition
 from agent.controller import Peer
-from agent.messages import Beacon, Gossip, Piece, Place, Record
+from agent.messages import AGENT_IDS, MAX_TEAM, Beacon, Gossip, Piece, Place, Record
 from netem.wire.channels import MAX_PAYLOAD_B
 
 RELAYED_SILENCE_ROUNDS = 12
@@ -27,30 +29,28 @@ NONE_LOST: Mapping[int, float] = MappingProxyType({})
 MAX_FRAME_B = MAX_PAYLOAD_B - CHECKSUM_B
 FRAME_HEAD_B = 17
 """Longest encoding of a Gossip without records [B]."""
-MAX_SUBJECTS = 1024
-"""Most subjects of a table: one round must fit one transmission."""
 
 
 class RecordTable:
     """What one agent knows of the other members of the team.
 
-    multihop_hz: how often the table is passed on [Hz]; 0: never.
+    multihop_hz: how often the table is passed on [Hz]; 0: never. ids: number of agent ids.
     """
 
-    def __init__(self, own_id: int, multihop_hz: float) -> None:
+    def __init__(self, own_id: int, multihop_hz: float, ids: int = AGENT_IDS) -> None:
         self._own_id = own_id
+        self._ids = ids
         self._newest: dict[int, Beacon | Record] = {}
-        self._last: dict[int, tuple[int, int]] = {}
+        self._last: dict[int, Version] = {}
         self._lag_s: dict[int, float] = {}
         period_s = 1.0 / multihop_hz if multihop_hz > 0.0 else 0.0
         self._relayed_silence_s = max(LEAST_RELAYED_SILENCE_S, RELAYED_SILENCE_ROUNDS * period_s)
 
     def adopt_beacon(self, beacon: Beacon) -> None:
         """Take a neighbour's beacon as the newest record of that neighbour."""
-        subject, version = beacon.id, (beacon.incarnation, beacon.sequence)
-        if version > self._last.get(subject, NO_VERSION) and (
-            subject in self._newest or self._has_room
-        ):
+        subject = beacon.id
+        version = Version(beacon.stamp_s, beacon.incarnation, beacon.sequence)
+        if self._may_know(subject) and version.supersedes(self._last.get(subject, NEVER_HEARD)):
             self._last[subject] = version
             self._newest[subject] = beacon
 
@@ -63,11 +63,11 @@ class RecordTable:
         latest_s = now_s + slack_s
         earliest_s = now_s - self._relayed_silence_s / (1.0 - 2.0 * LAG_SMOOTHING)
         for record in gossip.records:
-            subject, version = record.id, (record.incarnation, record.version)
-            if version <= self._last.get(subject, NO_VERSION):
+            subject = record.id
+            version = Version(record.stamp_s, record.incarnation, record.version)
+            if not version.supersedes(self._last.get(subject, NEVER_HEARD)):
                 continue
-            plausible = subject != self._own_id and earliest_s <= record.stamp_s <= latest_s
-            if plausible and (subject in self._newest or self._has_room):
+            if self._may_know(subject) and earliest_s <= record.stamp_s <= latest_s:
                 self._last[subject] = version
                 self._newest[subject] = record
                 lag_s = self._lag_s.get(subject, 0.0)
@@ -154,9 +154,12 @@ class RecordTable:
         ]
         return [add_checksum(encode(gossip)) for gossip in frames]
 
-    @property
-    def _has_room(self) -> bool:
-        return len(self._newest) < MAX_SUBJECTS
+    def _may_know(self, subject: int) -> bool:
+        """Whether a subject is known, or another agent of the run for which there is room."""
+        if subject in self._newest:
+            return True
+        other = subject != self._own_id and subject < self._ids
+        return other and len(self._newest) < MAX_TEAM
 
 
 def _record_of(newest: Beacon | Record) -> Record:

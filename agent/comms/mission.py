@@ -9,19 +9,23 @@ flies an older one.
 An agent that has the mission computes the frame from its path, and reports the frame at the time of
 each beacon. An agent that has only heard of the frame passes on the report unchanged, with its
 stamp, down the tiers. The newest stamp wins, and each agent extrapolates the frame from there.
+
+A key heard by radio may not run ahead of the time (``is_plausible``), so whatever key a member
+invents, the operator's next mission has a higher one. Every mission passes the one check of
+``mission_check`` before it is flown, and a rejected one is not decoded again.
 """
 
 from __future__ import annotations
 
 from typing import assert_never
-
-import msgspec
+from zlib import crc32
 
 from agent.codec import RejectedError, decode, decode_formation, encode, encode_formation
 from agent.controller import Flown
 from agent.messages import (
     AGENT_IDS,
     AT_HOME,
+    MAX_TEAM,
     PIECE_B,
     Beacon,
     Drift,
@@ -31,14 +35,30 @@ from agent.messages import (
     Piece,
     Pose,
 )
-from agent.qstructure.formation import Formation, FormationError, FormationSpec
+from agent.qstructure.formation import Formation, FormationError, FormationSpec, formation_of
 from agent.qstructure.frame_path import Track
+from agent.qstructure.mission_check import MissionError, check_drift, check_mission
 from agent.qstructure.target_frame import Frame
 
 KEYS_PER_VERSION = AGENT_IDS
 MAX_MISSION_B = 4 * PIECE_B
+FIRST_VERSIONS = 1000
+VERSIONS_PER_S = 10.0
+"""Most versions that a team can have had by a time: so many at once, and so many in a second."""
+MAX_RECEIVING = 4
+"""Most missions that an agent collects pieces of; of more, those with the lowest keys go."""
 MAX_EXTRAPOLATION_S = 5.0
 """A reported frame is extrapolated for this long; then it counts as at rest."""
+
+
+def last_version(time_s: float) -> int:
+    """Return the highest version that a team can have had by a time [s; Observation time]."""
+    return FIRST_VERSIONS + int(VERSIONS_PER_S * time_s)
+
+
+def is_plausible(key: int, time_s: float) -> bool:
+    """Whether a team can have a mission with this key at a time [s; Observation time]."""
+    return key // KEYS_PER_VERSION <= last_version(time_s)
 
 
 class _MissionData(Message, frozen=True):
@@ -70,14 +90,22 @@ class ReportedFrame:
 class Missions:
     """The mission that one agent flies, and those that it is receiving.
 
-    spacing: d_ir of the formation [m]; path: of the frame at the start.
+    spacing: d_ir of the formation [m]; path: of the frame at the start; ids: number of agent ids.
     """
 
     def __init__(
-        self, own_id: int, formation: FormationSpec, spacing: float, path: FramePath = AT_HOME
+        self,
+        own_id: int,
+        formation: FormationSpec,
+        spacing: float,
+        path: FramePath = AT_HOME,
+        ids: int = MAX_TEAM,
     ) -> None:
         self._own_id = own_id
         self._spacing = spacing
+        self._team = min(ids, MAX_TEAM)
+        self._rejected: dict[int, int] = {}
+        """Checksum of the rejected mission with each key."""
         self._encoded = encode_formation(formation)
         self._pieces: dict[int, dict[int, bytes]] = {}
         self._path = path
@@ -85,7 +113,7 @@ class Missions:
         self._resting: tuple[Frame, Pose] | None = None
         self.frame_key = 0
         self.flown = Flown(
-            key=0, formation=Formation(formation, spacing), frame=self._frame.at(0.0)
+            key=0, formation=formation_of(formation, spacing), frame=self._frame.at(0.0)
         )
 
     def flown_at(self, time_s: float) -> Flown:
@@ -100,17 +128,33 @@ class Missions:
         key = mission.key or version * KEYS_PER_VERSION + self._own_id
         self._adopt(key, mission.frame, mission.formation or self._encoded)
 
-    def receive(self, piece: Piece) -> None:
+    def receive(self, piece: Piece, now_s: float) -> None:
         """Take a piece of a mission; with the last piece, fly it. Raises RejectedError."""
         if piece.key <= self.flown.key or piece.index >= piece.count:
             return
-        self._pieces = {key: parts for key, parts in self._pieces.items() if key >= piece.key}
+        if not is_plausible(piece.key, now_s):
+            raise RejectedError("mission", f"no team can have had so many missions: {piece.key}")
         parts = self._pieces.setdefault(piece.key, {})
         parts[piece.index] = piece.data
-        if len(parts) == piece.count:
+        if len(parts) >= piece.count:
             del self._pieces[piece.key]
-            data = decode(b"".join(parts[k] for k in sorted(parts)), _MissionData, MAX_MISSION_B)
-            self._adopt(piece.key, data.frame, data.formation)
+            self._adopt_encoded(piece.key, b"".join(parts[k] for k in sorted(parts)))
+        while len(self._pieces) > MAX_RECEIVING:
+            del self._pieces[min(self._pieces)]
+
+    def _adopt_encoded(self, key: int, encoded: bytes) -> None:
+        """Fly a mission that has arrived in pieces, unless it is one that was rejected before."""
+        checksum = crc32(encoded)
+        if self._rejected.get(key) == checksum:
+            raise RejectedError("mission", "rejected before")
+        try:
+            data = decode(encoded, _MissionData, MAX_MISSION_B)
+            self._adopt(key, data.frame, data.formation)
+        except RejectedError:
+            self._rejected[key] = checksum
+            while len(self._rejected) > MAX_RECEIVING:
+                del self._rejected[min(self._rejected)]
+            raise
 
     def pieces(self) -> list[Piece]:
         """Return the present mission in pieces, for neighbours that fly an older one."""
@@ -125,12 +169,16 @@ class Missions:
         """Take the frame from a beacon if it is newer, before its mission has arrived.
 
         So a moving frame spreads down the tiers at the local channel's rate. Raises RejectedError
-        for a frame with a stamp later than the beacon's.
+        for a frame with a stamp later than the beacon's, or of an impossible mission.
         """
         if not self._is_newer(beacon):
             return
         if beacon.drift is not None and beacon.drift.stamp_s > beacon.stamp_s:
             raise RejectedError("future", "the frame's stamp is later than the beacon's")
+        if not is_plausible(beacon.frame_key, beacon.stamp_s):
+            detail = f"no team can have had so many missions: {beacon.frame_key}"
+            raise RejectedError("mission", detail)
+        self._check_drift(self.flown.formation, beacon.drift)
         self.frame_key = beacon.frame_key
         self._set_frame(ReportedFrame(beacon.frame, beacon.drift), beacon.stamp_s)
 
@@ -174,6 +222,12 @@ class Missions:
         formation = self.flown.formation
         if encoded != self._encoded:
             formation = self._formation(encoded)
+        try:
+            check_mission(formation, path, self._team)
+        except MissionError as error:
+            raise RejectedError("mission", str(error)) from error
+        if key < self.frame_key and isinstance(self._frame, ReportedFrame):
+            self._check_drift(formation, self._frame.drift)
         self._encoded, self._path = encoded, path
         self.flown = Flown(key=key, formation=formation, frame=self.flown.frame)
         if key >= self.frame_key:
@@ -187,8 +241,15 @@ class Missions:
         if here.moves or now.moves or (here.origin, here.yaw) != (now.origin, now.yaw):
             self.flown = self.flown._replace(frame=now)
 
+    def _check_drift(self, formation: Formation, drift: Drift | None) -> None:
+        try:
+            if drift is not None:
+                check_drift(formation, drift, self._team)
+        except MissionError as error:
+            raise RejectedError("mission", str(error)) from error
+
     def _formation(self, encoded: bytes) -> Formation:
         try:
-            return Formation(decode_formation(encoded), self._spacing)
-        except (FormationError, msgspec.ValidationError) as error:
+            return formation_of(decode_formation(encoded), self._spacing)
+        except FormationError as error:
             raise RejectedError("mission", str(error)) from error

@@ -6,6 +6,7 @@ never read.
 
 from collections.abc import Collection
 from math import inf, log
+from typing import NamedTuple
 
 from agent.codec import RejectedError
 from agent.controller import Heard
@@ -13,11 +14,11 @@ from agent.messages import Beacon, Place
 
 MAX_AGE_S = 5.0
 """An older beacon is rejected."""
+INCARNATION_LASTS_S = 5.0
+"""An older incarnation is heard again when the newer one has been silent for this long."""
 MAX_EXTRAPOLATION_S = 1.0
 """A position is extrapolated along its velocity for this long at most."""
 LEAST_SILENCE_S = 1.5
-NO_VERSION = (-1, -1)
-"""(incarnation, sequence) of a sender not heard so far: lower than any."""
 LOG_FALSE_ALARM = log(1e-6)
 """Logarithm of the probability that chance alone makes a silence of T_lost (E17)."""
 HEARD_BY_OTHERS = 0.25
@@ -27,23 +28,47 @@ MARGIN = 1.2
 """The loss is estimated from the last 39 gaps or so: n (1e6^(1/n) - 1) / ln 1e6 at n = 39."""
 
 
+class Version(NamedTuple):
+    """Which of a sender's statements one is: by its stamp, and by the sender's own count."""
+
+    stamp_s: float
+    incarnation: int
+    sequence: int
+
+    def supersedes(self, other: "Version") -> bool:
+        """Whether this statement is newer: later, and not the same one once more.
+
+        A higher sequence alone does not count: an invented one would shut out all that follow. So
+        would an invented incarnation, so it loses its rank when nothing follows it.
+        """
+        if self.incarnation < other.incarnation:
+            return self.stamp_s > other.stamp_s + INCARNATION_LASTS_S
+        return self > other and self[1:] != other[1:]
+
+
+NEVER_HEARD = Version(-inf, -1, -1)
+"""Of a sender not heard so far: older than any."""
+
+
 class Neighbour:
     """One neighbour: its last beacon, and the radio's quality estimated from its sequence."""
 
-    __slots__ = ("beacon", "key", "latency_s", "mean_gap", "place")
+    __slots__ = ("beacon", "latency_s", "mean_gap", "place", "version")
 
     def __init__(self, beacon: Beacon, latency_s: float) -> None:
         self.beacon = beacon
-        self.key = (beacon.incarnation, beacon.sequence)
+        self.version = _version_of(beacon)
         self.latency_s = latency_s
         self.mean_gap = 1.0
         self.place = _claimed_place(beacon)
 
-    def update(self, beacon: Beacon, key: tuple[int, int], latency_s: float) -> None:
-        """Take a newer beacon. key: its (incarnation, sequence); latency_s: its delay [s]."""
-        before, self.key = self.beacon, key
+    def update(self, beacon: Beacon, version: Version, latency_s: float, beacon_hz: float) -> None:
+        """Take a newer beacon. latency_s: its delay [s]; beacon_hz: the expected rate [Hz]."""
+        before, self.version = self.beacon, version
         if beacon.incarnation == before.incarnation:
-            gap = beacon.sequence - before.sequence
+            # An invented sequence must not make a long silence seem likely.
+            most = 2.0 + 2.0 * (beacon.stamp_s - before.stamp_s) * beacon_hz
+            gap = min(max(beacon.sequence - before.sequence, 1), most)
             self.mean_gap += SMOOTHING * (gap - self.mean_gap)
         self.latency_s += SMOOTHING * (latency_s - self.latency_s)
         if beacon.rank != before.rank or beacon.queue != before.queue:
@@ -74,7 +99,7 @@ class Neighbours:
         self._known: dict[int, Neighbour] = {}
         self._in_order: list[Neighbour] = []
         self.sorted_ids: tuple[int, ...] = ()
-        self._last: dict[int, tuple[int, int]] = {}
+        self._last: dict[int, Version] = {}
 
     def receive(self, beacon: Beacon, now_s: float, own_sent_s: dict[int, float]) -> None:
         """Take a beacon, or raise RejectedError for a replay or an implausible stamp.
@@ -82,12 +107,13 @@ class Neighbours:
         own_sent_s: sending time of each recent own sequence [s]. A beacon that echoes a sequence
         was sent after it (E22), whatever its stamp says.
         """
-        sender, key = beacon.id, (beacon.incarnation, beacon.sequence)
+        sender, version = beacon.id, _version_of(beacon)
         if sender == self._own_id:
             raise RejectedError("spoofed", "a beacon with the receiver's own id")
         known = self._known.get(sender)
-        if key <= (known.key if known is not None else self._last.get(sender, NO_VERSION)):
-            raise RejectedError("replay", f"sequence {key} of agent {sender} is not new")
+        last = known.version if known is not None else self._last.get(sender, NEVER_HEARD)
+        if not version.supersedes(last):
+            raise RejectedError("replay", f"{version} of agent {sender} is not new")
         age_s = now_s - beacon.stamp_s
         if age_s < -self._slack_s:
             raise RejectedError("future", f"the stamp is {-age_s:.3f} s ahead")
@@ -98,7 +124,7 @@ class Neighbours:
             raise RejectedError("offset", "the stamp is older than a beacon that it echoes")
         latency_s = age_s if age_s > 0.0 else 0.0
         if known is not None:
-            known.update(beacon, key, latency_s)
+            known.update(beacon, version, latency_s, self._beacon_hz)
         else:
             self._known[sender] = Neighbour(beacon, latency_s)
             self._put_in_order()
@@ -128,7 +154,7 @@ class Neighbours:
             and now_s - stamp_s > known.silence_s(self._beacon_hz)
         }
         for sender in gone:
-            self._last[sender] = self._known.pop(sender).key
+            self._last[sender] = self._known.pop(sender).version
         if gone:
             self._put_in_order()
         return gone
@@ -179,6 +205,10 @@ class Neighbours:
     def _put_in_order(self) -> None:
         self.sorted_ids = tuple(sorted(self._known))
         self._in_order = [self._known[sender] for sender in self.sorted_ids]
+
+
+def _version_of(beacon: Beacon) -> Version:
+    return Version(beacon.stamp_s, beacon.incarnation, beacon.sequence)
 
 
 def _claimed_place(beacon: Beacon) -> Place | None:

@@ -1,31 +1,55 @@
 """Curves by arc length: slots stand by metres along a curve, whatever its parameter.
 
-The curve is measured once, in pieces of at most a centimetre, as far as it is asked for. A table
-then gives the parameter of an arc length. The step is halved where the curve is fast or bends, so a
-jump shows as a step that no halving makes short.
+A curve is measured lazily, piece by piece, as far as it is asked for. A table then gives the
+parameter of an arc length, exact to a millimetre. The step is halved where the curve is fast, bends
+or changes its speed, so a jump shows as a step that no halving makes short. The first metres are
+measured in pieces of a centimetre; farther on, pieces are as long as the curve allows. The number
+of pieces is limited: a curve that needs more of them is refused, so measuring always comes to an
+end.
 """
 
 from bisect import bisect_right
 from collections.abc import Callable
 from math import dist, inf
+from typing import NamedTuple
 
 from agent.messages import Vector
 
 PIECE_M = 0.01
-"""Longest piece of the table."""
+"""Longest piece of the first metres."""
 BEND_M = 1e-5
-"""Most by which a piece with its middle point is longer than its chord."""
+"""Most by which such a piece with its middle point is longer than its chord."""
+TIGHT_M = 3e-7
+"""A piece that bends by more is counted longer than its chords, as an arc through them is."""
+LONG_PIECE_M = 0.25
+"""Longest piece after the first metres."""
+LONG_BEND_M = 5e-5
+"""Most by which such a piece with its middle point is longer than its chord."""
+UNEVEN_M = 3e-4
+"""Most by which the halves of such a piece differ."""
 LEAST_STEP = 1e-10
 GREATEST_STEP = 0.5
 """Bounds of a piece's step in the curve's own parameter."""
 STANDSTILL_STEPS = 2000
 STANDSTILL_M = 1e-6
-SAMPLES = 1000
 JUMP_M = 0.02
+HALVINGS = 50
 
 
 class CurveError(ValueError):
-    """A curve that cannot be measured: it jumps, stands still, or ends too soon."""
+    """A curve that cannot be measured: it jumps, stands still, winds too much or ends too soon."""
+
+
+class Effort(NamedTuple):
+    """How finely a curve is measured and how much work that may be."""
+
+    fine_m: float  # length of the part that is measured in short pieces [m]
+    pieces: int  # most pieces
+    samples: int  # points at which the way to a slot is searched for jumps
+
+
+FULL_EFFORT = Effort(fine_m=20.0, pieces=20_000, samples=1000)
+"""Of a curve that is alone in its formation."""
 
 
 class ArcLengthCurve:
@@ -34,11 +58,15 @@ class ArcLengthCurve:
     at: the curve by its own parameter [m]; ends: its last parameter.
     """
 
-    def __init__(self, at: Callable[[float], Vector], ends: float = inf) -> None:
+    def __init__(
+        self, at: Callable[[float], Vector], ends: float = inf, effort: Effort = FULL_EFFORT
+    ) -> None:
         self._at = at
         self._ends = ends
+        self._effort = effort
         self._parameters = [0.0]
         self._lengths = [0.0]
+        self._pieces = 0
         self._here = at(0.0)
         self._step = 1e-3
 
@@ -70,13 +98,16 @@ class ArcLengthCurve:
     def check(self, s: float) -> None:
         """Raise CurveError if the curve jumps somewhere on the way to arc length s [m].
 
-        Measuring never gets past a pole, since the way there has no end. So the parameters up to s
-        are checked too, for the author of a curve in metres expects it to reach that far.
+        Measuring finds the jumps up to there, but it never gets past a pole, since the way there
+        has no end. So the parameters up to s are searched too, for the author of a curve in metres
+        expects it to reach that far.
         """
-        last = min(max(self.parameter(s), s), self._ends)
-        here = self._at(0.0)
-        for k in range(SAMPLES):
-            start, end = last * k / SAMPLES, last * (k + 1) / SAMPLES
+        first, last = self.parameter(s), min(s, self._ends)
+        samples = self._effort.samples
+        here = self._at(first)
+        for k in range(samples if first < last else 0):
+            start = first + (last - first) * k / samples
+            end = first + (last - first) * (k + 1) / samples
             there = self._at(end)
             if dist(here, there) > JUMP_M:
                 self._check_jump(start, end)
@@ -84,38 +115,58 @@ class ArcLengthCurve:
 
     def _check_jump(self, start: float, end: float) -> None:
         """Halve an interval towards its longer half: it shrinks unless there is a jump."""
-        for _ in range(50):
+        here, there = self._at(start), self._at(end)
+        for _ in range(HALVINGS):
+            if dist(here, there) <= JUMP_M:
+                return
             middle = 0.5 * (start + end)
-            first = dist(self._at(start), self._at(middle))
-            if first >= dist(self._at(middle), self._at(end)):
-                end = middle
+            between = self._at(middle)
+            if dist(here, between) >= dist(between, there):
+                end, there = middle, between
             else:
-                start = middle
-        if dist(self._at(start), self._at(end)) > JUMP_M:
-            raise CurveError(f"it jumps near {start:.6g}: a pole?")
+                start, here = middle, between
+        raise CurveError(f"it jumps near {start:.6g}: a pole?")
 
     def point(self, s: float) -> Vector:
         """Return the point at arc length s [m]."""
         return self._at(self.parameter(s))
 
     def _measure_piece(self) -> None:
-        """Add one piece, so short that the table may interpolate linearly within it."""
-        start = self._parameters[-1]
+        """Add one piece, so short that the table may interpolate linearly within its halves."""
+        if self._pieces >= self._effort.pieces:
+            raise CurveError(
+                f"{self._lengths[-1]:.3g} m of it are measured in {self._pieces} steps, and no more"
+                " are allowed; it is too long, too slow or too tightly wound"
+            )
+        start, fine = self._parameters[-1], self._lengths[-1] < self._effort.fine_m
+        longest = PIECE_M if fine else LONG_PIECE_M
         while True:
             step = min(self._step, self._ends - start)
             middle, end = self._at(start + 0.5 * step), self._at(start + step)
-            piece = dist(self._here, middle) + dist(middle, end)
-            if piece <= PIECE_M and piece - dist(self._here, end) <= BEND_M:
+            first, second = dist(self._here, middle), dist(middle, end)
+            piece = first + second
+            bend = piece - dist(self._here, end)
+            if piece <= longest and _is_regular(bend, first - second, fine):
                 break
             self._step = 0.5 * step
             if self._step < LEAST_STEP:
                 raise CurveError(f"it jumps near {start:.6g}: a pole?")
-        self._parameters.append(start + step)
-        self._lengths.append(self._lengths[-1] + piece)
+        if bend > TIGHT_M:
+            piece += bend / 3.0
+        if not fine and piece > 0.0:
+            self._append(start + 0.5 * step, piece * first / (first + second))
+            self._append(start + step, piece * second / (first + second))
+        else:
+            self._append(start + step, piece)
+        self._pieces += 1
         self._here = end
-        if piece < 0.4 * PIECE_M:
+        if piece < 0.4 * longest:
             self._step = min(2.0 * step, GREATEST_STEP) if step == self._step else self._step
         self._check_progress()
+
+    def _append(self, parameter: float, length_m: float) -> None:
+        self._parameters.append(parameter)
+        self._lengths.append(self._lengths[-1] + length_m)
 
     def _check_progress(self) -> None:
         if len(self._lengths) <= STANDSTILL_STEPS:
@@ -125,3 +176,10 @@ class ArcLengthCurve:
                 f"it stands still from {self._parameters[-STANDSTILL_STEPS]:.6g} on, "
                 f"{self._lengths[-1]:.3f} m from its start"
             )
+
+
+def _is_regular(bend_m: float, uneven_m: float, fine: bool) -> bool:
+    """Whether a piece is straight enough, and even enough, for linear interpolation."""
+    if fine:
+        return bend_m <= BEND_M
+    return bend_m <= LONG_BEND_M and abs(uneven_m) <= UNEVEN_M

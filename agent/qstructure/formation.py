@@ -1,65 +1,45 @@
 """Formations: Definition 3. The places of a team, not which agent takes which place.
 
-The ``...Spec`` structures are the tables of a formation file. :class:`Formation` is the geometry
-that agents compute with, and a :class:`Layout` is a formation filled by a team of one size.
+:class:`Formation` is the geometry that agents compute with, and a :class:`Layout` is a formation
+filled by a team of one size. The tables of a formation file are in ``formation_tables``.
 """
 
 from collections.abc import Sequence
-from functools import cache
+from functools import lru_cache
 from math import dist, inf
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import msgspec
-from msgspec import Meta
 
-from agent.messages import Metres, Place, Vector
+from agent.messages import Place, Vector
 from agent.qstructure.curve import CurveError
 from agent.qstructure.expression import ExpressionError
-from agent.qstructure.orientation import (
-    Attitude,
-    Orientation,
-    OrientationError,
-    OrientationSpec,
+from agent.qstructure.formation_tables import (
+    FormationError,
+    FormationSpec,
+    Name,
+    QueueSpec,
+    capacities_of,
+    check_names,
+    queues_of,
 )
-from agent.qstructure.queue import Queue, QueueError
-from agent.qstructure.shape import ShapeError, ShapeSpec, Straight, shape_of
+from agent.qstructure.orientation import FREE, Attitude, OrientationError
+from agent.qstructure.queue import Queue
 
-Name = Annotated[str, Meta(min_length=1, max_length=64)]
+__all__ = [
+    "Formation",
+    "FormationError",
+    "FormationSpec",
+    "Layout",
+    "Name",
+    "QueueSpec",
+    "Slot",
+    "formation_of",
+]
+
 NO_PLACES: frozenset[Place] = frozenset()
-
-
-class FormationError(ValueError):
-    """A formation that cannot be flown; ``key`` is the offending key."""
-
-    def __init__(self, key: str, detail: str) -> None:
-        super().__init__(f"{key}: {detail}")
-        self.key = key
-        self.detail = detail
-
-
-class QueueSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A queue's table: Q_j = (V_j, S_j, C_j, O_j) of Definition 4.
-
-    vertices: names, one for an open queue, more for a closed one. shape: a closed queue without a
-    shape runs straight from vertex to vertex. capacity: share of the team; left out: equal shares.
-    orientation: left out: free.
-    """
-
-    name: Name
-    vertices: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=64)]
-    shape: ShapeSpec | None = None
-    capacity: Annotated[float, Meta(gt=0, le=1)] | None = None
-    orientation: OrientationSpec | None = None
-
-
-class FormationSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A formation file: F = (Q, V_F) of Definition 3; vertices [m; target's frame]."""
-
-    name: Name
-    vertices: Annotated[
-        dict[Name, tuple[Metres, Metres, Metres]], Meta(min_length=1, max_length=64)
-    ]
-    queue: Annotated[tuple[QueueSpec, ...], Meta(min_length=1, max_length=64)]
+LAYOUTS_KEPT = 128
+FORMATIONS_KEPT = 32
 
 
 class Slot(NamedTuple):
@@ -84,15 +64,17 @@ class Formation:
 
     A place is (queue, rank): the ranks of a queue's vertices come first, in order, then its members
     along the curve. A vertex shared by several queues is one place, of the first of these queues.
-    Raises :class:`FormationError` if the tables contradict each other.
+    A slot that cannot be computed, behind a pole say, is no place, and an angle that cannot be
+    computed is free: ``check`` refuses both, but a team may grow after it. Raises
+    :class:`FormationError` if the tables contradict each other.
     """
 
     def __init__(self, spec: FormationSpec, spacing: float) -> None:
         self.name = spec.name
-        _check_names(spec)
+        check_names(spec)
         self.vertices = dict(spec.vertices)
-        self.capacities = _capacities(spec)
-        self.queues = tuple(_queue(table, self.vertices, spacing) for table in spec.queue)
+        self.capacities = capacities_of(spec)
+        self.queues = queues_of(spec, spacing)
         self._vertices_of = [table.vertices for table in spec.queue]
         holders = self._holders()
         self.vertex_places = {name: places[0] for name, places in holders.items()}
@@ -101,7 +83,7 @@ class Formation:
         self._queues_of_vertex: dict[tuple[int, int], frozenset[int]] = {
             places[0]: frozenset(place.queue for place in places) for places in holders.values()
         }
-        self.layout = cache(self._layout)
+        self.layout = lru_cache(LAYOUTS_KEPT)(self._layout)
 
     def slot(self, place: Place, agents: int) -> Slot | None:
         """Return a place's slot in a team of that size; None if there is no such place.
@@ -113,9 +95,10 @@ class Formation:
             return found
         if not 0 <= place.queue < len(self.queues) or place.rank < 1:
             return None
-        if self.queues[place.queue].closed:
+        queue = self.queues[place.queue]
+        if queue.closed or queue.usable(place.rank) < place.rank:
             return None
-        return self._slot(place.queue, self.queues[place.queue].members(place.rank)[-1])
+        return self._slot(place.queue, queue.behind(place.rank))
 
     def queues_of(self, place: Place | tuple[int, int]) -> frozenset[int]:
         """Return the queues that a place belongs to; for a vertex, all that pass through it."""
@@ -128,7 +111,8 @@ class Formation:
         named first (E16). What a closed queue cannot hold goes to queues that can. blocked: places
         that are not available, since an unidentified vehicle hovers there (E18).
         """
-        bounds = [self._capacity_of(j, blocked) for j in range(len(self.queues))]
+        queues = range(len(self.queues))
+        bounds = [self._capacity_of(j, agents + len(blocked), blocked) for j in queues]
         return self._divide(agents, bounds, blocked)
 
     def _divide(
@@ -152,22 +136,39 @@ class Formation:
 
     def check(self, agents: int, least_m: float) -> None:
         """Raise FormationError unless a team of that size fits, its slots ``least_m`` [m] apart."""
-        layout = self._checked_layout(agents)
+        wanted = self._divide(agents, [inf] * len(self.queues))
+        for j, queue in enumerate(self.queues):
+            if not queue.closed:
+                self._check_members(j, wanted[j] - len(self._own[j]))
+        layout = self.layout(agents)
         if layout.unplaced:
             raise FormationError(
                 "queue",
                 f"all queues are closed and full: {layout.unplaced} of {agents} agents find no "
                 "place; add an open queue, or take fewer agents",
             )
-        wanted = self._divide(agents, [inf] * len(self.queues))
         for j, queue in enumerate(self.queues):
-            if wanted[j] > self._capacity_of(j):
+            room = self._capacity_of(j, agents)
+            if wanted[j] > room:
                 raise FormationError(
                     f"queue {queue.name!r}",
-                    f"its capacity asks for {wanted[j]} members, {self._capacity_of(j):g} fit",
+                    f"its capacity asks for {wanted[j]} members, {room:g} fit",
                 )
             self._check_shape(queue, layout)
         _check_apart(layout, self.queues, least_m)
+
+    def reach_m(self, agents: int) -> float:
+        """Return how far from the frame's origin a slot of so many agents can be at most [m]."""
+        return max(
+            dist((0.0, 0.0, 0.0), queue.point(0.0))
+            + (queue.stations[-1] if queue.closed else queue.behind(agents))
+            for queue in self.queues
+        )
+
+    def _check_members(self, queue: int, count: int) -> None:
+        """Raise FormationError unless an open queue's first members can be computed."""
+        for s in self.queues[queue].members(count):
+            self._computed(queue, s)
 
     def _check_shape(self, queue: Queue, layout: Layout) -> None:
         used = [
@@ -175,31 +176,27 @@ class Formation:
             for place, slot in layout.slots.items()
             if self.queues[place.queue] is queue
         ]
+        for s in used:
+            self._computed(self.queues.index(queue), s)
         try:
             queue.check(max(used, default=0.0))
         except (CurveError, ExpressionError) as error:
             raise FormationError(f"queue {queue.name!r}, shape", str(error)) from error
-
-    def _checked_layout(self, agents: int) -> Layout:
-        try:
-            return self.layout(agents)
-        except (CurveError, ExpressionError) as error:
-            raise FormationError("queue", str(error)) from error
 
     def _layout(self, agents: int, blocked: frozenset[Place] = NO_PLACES) -> Layout:
         counts = self.divide(agents, blocked)
         common = _without(self.common, blocked)[:agents]
         ordered = [(0, 0, place) for place in common]
         heads = {*common}
-        slots = {place: self._station(place) for place in common}
+        found = {place: self._station(place) for place in common}
         for j, queue in enumerate(self.queues):
             own = _without(self._own[j], blocked)[: counts[j]]
             members = self._members(j, counts[j] - len(own), blocked)
             arc_lengths = queue.members(
                 members[-1].rank + 1 - len(queue.stations) if members else 0
             )
-            slots |= {place: self._station(place) for place in own}
-            slots |= {
+            found |= {place: self._station(place) for place in own}
+            found |= {
                 place: self._slot(j, arc_lengths[place.rank - len(queue.stations)])
                 for place in members
             }
@@ -207,8 +204,9 @@ class Formation:
             ordered += [(1 + k, j, place) for k, place in enumerate(members)]
             heads.update(own if self._has_vertex(j, blocked) else members[:1])
         ordered.sort()
-        places = tuple(place for _, _, place in ordered)
-        return Layout(places, slots, agents - len(places), frozenset(heads))
+        slots = {place: slot for place, slot in found.items() if slot is not None}
+        places = tuple(place for _, _, place in ordered if place in slots)
+        return Layout(places, slots, agents - len(places), frozenset(heads & slots.keys()))
 
     def _members(self, queue: int, count: int, blocked: frozenset[Place]) -> list[Place]:
         """Return the first ``count`` available places behind or between a queue's vertices."""
@@ -228,13 +226,27 @@ class Formation:
             for place, queues in self._queues_of_vertex.items()
         )
 
-    def _station(self, place: Place) -> Slot:
+    def _station(self, place: Place) -> Slot | None:
         return self._slot(place.queue, self.queues[place.queue].stations[place.rank])
 
-    def _slot(self, queue: int, s: float) -> Slot:
+    def _slot(self, queue: int, s: float) -> Slot | None:
+        """Return the slot at an arc length [m]; None if its point cannot be computed."""
         where = self.queues[queue]
         try:
-            return Slot(where.point(s), s, where.attitude(s))
+            point = where.point(s)
+        except (CurveError, ExpressionError):
+            return None
+        try:
+            return Slot(point, s, where.attitude(s))
+        except OrientationError:
+            return Slot(point, s, FREE)
+
+    def _computed(self, queue: int, s: float) -> None:
+        """Raise FormationError if a point or an angle at arc length s [m] cannot be computed."""
+        where = self.queues[queue]
+        try:
+            where.point(s)
+            where.attitude(s)
         except OrientationError as error:
             key = f"queue {where.name!r}, orientation.{error.key}"
             raise FormationError(key, str(error)) from error
@@ -257,67 +269,32 @@ class Formation:
                 own[places[0].queue].append(places[0])
         return [sorted(places) for places in own]
 
-    def _capacity_of(self, queue: int, blocked: frozenset[Place] = NO_PLACES) -> float:
-        """Return how many agents a queue can hold besides those of shared vertices."""
+    def _capacity_of(self, queue: int, agents: int, blocked: frozenset[Place] = NO_PLACES) -> float:
+        """Return how many agents a queue can hold besides those of shared vertices.
+
+        Infinite for an open queue with room for that many.
+        """
         room = self.queues[queue].room
         if room is None:
-            return inf
+            room = self.queues[queue].usable(agents)
+            if room >= agents:
+                return inf
         lost = sum(place.queue == queue and place not in self.common for place in blocked)
         return max(0, len(self._own[queue]) + room - lost)
 
 
+@lru_cache(FORMATIONS_KEPT)
+def _formation_of(encoded: bytes, spacing: float) -> Formation:
+    return Formation(msgspec.msgpack.decode(encoded, type=FormationSpec), spacing)
+
+
+def formation_of(spec: FormationSpec, spacing: float) -> Formation:
+    """Return a formation's geometry, the same object for equal tables. Raises FormationError."""
+    return _formation_of(msgspec.msgpack.encode(spec), spacing)
+
+
 def _without(places: Sequence[Place], blocked: frozenset[Place]) -> list[Place]:
     return [place for place in places if place not in blocked]
-
-
-def _queue(table: QueueSpec, vertices: dict[str, Vector], spacing: float) -> Queue:
-    """Return a queue's geometry; raise FormationError with the queue's name."""
-    through = [vertices[name] for name in table.vertices]
-    label = f"queue {table.name!r}"
-    if table.shape is None and len(through) == 1:
-        raise FormationError(f"{label}, shape", "an open queue needs a shape")
-    try:
-        shape = shape_of(table.shape) if table.shape is not None else Straight(through)
-        orientation = Orientation(table.orientation) if table.orientation is not None else None
-        return Queue(table.name, through, shape, spacing, orientation)
-    except (ShapeError, OrientationError, QueueError) as error:
-        part = {ShapeError: "shape", OrientationError: "orientation"}.get(type(error))
-        key = ".".join(each for each in (part, error.key) if each)
-        raise FormationError(f"{label}, {key}", str(error)) from error
-    except (CurveError, ExpressionError) as error:
-        raise FormationError(f"{label}, shape", str(error)) from error
-
-
-def _check_names(spec: FormationSpec) -> None:
-    seen: set[str] = set()
-    for index, queue in enumerate(spec.queue):
-        if queue.name in seen:
-            raise FormationError(f"queue[{index}].name", f"{queue.name!r} is used twice")
-        seen.add(queue.name)
-        for vertex in queue.vertices:
-            if vertex not in spec.vertices:
-                known = ", ".join(spec.vertices)
-                raise FormationError(
-                    f"queue[{index}].vertices", f"no vertex {vertex!r}; there are {known}"
-                )
-        if len(set(queue.vertices)) < len(queue.vertices):
-            raise FormationError(f"queue[{index}].vertices", "a vertex is named twice")
-    used = {vertex for queue in spec.queue for vertex in queue.vertices}
-    for name in spec.vertices:
-        if name not in used:
-            raise FormationError(f"vertices.{name}", "no queue passes through it")
-
-
-def _capacities(spec: FormationSpec) -> tuple[float, ...]:
-    """Return each queue's share; queues without a capacity share the rest equally."""
-    given = [queue.capacity for queue in spec.queue]
-    total = sum(share for share in given if share is not None)
-    missing = given.count(None)
-    if missing and total < 1.0 - 1e-6:
-        return tuple((1.0 - total) / missing if share is None else share for share in given)
-    if missing or abs(total - 1.0) > 1e-6:
-        raise FormationError("queue.capacity", f"the sum must be 1 within 1e-6; it is {total:g}")
-    return tuple(share for share in given if share is not None)
 
 
 def _check_apart(layout: Layout, queues: tuple[Queue, ...], least_m: float) -> None:

@@ -10,6 +10,7 @@ from agent.qstructure.expression import MAX_EXPRESSION_LENGTH, Expression, Expre
 
 Text = Annotated[str, Meta(min_length=1, max_length=MAX_EXPRESSION_LENGTH)]
 Angle = Annotated[float, Meta(ge=-1e4, le=1e4)] | Text
+MAX_TILT_DEG = 90.0
 ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
 
 
@@ -60,7 +61,11 @@ class Orientation:
         angles: list[float | None] = []
         for key, angle in zip(ANGLES, self._angles, strict=True):
             try:
-                angles.append(None if angle is None else radians(angle(d)))
+                degrees = None if angle is None else angle(d)
             except ExpressionError as error:
                 raise OrientationError(key, str(error)) from error
+            if degrees is not None and key != "yaw_deg" and abs(degrees) > MAX_TILT_DEG:
+                detail = f"{degrees:g} at d = {d:g}; at most {MAX_TILT_DEG:g}"
+                raise OrientationError(key, detail)
+            angles.append(None if degrees is None else radians(degrees))
         return Attitude(*angles)

@@ -4,24 +4,28 @@ A shape starts at the origin; a queue puts that origin on its first vertex. A sh
 continued straight, in its last direction, since an open queue has no end.
 """
 
+from bisect import bisect_right
 from collections.abc import Callable
 from itertools import pairwise
-from math import cos, dist, hypot, pi, radians, sin
+from math import cos, dist, hypot, inf, pi, radians, sin
 from typing import Annotated, assert_never
 
 import msgspec
 from msgspec import Meta
 
 from agent.messages import ZERO, Metres, Vector
-from agent.qstructure.curve import ArcLengthCurve, CurveError
+from agent.qstructure.curve import FULL_EFFORT, ArcLengthCurve, CurveError, Effort
 from agent.qstructure.expression import MAX_EXPRESSION_LENGTH, Expression, ExpressionError
 
 Triple = tuple[Metres, Metres, Metres]
-Length = Annotated[float, Meta(gt=0, le=1e4)]
+LEAST_M = 1e-3
+"""Least radius, and least distance between two points: what is smaller has no direction to fly."""
+Length = Annotated[float, Meta(ge=LEAST_M, le=1e4)]
 Degrees = Annotated[float, Meta(ge=-1e4, le=1e4)]
 Points = Annotated[tuple[Triple, ...], Meta(min_length=2, max_length=256)]
 Text = Annotated[str, Meta(min_length=1, max_length=MAX_EXPRESSION_LENGTH)]
 AHEAD_M = 1e-4
+"""How far before its end a curve's last direction is taken."""
 
 
 class ShapeError(ValueError):
@@ -82,17 +86,27 @@ ShapeSpec = Ray | Polyline | Arc | Helix | Spline | Curve
 
 
 class Shape:
-    """A curve by arc length. ``end``: arc length at which its straight continuation begins [m]."""
+    """A curve by arc length; one that ends is continued straight."""
 
     def __init__(self, curve: ArcLengthCurve, *, endless: bool) -> None:
         self._by_length = curve
-        self.end = float("inf") if endless else curve.length()
+        self._endless = endless
         self._origin = curve.point(0.0)
+
+    @property
+    def end(self) -> float:
+        """Arc length at which the straight continuation begins [m]; infinite without an end."""
+        return inf if self._endless else self._by_length.length()
+
+    def within(self, s: float) -> float:
+        """Return an arc length [m], or the curve's end if that comes first."""
+        return s if self._by_length.reaches(s) else self.end
 
     def point(self, s: float) -> Vector:
         """Return the point at arc length s >= 0 [m] from the vertex, relative to it [m]."""
-        x, y, z = self._by_length.point(min(s, self.end))
-        beyond = max(0.0, s - self.end)
+        last = self.within(s)
+        x, y, z = self._by_length.point(last)
+        beyond = max(0.0, s - last)
         if beyond:
             u, v, w = self._last_direction()
             x, y, z = x + beyond * u, y + beyond * v, z + beyond * w
@@ -100,7 +114,7 @@ class Shape:
 
     def check(self, s: float) -> None:
         """Raise CurveError if the curve has a pole or a jump on the way to arc length s [m]."""
-        self._by_length.check(min(s, self.end))
+        self._by_length.check(self.within(s))
 
     def _last_direction(self) -> Vector:
         here, before = self._by_length.point(self.end), self._by_length.point(self.end - AHEAD_M)
@@ -118,11 +132,13 @@ class Straight:
         self._units = [_unit(a, b) for a, b in pairwise(corners)]
         self.end = self._starts[-1]
 
+    def within(self, s: float) -> float:
+        """Return an arc length [m], or the last corner's if that comes first."""
+        return min(s, self.end)
+
     def point(self, s: float) -> Vector:
         """Return the point at arc length s >= 0 [m] from the first corner, relative to it [m]."""
-        piece = 0
-        while piece < len(self._units) - 1 and s >= self._starts[piece + 1]:
-            piece += 1
+        piece = min(bisect_right(self._starts, s, 1) - 1, len(self._units) - 1)
         corner, unit, along = self._corners[piece], self._units[piece], s - self._starts[piece]
         origin = self._corners[0]
         return (
@@ -135,28 +151,57 @@ class Straight:
         """Accept any s: straight pieces have neither poles nor jumps."""
 
 
-def shape_of(spec: ShapeSpec) -> Shape | Straight:
-    """Return the curve that a shape's table describes, or raise :class:`ShapeError`."""
+WORK = 1_000_000
+"""Most work of measuring the curves of one formation, in evaluations of a node of an expression."""
+POINT_WORK = 12
+"""Work for a point of a curve besides its expressions."""
+FINE_M = 20.0
+"""The part of a formation's curves that is measured in short pieces [m]."""
+MIN_SAMPLES = 20
+
+
+def effort_for(spec: ShapeSpec, curves: int) -> Effort:
+    """Return the effort for a shape in a formation with so many measured curves."""
+    texts = (spec.x, spec.y, spec.z) if isinstance(spec, Curve) else ()
+    point_work = POINT_WORK + sum(map(len, texts))
+    points = WORK // (point_work * max(curves, 1))
+    return Effort(
+        fine_m=FINE_M / max(curves, 1),
+        pieces=min(points // 2, FULL_EFFORT.pieces),
+        samples=min(max(points // 40, MIN_SAMPLES), FULL_EFFORT.samples),
+    )
+
+
+def is_measured(spec: ShapeSpec | None) -> bool:
+    """Whether a shape is a curve that has to be measured."""
+    return isinstance(spec, Arc | Helix | Spline | Curve)
+
+
+def shape_of(spec: ShapeSpec, curves: int = 1) -> Shape | Straight:
+    """Return the curve that a shape's table describes, or raise :class:`ShapeError`.
+
+    curves: how many curves of its formation are measured.
+    """
     try:
-        return _shape_of(spec)
+        return _shape_of(spec, effort_for(spec, curves))
     except (CurveError, ExpressionError) as error:
         raise ShapeError("", str(error)) from error
 
 
-def _shape_of(spec: ShapeSpec) -> Shape | Straight:
+def _shape_of(spec: ShapeSpec, effort: Effort) -> Shape | Straight:
     match spec:
         case Ray():
             return _ray(spec)
         case Polyline():
             return _polyline(spec)
         case Arc():
-            return _arc(spec)
+            return _arc(spec, effort)
         case Helix():
-            return _helix(spec)
+            return _helix(spec, effort)
         case Spline():
-            return _spline(spec)
+            return _spline(spec, effort)
         case Curve():
-            return _curve(spec)
+            return _curve(spec, effort)
         case _:
             assert_never(spec)
 
@@ -172,20 +217,23 @@ def _polyline(spec: Polyline) -> Straight:
     return Straight(list(spec.points_m))
 
 
-def _arc(spec: Arc) -> Shape:
+def _arc(spec: Arc, effort: Effort) -> Shape:
     if spec.sweep_deg == 0.0:
         raise ShapeError("sweep_deg", "must not be 0; a straight queue is a ray")
     sweep, heading = radians(spec.sweep_deg), radians(spec.heading_deg)
+    if abs(sweep) * spec.radius_m < LEAST_M:
+        detail = f"the arc is {abs(sweep) * spec.radius_m:.3g} m long; at least {LEAST_M:g} m"
+        raise ShapeError("sweep_deg", detail)
     side = 1.0 if sweep > 0.0 else -1.0
 
     def at(angle: float) -> Vector:
         radius, turned = side * spec.radius_m, heading + side * angle
         return (radius * (sin(turned) - sin(heading)), radius * (cos(heading) - cos(turned)), 0.0)
 
-    return Shape(ArcLengthCurve(at, abs(sweep)), endless=False)
+    return Shape(ArcLengthCurve(at, abs(sweep), effort), endless=False)
 
 
-def _helix(spec: Helix) -> Shape:
+def _helix(spec: Helix, effort: Effort) -> Shape:
     heading = radians(spec.heading_deg)
 
     def at(angle: float) -> Vector:
@@ -193,17 +241,16 @@ def _helix(spec: Helix) -> Shape:
         y = spec.radius_m * (cos(heading) - cos(heading + angle))
         return (x, y, spec.pitch_m * angle / (2.0 * pi))
 
-    return Shape(ArcLengthCurve(at), endless=True)
+    return Shape(ArcLengthCurve(at, effort=effort), endless=True)
 
 
-def _spline(spec: Spline) -> Shape:
+def _spline(spec: Spline, effort: Effort) -> Shape:
     _check_points(spec.points_m)
-    return Shape(
-        ArcLengthCurve(_catmull_rom(spec.points_m), len(spec.points_m) - 1.0), endless=False
-    )
+    last = len(spec.points_m) - 1.0
+    return Shape(ArcLengthCurve(_catmull_rom(spec.points_m), last, effort), endless=False)
 
 
-def _curve(spec: Curve) -> Shape:
+def _curve(spec: Curve, effort: Effort) -> Shape:
     parts = []
     for key in ("x", "y", "z"):
         try:
@@ -211,13 +258,14 @@ def _curve(spec: Curve) -> Shape:
         except ExpressionError as error:
             raise ShapeError(key, str(error)) from error
     x, y, z = parts
-    return Shape(ArcLengthCurve(lambda s: (x(s), y(s), z(s))), endless=True)
+    return Shape(ArcLengthCurve(lambda s: (x(s), y(s), z(s)), effort=effort), endless=True)
 
 
 def _check_points(points: tuple[Vector, ...]) -> None:
     for index, (a, b) in enumerate(pairwise(points)):
-        if dist(a, b) < 1e-9:
-            raise ShapeError("points_m", f"points {index} and {index + 1} must not coincide")
+        if dist(a, b) < LEAST_M:
+            detail = f"points {index} and {index + 1} are {dist(a, b):.3g} m apart"
+            raise ShapeError("points_m", f"{detail}; at least {LEAST_M:g} m")
 
 
 def _catmull_rom(points: tuple[Vector, ...]) -> Callable[[float], Vector]:

@@ -23,6 +23,8 @@ from agent.codec import (
 )
 from agent.messages import (
     CAUSES,
+    FRAME_M,
+    LEAST_SPEED_MPS,
     Beacon,
     Command,
     Drift,
@@ -146,14 +148,17 @@ velocities = st.tuples(speeds, speeds, speeds)
 angles = st.floats(-100.0, 100.0)
 parents = st.integers(-1, 2**16 - 1)
 costs = st.integers(0, 2**31 - 1)
-poses = st.builds(Pose, x=metres, y=metres, z=metres, yaw=angles)
+frame_metres = st.floats(-FRAME_M, FRAME_M)
+poses = st.builds(Pose, x=frame_metres, y=frame_metres, z=frame_metres, yaw=angles)
 blocked = st.lists(st.tuples(indices, indices), max_size=8).map(tuple)
 drifts = st.builds(Drift, stamp_s=seconds, x=speeds, y=speeds, z=speeds, yaw_rate=angles)
 rates = st.floats(1e-6, 100.0)
 paths = st.builds(
     FramePath,
-    waypoints=st.lists(positions, min_size=1, max_size=3).map(tuple),
-    speed=rates,
+    waypoints=st.lists(
+        st.tuples(frame_metres, frame_metres, frame_metres), min_size=1, max_size=3
+    ).map(tuple),
+    speed=st.floats(LEAST_SPEED_MPS, 100.0),
     start_s=seconds,
     yaw=angles,
     turn_rate=rates,

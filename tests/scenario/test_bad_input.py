@@ -11,8 +11,8 @@ WEDGE = Path("deploy/scenarios/wedge-9.toml")
 QUEUE = "{ name = 'Q', vertices = ['V1'], shape = { kind = 'ray', direction = [0, 0, 1] } }"
 
 OVERRIDDEN = [
-    ("netem.range_m", "-6", "netem.range_m", "above 0"),
-    ("netem.range_m", "0", "netem.range_m", "above 0"),
+    ("netem.range_m", "-6", "netem.range_m", "from 0.001"),
+    ("netem.range_m", "0", "netem.range_m", "from 0.001"),
     ("netem.range_m", "nan", "netem.range_m", "finite"),
     ("netem.range_m", "inf", "netem.range_m", "got inf; must be a finite number"),
     ("netem.delay_ms", "-1", "netem.delay_ms", "from 0"),
@@ -32,7 +32,7 @@ OVERRIDDEN = [
     ("fleet.agents", "true", "fleet.agents", "got true"),
     ("fleet.agents.x", "1", "fleet.agents", "is not a table"),
     ("fleet", "3", "fleet", "a table of agents, tick_hz, start"),
-    ("fleet.tick_hz", "0", "fleet.tick_hz", "above 0"),
+    ("fleet.tick_hz", "0", "fleet.tick_hz", "from 0.001"),
     ("fleet.start", "{ size_m = [1, 1, 1] }", "fleet.start.kind", "'box' or 'list'"),
     ("fleet.start.kind", "ring", "fleet.start.kind", "'ring'; allowed: 'box' or 'list'"),
     (
@@ -55,7 +55,7 @@ OVERRIDDEN = [
     ("name", "../x", "name", "letters"),
     ("seed", "-1", "seed", "from 0"),
     ("seed", str(2**60), "seed", "below"),
-    ("duration_s", "0", "duration_s", "above 0"),
+    ("duration_s", "0", "duration_s", "from 0.001"),
     ("duration_s", "0.001", "duration_s", "at least one tick"),
     ("formation.file", "nope.toml", "formation.file", "no such file"),
     (
@@ -197,7 +197,7 @@ LINKS = [
     ("gemodel", "{ p_percent = 5 }", "r_percent: is missing"),
     ("gemodel", "{ p_percent = 5, r_percent = 120 }", "r_percent: got 120"),
     ("path_loss", "{ exponent = 3, budget_db = 70 }", "reference_loss_db: is missing"),
-    ("path_loss.shadowing_db", "0", "above 0"),
+    ("path_loss.shadowing_db", "0", "from 0.001"),
     ("rate_kbit", "0", "from 0.001 up to"),
     ("rate_kbit", "1e-300", "from 0.001 up to"),
     ("limit", "0", "from 1"),

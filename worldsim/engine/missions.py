@@ -3,7 +3,7 @@
 from typing import Literal, assert_never
 
 from agent.codec import encode_formation
-from agent.comms.mission import KEYS_PER_VERSION
+from agent.comms.mission import KEYS_PER_VERSION, is_plausible
 from agent.messages import Mission
 from agent.qstructure.formation import FormationSpec
 from worldsim.engine.operations import GiveMission
@@ -55,8 +55,13 @@ class Missions:
         self.pending = Mission(key=key, frame=mission.path, formation=formation)
         return key
 
-    def report(self, agent: int, key: int) -> None:
-        """Record the key of the mission that an agent flies; 0 for an agent that starts."""
+    def report(self, agent: int, key: int, time_s: float) -> None:
+        """Record the key of the mission that an agent flies at a time [s]; 0 where it starts.
+
+        A key that no team can have reached by then is invented, and ignored.
+        """
+        if not is_plausible(key, time_s):
+            return
         self._flown[agent] = key
         if self.pending is not None and key >= self.pending.key:
             self.pending = None

@@ -148,7 +148,7 @@ class SlotLoop:
             telemetry = command.telemetry
             self._telemetry.update(agent, telemetry, self._headings[agent])
             self.radio_use.count_step(agent, len(telemetry.heard))
-            self.effects.missions.report(agent, telemetry.mission)
+            self.effects.missions.report(agent, telemetry.mission, self.world.time_s)
             self._report_place(agent, telemetry.place)
             if telemetry.rejected:
                 self.rejections.update(agent, command)

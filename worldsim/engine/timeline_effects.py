@@ -7,7 +7,7 @@ Then it is applied here: to the members, the radio's conditions, the sensors and
 from collections.abc import Callable, Iterator
 from typing import Literal, assert_never
 
-from agent.qstructure.formation import Formation, FormationSpec
+from agent.qstructure.formation import FormationSpec, formation_of
 from netem.conditions import NetworkConditions
 from netem.faults import FaultOrder, RadioEvent, RadioFault
 from worldsim.engine.membership import Membership
@@ -66,7 +66,7 @@ class TimelineEffects:
         self.places: list[tuple[int, int] | None] = [None] * scenario.rows
         """The place (queue, rank) that each agent claims, as last reported; row i = agent i."""
         self._spacing_m = scenario.control.spacing_m
-        self._formation = Formation(scenario.formation, self._spacing_m)
+        self._formation = formation_of(scenario.formation, self._spacing_m)
         self._world = world
         self._emit = emit
 
@@ -185,7 +185,7 @@ class TimelineEffects:
         event = _start_event(operation.kind)
         for agent, incarnation in operation.incarnations.items():
             self.places[agent] = None
-            self.missions.report(agent, 0)
+            self.missions.report(agent, 0, self._world.time_s)
             self._emit(
                 event(t_s=self._t_s, agent=agent, planned=True, by=by, incarnation=incarnation)
             )
@@ -210,7 +210,7 @@ class TimelineEffects:
 
     def _give(self, mission: GiveMission, by: By) -> None:
         key = self.missions.issue(mission)
-        self._formation = Formation(mission.formation, self._spacing_m)
+        self._formation = formation_of(mission.formation, self._spacing_m)
         event = _mission_event(mission.kind)
         self._emit(
             event(

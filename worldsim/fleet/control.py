@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 import zenoh
 
+from agent.comms.mission import last_version
 from netem.faults import FaultOrder, RadioEvent
 from netem.link_parameters import Conditions
 from netem.wire.bus import Bus, Handler, drain
@@ -37,7 +38,6 @@ from worldsim.scenario.timeline import Step
 from worldsim.scenario.toml import ScenarioError
 
 MAX_REQUEST_B = 64 * 1024
-MAX_VERSION = 2**31
 REQUESTS_PER_SLOT = 4
 CarryOut = Callable[[Operation, By], None]
 """Carries an operation out, and applies it to the slot loop."""
@@ -163,8 +163,10 @@ class Control:
         if request.to is not None and not members.running[request.to]:
             state = members.state(request.to).value
             raise RequestError(f"to: agent {request.to} is not running ({state})")
-        if request.version is not None and not newest < request.version < MAX_VERSION:
-            raise RequestError(f"version: {request.version}; above {newest} is allowed")
+        last = last_version(self._loop.world.time_s)
+        if request.version is not None and not newest < request.version <= last:
+            detail = f"{request.version}; above {newest} is allowed, up to {last} by now"
+            raise RequestError(f"version: {detail}")
 
     def _answer(self, events: list[RunEvent]) -> Answer:
         network = self._loop.network

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from agent.guidance.cone import cone_of
-from agent.qstructure.formation import Formation
+from agent.qstructure.formation import formation_of
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.invariants import Invariants, InvariantTally
 from worldsim.judge.metrics import Separation, conserved
@@ -80,7 +80,7 @@ class Judge:
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        formation = Formation(scenario.formation, scenario.control.spacing_m)
+        formation = formation_of(scenario.formation, scenario.control.spacing_m)
         self.phases = [Phase(formation, 0.0, path_of(scenario.frame))]
         self.queues = [QueueConvergence(self.phases[0])]
         self._hovering = HoveringVehicles(scenario.control.spacing_m)
@@ -192,7 +192,7 @@ class Judge:
         return {"I1": self._safety, **allocation, "I8": self._conservation}
 
     def _open_phase(self, event: MissionRunEvent) -> None:
-        formation = Formation(event.tables, self._scenario.control.spacing_m)
+        formation = formation_of(event.tables, self._scenario.control.spacing_m)
         self.phases.append(Phase(formation, event.t_s, event.path, event.mission))
         self.queues.append(QueueConvergence(self.phases[-1]))
 

@@ -10,7 +10,8 @@ from typing import NamedTuple, assert_never
 
 from agent.codec import encode_formation
 from agent.messages import MAX_ORDER_B
-from agent.qstructure.formation import FormationError, FormationSpec
+from agent.qstructure.formation import Formation, FormationError, FormationSpec
+from agent.qstructure.mission_check import MissionError, check_mission
 from netem.faults import RadioFault
 from netem.link_parameters import Conditions
 from worldsim.scenario.events import ACTIONS, UNDOABLE, EventTable
@@ -32,7 +33,13 @@ from worldsim.scenario.selectors import (
 )
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.tables import MAX_AGENTS, Scenario
-from worldsim.scenario.target_frame import FrameChange, changed_frame, frame_problem
+from worldsim.scenario.target_frame import (
+    FrameChange,
+    FrameTable,
+    changed_frame,
+    frame_problem,
+    path_of,
+)
 from worldsim.scenario.timeline import Step, steps
 from worldsim.scenario.toml import ScenarioError
 
@@ -215,9 +222,11 @@ class EventChecks:
         if change.start_s is not None and change.start_s < at_s:
             detail = f"{change.start_s:g}; the event's at_s = {at_s:g} or later"
             yield Problem("frame.start_s", detail)
-        broken = frame_problem(changed_frame(self.fleet.frame, change, at_s))
+        changed = changed_frame(self.fleet.frame, change, at_s)
+        broken = frame_problem(changed)
         if broken is not None:
             yield Problem(f"frame.{broken.key}", broken.detail)
+        yield from self._mission(self.fleet.formation, changed)
         size_b = len(encode_formation(self.fleet.spec))
         if size_b > MAX_ORDER_B:
             detail = f"the formation has {size_b} B; a mission holds at most {MAX_ORDER_B} B"
@@ -230,12 +239,20 @@ class EventChecks:
             return
         formation = self.fleet.made(spec)
         formation.check(team, self._scenario.min_slot_distance_m)
+        yield from self._mission(formation, self.fleet.frame)
         size_b = len(encode_formation(spec))
         if size_b > MAX_ORDER_B:
             yield Problem("formation", f"{size_b} B; a mission holds at most {MAX_ORDER_B} B")
         tilted = tilt_problem(self._scenario, formation, team)
         if tilted is not None:
             yield Problem("formation", f"{tilted.key}: {tilted.detail}")
+
+    def _mission(self, formation: Formation, frame: FrameTable) -> Iterator[Problem]:
+        """Check a formation together with the path of its frame."""
+        try:
+            check_mission(formation, path_of(frame), self._scenario.rows)
+        except MissionError as error:
+            yield Problem(error.key, error.detail)
 
 
 def _not_allowed(selector: Selector, hold_places: bool) -> str:

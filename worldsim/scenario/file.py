@@ -12,13 +12,15 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from agent.qstructure.formation import Formation, FormationError, FormationSpec
+from agent.qstructure.formation import FormationError, FormationSpec, formation_of
+from agent.qstructure.mission_check import MissionError, check_mission
 from worldsim.scenario.decoding import decode
 from worldsim.scenario.event_checks import FormationSource, check_timeline
 from worldsim.scenario.library import formation_from
 from worldsim.scenario.obstacle_tables import resolve_field
 from worldsim.scenario.rules import check_rules, tilt_problem
 from worldsim.scenario.tables import Scenario
+from worldsim.scenario.target_frame import path_of
 from worldsim.scenario.toml import Data, ScenarioError, override, read, tables
 
 _PLAIN_ARRAY = re.compile(r"\[\n((?: +[^\s\[\]{}][^\n]*,\n)+) *\]")
@@ -122,10 +124,13 @@ def _with_field(scenario: Scenario, file: str | Path) -> Scenario:
 def _check_formation(scenario: Scenario, file: Path, source: Path, prefix: str) -> None:
     control = scenario.control
     try:
-        formation = Formation(scenario.formation, control.spacing_m)
+        formation = formation_of(scenario.formation, control.spacing_m)
         formation.check(scenario.fleet.agents, scenario.min_slot_distance_m)
+        check_mission(formation, path_of(scenario.frame), scenario.rows)
     except FormationError as error:
         raise ScenarioError(source, prefix + error.key, error.detail) from error
+    except MissionError as error:
+        raise ScenarioError(file, error.key, error.detail) from error
     tilted = tilt_problem(scenario, formation, scenario.fleet.agents)
     if tilted is not None:
         raise ScenarioError(file, *tilted)

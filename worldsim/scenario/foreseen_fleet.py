@@ -6,7 +6,7 @@ that they select, only the number is foreseen.
 
 from typing import NamedTuple, assert_never
 
-from agent.qstructure.formation import Formation, FormationSpec
+from agent.qstructure.formation import Formation, FormationSpec, formation_of
 from netem.faults import Heal, Partition, RadioFault
 from worldsim.scenario.faults import (
     Join,
@@ -78,7 +78,7 @@ class ForeseenFleet:
 
     def made(self, spec: FormationSpec) -> Formation:
         """Return a formation with the scenario's spacing. Raises FormationError."""
-        return Formation(spec, self._spacing_m)
+        return formation_of(spec, self._spacing_m)
 
     def apply(self, step: Step) -> None:
         """Apply a valid step."""

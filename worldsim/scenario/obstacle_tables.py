@@ -12,7 +12,7 @@ from typing import Annotated, Literal, NamedTuple, assert_never
 import numpy as np
 from msgspec import Meta
 
-from agent.config import Positive, Table
+from agent.config import LEAST, Positive, Table
 from agent.messages import Position, Vector
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.start import BoxStart, Degrees, Extent, ListStart
@@ -36,7 +36,7 @@ class Movable(Table, frozen=True):
 
     centre_m: Position | None = None  # world frame
     waypoints_m: Waypoints | None = None  # world frame
-    speed_mps: Annotated[float, Meta(gt=0, le=50)] | None = None
+    speed_mps: Annotated[float, Meta(ge=LEAST, le=50)] | None = None
     at_end: Literal["back", "stop"] = "back"
     from_s: Annotated[float, Meta(ge=0, le=86_400)] = 0.0
 
@@ -85,7 +85,7 @@ class ObstacleField(Table, frozen=True):
     centre_m: Position  # world frame
     size_m: tuple[Extent, Extent, Extent]  # along x, y, z
     count: Annotated[int, Meta(ge=1, le=MAX_OBSTACLES)] | None = None
-    density_per_m3: Positive | None = None
+    density_per_m3: Annotated[float, Meta(gt=0, le=1e4)] | None = None
     shape: Literal["sphere", "cylinder"] = "sphere"
     radius_m: Range = (0.3, 0.6)
     corridor_m: Extent = 1.7

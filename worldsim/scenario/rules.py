@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import assert_never
 
 from agent.messages import Position
-from agent.qstructure.formation import Formation
+from agent.qstructure.formation import Formation, formation_of
 from agent.qstructure.frame_path import tip_speed
 from worldsim.scenario.obstacle_tables import obstacle_problem
 from worldsim.scenario.problem import Problem
@@ -259,7 +259,7 @@ def _frame_slow_enough(scenario: Scenario) -> Problem | None:
 
 def _formation_radius_m(scenario: Scenario) -> float:
     """Return the largest distance of a slot from the frame's vertical axis [m]."""
-    formation = Formation(scenario.formation, scenario.control.spacing_m)
+    formation = formation_of(scenario.formation, scenario.control.spacing_m)
     slots = formation.layout(scenario.fleet.agents).slots.values()
     return max(hypot(slot.point[0], slot.point[1]) for slot in slots)
 

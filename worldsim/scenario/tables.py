@@ -12,6 +12,7 @@ from msgspec import Meta
 
 from agent.config import (
     DEFAULT_CAST_FAR_M,
+    LEAST,
     AgentSetup,
     Comms,
     Control,
@@ -113,7 +114,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
     schema: Annotated[int, Meta(ge=1, le=1)] = 1
     name: RunName = "unnamed"
     seed: Annotated[int, Meta(ge=0, lt=2**53)] = 1
-    duration_s: Annotated[float, Meta(gt=0, le=86_400)] = 20.0
+    duration_s: Annotated[float, Meta(ge=LEAST, le=86_400)] = 20.0
     vehicle: Vehicle = Vehicle()
     agent: tuple[AgentTable, ...] = ()
     sensor: Sensors = Sensors()
@@ -212,6 +213,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
             formation=self.formation,
             frame=path_of(self.frame),
             team=self.fleet.agents,
+            ids=self.rows,
         )
 
     def _resolved_control(self) -> Control:

@@ -1,19 +1,19 @@
 """The target's frame in a scenario: its path as tables, and as the message that agents get."""
 
-from math import dist, radians
+from math import radians
 from typing import Annotated, Literal, assert_never
 
 import msgspec
 from msgspec import Meta
 
-from agent.config import Positive, Table
-from agent.messages import FramePath, Position
+from agent.config import FrameSpeed, Table
+from agent.messages import FramePath, FramePosition
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.start import Degrees
 
-MIN_LEG_M = 1e-3
+TurnRate = Annotated[float, Meta(ge=0.01, le=5000)]
 Time = Annotated[float, Meta(ge=0, le=86_400)]
-Waypoints = Annotated[tuple[Position, ...], Meta(min_length=1, max_length=16)]
+Waypoints = Annotated[tuple[FramePosition, ...], Meta(min_length=1, max_length=16)]
 Pauses = Annotated[tuple[Time, ...], Meta(max_length=16)]
 
 
@@ -27,12 +27,12 @@ class FrameTable(Table, frozen=True):
     """
 
     waypoints_m: Waypoints = ((0.0, 0.0, 0.0),)
-    speed_mps: Positive | None = None
+    speed_mps: FrameSpeed | None = None
     start_s: Time = 0.0
     pauses_s: Pauses = ()
     yaw: Literal["fixed", "path"] = "fixed"
     yaw_deg: Degrees = 0.0
-    turn_dps: Positive = 10.0
+    turn_dps: TurnRate = 10.0
 
 
 REST = FrameTable()
@@ -45,12 +45,12 @@ class FrameChange(Table, frozen=True):
     """
 
     waypoints_m: Waypoints | None = None
-    speed_mps: Positive | None = None
+    speed_mps: FrameSpeed | None = None
     start_s: Time | None = None
     pauses_s: Pauses | None = None
     yaw: Literal["fixed", "path"] | None = None
     yaw_deg: Degrees | None = None
-    turn_dps: Positive | None = None
+    turn_dps: TurnRate | None = None
 
     @property
     def given(self) -> dict[str, object]:
@@ -91,10 +91,6 @@ def frame_problem(frame: FrameTable) -> Problem | None:
         return Problem("speed_mps", detail)
     if frame.pauses_s and len(frame.pauses_s) != points:
         return Problem("pauses_s", f"{len(frame.pauses_s)} for {points} waypoints; one for each")
-    for index in range(1, points):
-        if dist(frame.waypoints_m[index - 1], frame.waypoints_m[index]) < MIN_LEG_M:
-            detail = "the same point as before; use pauses_s to wait there"
-            return Problem(f"waypoints_m[{index}]", detail)
     return None
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agent.config import Vehicle
-from agent.messages import Vector
+from agent.messages import FLIGHT_M, Vector
 
 Floats = NDArray[np.float64]
 _TURN = 2.0 * np.pi
@@ -76,7 +76,8 @@ class Vehicles:
         if self._accelerates:
             velocity = self._accelerated(velocity, dt)
         self.velocity = velocity
-        self.position = self.position + velocity * dt
+        moved = self.position + velocity * dt
+        self.position = np.minimum(np.maximum(moved, -FLIGHT_M), FLIGHT_M)
         reach = self._max_yaw_rate * dt
         turn = np.minimum(np.maximum(wrapped(yaw - self.yaw), -reach), reach)
         self.yaw = wrapped(self.yaw + turn)

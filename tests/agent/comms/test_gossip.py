@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agent.codec import decode_gossip, encode
-from agent.comms.gossip import FRAME_HEAD_B, MAX_SUBJECTS, RecordTable
-from agent.messages import Place
+from agent.comms.gossip import FRAME_HEAD_B, RecordTable
+from agent.messages import MAX_TEAM, Place
 from netem.wire.channels import MAX_PAYLOAD_B
 from netem.wire.frame import MAX_OUTGOING
 from tests.agent.comms.builders import (
@@ -202,7 +202,7 @@ def test_the_head_has_its_longest_encoding():
     assert whole == FRAME_HEAD_B + 20 * len(encode(record(1, 1)))
 
 
-@pytest.mark.parametrize("known", [0, 1, 17, 18, 19, 200, MAX_SUBJECTS])
+@pytest.mark.parametrize("known", [0, 1, 17, 18, 19, 200, MAX_TEAM])
 def test_the_whole_table_fits_with_the_greatest_numbers(known):
     records = [greatest_record(2**16 - 1 - k) for k in range(known)]
     full = adopted(table(), *records, now_s=LATE_S)
@@ -217,7 +217,7 @@ def test_a_table_has_a_greatest_size():
     known = table()
     for first in range(1, 4000, 16):
         adopted(known, *(record(subject, 1, 1.0) for subject in range(first, first + 16)))
-    assert len(content(known)) == MAX_SUBJECTS
+    assert len(content(known)) == MAX_TEAM
     adopted(known, record(1, 2, 1.0))
     assert content(known)[1].version == 2, "a known subject is still updated"
     known.forget_silent(60.0, ())
