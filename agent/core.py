@@ -173,7 +173,7 @@ class Agent:
             raise RejectedError("spoofed", f"gossip of agent {source} with the id {gossip.id}")
         self._table.adopt(gossip, now_s, self._slack_s)
         if gossip.piece is not None:
-            self._missions.receive(gossip.piece, now_s)
+            self._missions.receive(gossip.piece, source, now_s)
 
     def _senses(self, observation: Observation) -> Senses:
         now_s = observation.time_s

@@ -12,13 +12,13 @@ stamp, down the tiers. The newest stamp wins, and each agent extrapolates the fr
 
 A key heard by radio may not run ahead of the time (``is_plausible``), so whatever key a member
 invents, the operator's next mission has a higher one. Every mission passes the one check of
-``mission_check`` before it is flown, and a rejected one is not decoded again.
+``mission_check`` before it is flown. The pieces of one sender make a mission, so no other member
+can spoil it.
 """
 
 from __future__ import annotations
 
-from typing import assert_never
-from zlib import crc32
+from typing import NamedTuple, assert_never
 
 from agent.codec import RejectedError, decode, decode_formation, encode, encode_formation
 from agent.controller import Flown
@@ -45,8 +45,10 @@ MAX_MISSION_B = 4 * PIECE_B
 FIRST_VERSIONS = 1000
 VERSIONS_PER_S = 10.0
 """Most versions that a team can have had by a time: so many at once, and so many in a second."""
-MAX_RECEIVING = 4
-"""Most missions that an agent collects pieces of; of more, those with the lowest keys go."""
+DEAF_S = 0.5
+DEAF_AFTER_REJECTION_S = 10.0
+"""How long the pieces of a sender are ignored after a mission of it was taken, or rejected: it may
+not occupy a receiver with one mission after the other."""
 MAX_EXTRAPOLATION_S = 5.0
 """A reported frame is extrapolated for this long; then it counts as at rest."""
 
@@ -66,6 +68,14 @@ class _MissionData(Message, frozen=True):
 
     frame: FramePath
     formation: bytes  # a FormationSpec as msgpack
+
+
+class _Pieces(NamedTuple):
+    """The pieces of a mission that have arrived from one sender."""
+
+    key: int
+    number: int  # of pieces in all
+    parts: dict[int, bytes]
 
 
 class ReportedFrame:
@@ -104,10 +114,11 @@ class Missions:
         self._own_id = own_id
         self._spacing = spacing
         self._team = min(ids, MAX_TEAM)
-        self._rejected: dict[int, int] = {}
-        """Checksum of the rejected mission with each key."""
+        self._deaf_until_s: dict[int, float] = {}
+        """Until when the pieces of each sender are ignored [s]."""
         self._encoded = encode_formation(formation)
-        self._pieces: dict[int, dict[int, bytes]] = {}
+        self._pieces: dict[int, _Pieces] = {}
+        """What has arrived from each sender."""
         self._path = path
         self._frame: Track | ReportedFrame = Track(path)
         self._resting: tuple[Frame, Pose] | None = None
@@ -128,33 +139,25 @@ class Missions:
         key = mission.key or version * KEYS_PER_VERSION + self._own_id
         self._adopt(key, mission.frame, mission.formation or self._encoded)
 
-    def receive(self, piece: Piece, now_s: float) -> None:
-        """Take a piece of a mission; with the last piece, fly it. Raises RejectedError."""
+    def receive(self, piece: Piece, sender: int, now_s: float) -> None:
+        """Take a piece of a mission; with the sender's last piece, fly it. Raises RejectedError."""
         if piece.key <= self.flown.key or piece.index >= piece.count:
+            return
+        if now_s < self._deaf_until_s.get(sender, 0.0):
             return
         if not is_plausible(piece.key, now_s):
             raise RejectedError("mission", f"no team can have had so many missions: {piece.key}")
-        parts = self._pieces.setdefault(piece.key, {})
-        parts[piece.index] = piece.data
-        if len(parts) >= piece.count:
-            del self._pieces[piece.key]
-            self._adopt_encoded(piece.key, b"".join(parts[k] for k in sorted(parts)))
-        while len(self._pieces) > MAX_RECEIVING:
-            del self._pieces[min(self._pieces)]
-
-    def _adopt_encoded(self, key: int, encoded: bytes) -> None:
-        """Fly a mission that has arrived in pieces, unless it is one that was rejected before."""
-        checksum = crc32(encoded)
-        if self._rejected.get(key) == checksum:
-            raise RejectedError("mission", "rejected before")
-        try:
+        collected = self._pieces.get(sender)
+        if collected is None or collected.key != piece.key or collected.number != piece.count:
+            collected = self._pieces[sender] = _Pieces(piece.key, piece.count, {})
+        collected.parts[piece.index] = piece.data
+        if len(collected.parts) == piece.count:
+            del self._pieces[sender]
+            self._deaf_until_s[sender] = now_s + DEAF_AFTER_REJECTION_S
+            encoded = b"".join(collected.parts[k] for k in sorted(collected.parts))
             data = decode(encoded, _MissionData, MAX_MISSION_B)
-            self._adopt(key, data.frame, data.formation)
-        except RejectedError:
-            self._rejected[key] = checksum
-            while len(self._rejected) > MAX_RECEIVING:
-                del self._rejected[min(self._rejected)]
-            raise
+            self._adopt(piece.key, data.frame, data.formation)
+            self._deaf_until_s[sender] = now_s + DEAF_S
 
     def pieces(self) -> list[Piece]:
         """Return the present mission in pieces, for neighbours that fly an older one."""

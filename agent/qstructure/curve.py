@@ -135,8 +135,8 @@ class ArcLengthCurve:
         """Add one piece, so short that the table may interpolate linearly within its halves."""
         if self._pieces >= self._effort.pieces:
             raise CurveError(
-                f"{self._lengths[-1]:.3g} m of it are measured in {self._pieces} steps, and no more"
-                " are allowed; it is too long, too slow or too tightly wound"
+                f"after {self._pieces} steps only {self._lengths[-1]:.3f} m of it are measured;"
+                " it is too long, too slow or too tightly wound"
             )
         start, fine = self._parameters[-1], self._lengths[-1] < self._effort.fine_m
         longest = PIECE_M if fine else LONG_PIECE_M

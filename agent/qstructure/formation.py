@@ -6,6 +6,7 @@ filled by a team of one size. The tables of a formation file are in ``formation_
 
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import product
 from math import dist, inf
 from typing import NamedTuple
 
@@ -298,13 +299,19 @@ def _without(places: Sequence[Place], blocked: frozenset[Place]) -> list[Place]:
 
 
 def _check_apart(layout: Layout, queues: tuple[Queue, ...], least_m: float) -> None:
-    placed = [(place, layout.slots[place].point) for place in layout.places]
-    for index, (place, point) in enumerate(placed):
-        for other, there in placed[:index]:
-            apart = dist(point, there)
-            if apart < least_m - 1e-9:
-                names = sorted({queues[place.queue].name, queues[other.queue].name})
-                raise FormationError(
-                    f"queue {' and '.join(map(repr, names))}",
-                    f"two of its slots are {apart:.3f} m apart; at least {least_m:g} m is required",
-                )
+    """Raise FormationError for two slots that are too near; only near ones are compared."""
+    cells: dict[tuple[int, int, int], list[Place]] = {}
+    for place in layout.places:
+        point = layout.slots[place].point
+        x, y, z = (int(each // least_m) for each in point)
+        for cell in product((x - 1, x, x + 1), (y - 1, y, y + 1), (z - 1, z, z + 1)):
+            for other in cells.get(cell, ()):
+                apart = dist(point, layout.slots[other].point)
+                if apart < least_m - 1e-9:
+                    names = sorted({queues[place.queue].name, queues[other.queue].name})
+                    raise FormationError(
+                        f"queue {' and '.join(map(repr, names))}",
+                        f"two of its slots are {apart:.3f} m apart; at least {least_m:g} m is"
+                        " required",
+                    )
+        cells.setdefault((x, y, z), []).append(place)

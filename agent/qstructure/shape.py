@@ -14,7 +14,7 @@ import msgspec
 from msgspec import Meta
 
 from agent.messages import ZERO, Metres, Vector
-from agent.qstructure.curve import FULL_EFFORT, ArcLengthCurve, CurveError, Effort
+from agent.qstructure.curve import FULL_EFFORT, PIECE_M, ArcLengthCurve, CurveError, Effort
 from agent.qstructure.expression import MAX_EXPRESSION_LENGTH, Expression, ExpressionError
 
 Triple = tuple[Metres, Metres, Metres]
@@ -151,12 +151,14 @@ class Straight:
         """Accept any s: straight pieces have neither poles nor jumps."""
 
 
-WORK = 1_000_000
+WORK = 2_500_000
 """Most work of measuring the curves of one formation, in evaluations of a node of an expression."""
 POINT_WORK = 12
 """Work for a point of a curve besides its expressions."""
 FINE_M = 20.0
 """The part of a formation's curves that is measured in short pieces [m]."""
+FINE_SHARE = 0.25
+"""Most of the pieces that these may take."""
 MIN_SAMPLES = 20
 
 
@@ -165,9 +167,10 @@ def effort_for(spec: ShapeSpec, curves: int) -> Effort:
     texts = (spec.x, spec.y, spec.z) if isinstance(spec, Curve) else ()
     point_work = POINT_WORK + sum(map(len, texts))
     points = WORK // (point_work * max(curves, 1))
+    pieces = min(points // 2, FULL_EFFORT.pieces)
     return Effort(
-        fine_m=FINE_M / max(curves, 1),
-        pieces=min(points // 2, FULL_EFFORT.pieces),
+        fine_m=min(FINE_M / max(curves, 1), FINE_SHARE * pieces * PIECE_M),
+        pieces=pieces,
         samples=min(max(points // 40, MIN_SAMPLES), FULL_EFFORT.samples),
     )
 

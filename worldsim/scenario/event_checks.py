@@ -19,7 +19,7 @@ from worldsim.scenario.faults import Join, Kill, Leave, Pause, Restart, Resume, 
 from worldsim.scenario.foreseen_fleet import FleetNow, ForeseenFleet
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.radio_checks import radio_problems
-from worldsim.scenario.rules import tilt_problem
+from worldsim.scenario.rules import start_problem, tilt_problem
 from worldsim.scenario.selectors import (
     AllAgents,
     OneAgent,
@@ -43,6 +43,9 @@ from worldsim.scenario.target_frame import (
 from worldsim.scenario.timeline import Step, steps
 from worldsim.scenario.toml import ScenarioError
 
+MAX_SLOTS_CHECKED = 50_000
+"""Most slots of all formations, each filled by all agents, that a timeline may ask to check."""
+
 
 class FormationSource(NamedTuple):
     """Where the keys of a formation are, for error messages."""
@@ -63,6 +66,13 @@ def check_timeline(scenario: Scenario, file: Path, sources: dict[int, FormationS
             raise _error(file, index, problem)
     if scenario.rows > MAX_AGENTS:
         raise ScenarioError(file, "event", f"{scenario.rows} agents in all; at most {MAX_AGENTS}")
+    layouts = sum(event.formation is not None or event.joiners > 0 for event in scenario.event)
+    if layouts * scenario.rows > MAX_SLOTS_CHECKED:
+        detail = (
+            f"{layouts} events change what {scenario.rows} agents form;"
+            f" at most {MAX_SLOTS_CHECKED // scenario.rows} for so many"
+        )
+        raise ScenarioError(file, "event", detail)
     checks = EventChecks(scenario, ForeseenFleet(scenario))
     for step in steps(scenario):
         try:
@@ -205,6 +215,9 @@ class EventChecks:
                 if spacing_m < least_m:
                     detail = f"{spacing_m:g}; at least control.separation_m = {least_m:g}"
                     yield Problem("join.start.spacing_m", detail)
+                outside = start_problem(join.start)
+                if outside is not None:
+                    yield outside.within("join.start")
             case _:
                 assert_never(join.start)
         formation = self.fleet.formation

@@ -19,7 +19,8 @@ from worldsim.scenario.start import BoxStart, Degrees, Extent, ListStart
 
 MAX_OBSTACLES = 1000
 MAX_TRIES = 2000
-"""Draws for one obstacle of a field; when all fail, the box has no room for it."""
+"""Draws for a field, besides TRIES_EACH for each obstacle, after which its box counts as full."""
+TRIES_EACH = 20
 FIELD_KEY = 0xF1E1D
 """Separates the draws of a field from other draws with the same seed."""
 
@@ -124,12 +125,13 @@ def draw_obstacles(
     """Yield a field's obstacles; fewer than it asks for where the box has no room for more."""
     generator = np.random.Generator(np.random.Philox(key=[seed, FIELD_KEY]))
     placed: list[_Placement] = []
-    for _ in range(field.total):
-        found = _draw(field, start, placed, generator)
-        if found is None:
+    for _ in range(MAX_TRIES + TRIES_EACH * field.total):
+        if len(placed) == field.total:
             return
-        placed.append(found)
-        yield _shaped(field, found)
+        found = _draw(field, generator)
+        if _has_room(field, start, placed, found):
+            placed.append(found)
+            yield _shaped(field, found)
 
 
 def field_problem(field: ObstacleField) -> Problem | None:
@@ -192,21 +194,12 @@ def _path_length_m(waypoints: Sequence[Vector]) -> float:
     return sum(dist(here, there) for here, there in pairwise(waypoints))
 
 
-def _draw(
-    field: ObstacleField,
-    start: BoxStart | ListStart,
-    placed: Sequence[_Placement],
-    generator: np.random.Generator,
-) -> _Placement | None:
-    """Return an obstacle with room around it; None where no draw finds any."""
+def _draw(field: ObstacleField, generator: np.random.Generator) -> _Placement:
+    """Draw an obstacle in a field, whether or not there is room around it."""
     least, largest = field.radius_m
-    for _ in range(MAX_TRIES):
-        *share, radius_share = generator.random(4).tolist()
-        centre = _centre_at(field, (share[0], share[1], share[2]))
-        placement = _Placement(centre, radius=least + (largest - least) * radius_share)
-        if _has_room(field, start, placed, placement):
-            return placement
-    return None
+    *share, radius_share = generator.random(4).tolist()
+    centre = _centre_at(field, (share[0], share[1], share[2]))
+    return _Placement(centre, radius=least + (largest - least) * radius_share)
 
 
 def _centre_at(field: ObstacleField, share: Vector) -> Vector:

@@ -9,7 +9,8 @@ from math import ceil, degrees, dist, hypot
 from pathlib import Path
 from typing import assert_never
 
-from agent.messages import Position
+from agent.config import LEAST
+from agent.messages import FLIGHT_M, Position
 from agent.qstructure.formation import Formation, formation_of
 from agent.qstructure.frame_path import tip_speed
 from worldsim.scenario.obstacle_tables import obstacle_problem
@@ -122,6 +123,26 @@ def _listed_too_close(positions_m: Sequence[Position], separation: float) -> Pro
     return None
 
 
+def _starts_inside(scenario: Scenario) -> Problem | None:
+    problem = start_problem(scenario.fleet.start)
+    return problem.within("fleet.start") if problem is not None else None
+
+
+def start_problem(start: BoxStart | ListStart) -> Problem | None:
+    """Return the problem of a start box that sticks out of the world."""
+    match start:
+        case ListStart():
+            return None
+        case BoxStart():
+            for axis, (centre, size) in enumerate(zip(start.centre_m, start.size_m, strict=True)):
+                if abs(centre) + 0.5 * size > FLIGHT_M:
+                    detail = f"the box reaches beyond {FLIGHT_M:g} m, the edge of the world"
+                    return Problem(f"centre_m[{axis}]", detail)
+            return None
+        case _:
+            assert_never(start)
+
+
 def _start_for_each_agent(scenario: Scenario) -> Problem | None:
     start = scenario.fleet.start
     match start:
@@ -188,6 +209,8 @@ def _rates_up_to_tick_rate(scenario: Scenario) -> Problem | None:
     for name, rate in (("local_hz", comms.local_hz), ("multihop_hz", comms.multihop_hz)):
         if rate > tick_hz:
             return Problem(f"comms.{name}", f"{rate:g}; at most fleet.tick_hz = {tick_hz:g}")
+        if 0.0 < rate < LEAST:
+            return Problem(f"comms.{name}", f"{rate:g}; at least {LEAST:g}, or 0 for off")
     return None
 
 
@@ -266,9 +289,12 @@ def _formation_radius_m(scenario: Scenario) -> float:
 
 def _laser_rings_apart(scenario: Scenario) -> Problem | None:
     laser = scenario.sensor.laser
-    if laser.rings == 1 or laser.elevation_deg > 0.0:
+    if laser.rings == 1 or laser.elevation_deg >= LEAST:
         return None
-    detail = f"{laser.rings} rings need elevation_deg above 0; without it a laser has one ring"
+    detail = (
+        f"{laser.rings} rings need elevation_deg of at least {LEAST:g};"
+        " without it a laser has one ring"
+    )
     return Problem("sensor.laser.rings", detail)
 
 
@@ -277,6 +303,7 @@ RULES = (
     _at_least_one_tick,
     _spacing_leaves_equilibrium,
     _start_for_each_agent,
+    _starts_inside,
     _starts_separated,
     _known_agents,
     _known_links,

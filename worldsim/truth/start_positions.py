@@ -10,7 +10,8 @@ from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats, Poses
 
 MAX_DRAWS = 10_000
-"""Draws for one vehicle, after which its box counts as full."""
+"""Draws for the vehicles of a box, besides DRAWS_EACH for each, after which it counts as full."""
+DRAWS_EACH = 20
 KEY_SALT = 0x57A27
 NO_VEHICLES: Floats = np.empty((0, 3))
 
@@ -94,15 +95,15 @@ def _drawn(
     centre, size = np.array(start.centre_m), np.array(start.size_m)
     present = clearance.vehicles
     placed = np.concatenate((present, np.empty((agents, 3))))
-    for row in range(len(present), len(placed)):
-        for _ in range(MAX_DRAWS):
-            placed[row] = centre + size * (generator.random(3) - 0.5)
-            apart = _apart(placed[:row] - placed[row], start.spacing_m)
-            if apart and clearance.obstacle_near(placed[row]) is None:
-                break
-        else:
-            raise StartError(_box_is_full(start, agents, clearance))
-    return placed[len(present) :]
+    row = len(present)
+    for _ in range(MAX_DRAWS + DRAWS_EACH * agents):
+        if row == len(placed):
+            return placed[len(present) :]
+        placed[row] = centre + size * (generator.random(3) - 0.5)
+        apart = _apart(placed[:row] - placed[row], start.spacing_m)
+        if apart and clearance.obstacle_near(placed[row]) is None:
+            row += 1
+    raise StartError(_box_is_full(start, agents, clearance))
 
 
 def _box_is_full(start: BoxStart, agents: int, clearance: Clearance) -> str:
