@@ -30,6 +30,8 @@ UNEVEN_M = 3e-4
 LEAST_STEP = 1e-10
 GREATEST_STEP = 0.5
 """Bounds of a piece's step in the curve's own parameter."""
+GREATEST_SHARE = 0.01
+"""After the first metres, a step may also be so large a share of the parameter."""
 STANDSTILL_STEPS = 2000
 STANDSTILL_M = 1e-6
 JUMP_M = 0.02
@@ -161,7 +163,8 @@ class ArcLengthCurve:
         self._pieces += 1
         self._here = end
         if piece < 0.4 * longest:
-            self._step = min(2.0 * step, GREATEST_STEP) if step == self._step else self._step
+            greatest = GREATEST_STEP if fine else max(GREATEST_STEP, GREATEST_SHARE * start)
+            self._step = min(2.0 * step, greatest) if step == self._step else self._step
         self._check_progress()
 
     def _append(self, parameter: float, length_m: float) -> None:

@@ -78,7 +78,10 @@ def _queue(
     try:
         shape = shape_of(table.shape, curves) if table.shape is not None else Straight(through)
         orientation = Orientation(table.orientation) if table.orientation is not None else None
-        return Queue(table.name, through, shape, spacing, orientation, steps)
+        queue = Queue(table.name, through, shape, spacing, orientation, steps)
+        if not queue.closed:
+            queue.point(queue.behind(1))  # it has room for one member at least
+        return queue
     except (ShapeError, OrientationError, QueueError) as error:
         part = {ShapeError: "shape", OrientationError: "orientation"}.get(type(error))
         key = ".".join(each for each in (part, error.key) if each)

@@ -1,5 +1,6 @@
 """Requests of an operator: carried out and reported, or rejected with a reason."""
 
+import re
 from math import inf, nan
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,15 @@ DEPLOY = Path("deploy")
 WEDGE = DEPLOY / "scenarios/wedge-9.toml"
 LINES = formation_tables(DEPLOY / "formations/three-horizontal-lines.toml")
 JOINED = "[{ at_s = 15, join = 1 }]"
+RAY = {"kind": "ray", "direction": [-1, 0, 0]}
+
+
+def queue_of(
+    through: list[str], shape: dict[str, Any] | None = None, **vertices: list[float]
+) -> dict[str, Any]:
+    """Return the tables of a formation of one queue."""
+    queue = {"name": "Q", "vertices": through} | ({"shape": shape} if shape else {})
+    return {"name": "f", "vertices": vertices or {"A": [0, 0, 0]}, "queue": [queue]}
 
 
 class OperatedFleet:
@@ -146,6 +156,28 @@ REJECTED = [
     ({"formation": {**LINES, "vertices": {"V1": [0, 0, 0]}}}, "formation."),
     ({"frame": {"yaw_deg": 9}, "to": 9}, "to: no agent 9; 0 to 8"),
     ({"frame": {"yaw_deg": 9}, "version": 0}, "version: 0; above 0"),
+    (
+        {"frame": {"yaw_deg": 9}, "version": 2**31},
+        "version: 2147483648; above 0 is allowed, up to 1010 by now",
+    ),
+    (
+        {"formation": queue_of(["A", "B"], A=[0, 0, 0], B=[0, 0, 0])},
+        "formation.queue 'Q', vertices: 'A' and 'B' are 0 m apart",
+    ),
+    (
+        {"formation": queue_of(["A"], {"kind": "curve", "x": "1/s", "y": "0", "z": "0"})},
+        "formation.queue 'Q', shape: '1/s' at s = 0",
+    ),
+    (
+        {"formation": queue_of(["A"], {"kind": "curve", "x": "s*1e-7", "y": "0", "z": "0"})},
+        "formation.queue 'Q', shape: after ",
+    ),
+    ({"formation": queue_of(["A"], RAY, A=[1e6, 0, 0])}, "formation: with up to 9 agents its"),
+    (
+        {"formation": {**queue_of(["A"], RAY), "vertices": {"A": [2e6, 0, 0]}}},
+        "formation.vertices.A[0]: got 2000000",
+    ),
+    ({"frame": {"waypoints_m": [[1e6, 1e6, 0]]}}, "frame.waypoints_m[0][0]: got 1000000"),
     ({"kill": [1], "to": 2}, "kill: to and version go with a mission only"),
     ({"kill": [1], "leave": [2]}, "leave: not beside kill"),
     ({"heal": True, "for_s": 3}, "for_s: heal is not undone"),
@@ -167,6 +199,25 @@ def test_an_invalid_request_is_rejected_and_changes_nothing(
     assert fleet.ask() == radio
     assert radio.faults == ()
     assert fleet.loop.members.running.all()
+
+
+def test_a_fleet_flies_on_after_missions_that_cannot_be_flown() -> None:
+    fleet = OperatedFleet()
+    for keys, reason in REJECTED:
+        if "formation" in keys or "frame" in keys:
+            with pytest.raises(RequestError, match=re.escape(reason)):
+                fleet.ask(**keys)
+    fleet.ask(formation=queue_of(["A"], {"kind": "spline", "points_m": [[0] * 3, [1e6, 0, 0]]}))
+    fleet.fly(3.0)
+    assert all(each is not None and each.telemetry.mission for each in fleet.loop.world.latest)
+
+
+def test_an_invented_mission_key_does_not_end_the_numbering() -> None:
+    fleet = OperatedFleet(3.0)
+    fleet.loop.effects.missions.report(8, 2**53 - 1, fleet.loop.world.time_s)
+    (given,) = fleet.ask(frame={"yaw_deg": 90}).events
+    assert isinstance(given, FrameGiven)
+    assert given.mission == 2**16
 
 
 def test_an_older_mission_version_is_rejected() -> None:

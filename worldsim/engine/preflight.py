@@ -8,13 +8,14 @@ from pathlib import Path
 
 from agent.controller import ControllerError
 from agent.controller import load as load_controller
-from worldsim.scenario.faults import ProcessFault
+from worldsim.scenario.faults import Join, ProcessFault
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.rules import speed_problem
+from worldsim.scenario.start import BoxStart
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
 from worldsim.truth.obstacles import Obstacles
-from worldsim.truth.start_positions import StartError, start_poses_of
+from worldsim.truth.start_positions import StartError, clearance_of, start_poses, start_poses_of
 
 VIRTUAL_COMMAND_TICKS = 1
 """Lifetime of a command in virtual time and in lockstep, where none is late [ticks]."""
@@ -33,6 +34,7 @@ def admit(scenario: Scenario, file: str | Path, command_ticks: int, by_hand: boo
         or (_launcher(scenario) if by_hand else None)
         or _controller(scenario)
         or _room(scenario)
+        or _joining_room(scenario)
     )
     if problem is not None:
         raise ScenarioError(file, *problem)
@@ -67,4 +69,19 @@ def _room(scenario: Scenario) -> Problem | None:
         start_poses_of(scenario, Obstacles(scenario.obstacle))
     except StartError as error:
         return Problem("fleet.start", str(error))
+    return None
+
+
+def _joining_room(scenario: Scenario) -> Problem | None:
+    """Return a problem for the first join that has no room even in a world without vehicles."""
+    obstacles = Obstacles(scenario.obstacle)
+    for index, event in enumerate(scenario.event):
+        join = event.action
+        if not isinstance(join, Join) or not isinstance(join.start, BoxStart):
+            continue
+        clearance = clearance_of(scenario, obstacles, event.at_s)
+        try:
+            start_poses(join.start, join.count, scenario.seed, clearance, event=index + 1)
+        except StartError as error:
+            return Problem(f"event[{index}].join.start", str(error))
     return None

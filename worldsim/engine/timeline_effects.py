@@ -26,6 +26,7 @@ from worldsim.engine.selection import Claims
 from worldsim.judge.event import By
 from worldsim.judge.radio_events import applied
 from worldsim.judge.run_events import (
+    NOBODY_TO_RESTART,
     FormationGiven,
     FrameGiven,
     Joined,
@@ -190,7 +191,7 @@ class TimelineEffects:
                 event(t_s=self._t_s, agent=agent, planned=True, by=by, incarnation=incarnation)
             )
         if not operation.incarnations:
-            refused = operation.refused or "no agent to restart"
+            refused = operation.refused or NOBODY_TO_RESTART
             self._emit(event(t_s=self._t_s, agent=None, planned=True, by=by, refused=refused))
 
     def _set_sensors(self, operation: SetSensorMode, by: By) -> None:

@@ -41,6 +41,9 @@ class Resumed(ProcessEvent, frozen=True, tag="resume"):
     """An agent's stopped process continued."""
 
 
+NOBODY_TO_RESTART = "no agent to restart"
+
+
 class StartEvent(PlannedEvent, frozen=True, kw_only=True):
     """An agent's process started; without an agent where the start was refused."""
 

@@ -22,6 +22,7 @@ from worldsim.judge.queue_convergence import QueueConvergence
 from worldsim.judge.radio_events import RadioRunEvent
 from worldsim.judge.recovery import Recoveries, Recovery
 from worldsim.judge.run_events import (
+    NOBODY_TO_RESTART,
     FormationGiven,
     FrameGiven,
     Joined,
@@ -85,6 +86,7 @@ class Judge:
         self.queues = [QueueConvergence(self.phases[0])]
         self._hovering = HoveringVehicles(scenario.control.spacing_m)
         self._recoveries = Recoveries(self._hovering)
+        self._without_room: list[Restarted | Joined] = []
         converges = scenario.expect.converge
         self._allocation = Invariants(scenario, self._hovering) if converges else None
         self.min_separation_m: float | None = None
@@ -115,6 +117,8 @@ class Judge:
                 self._open_phase(event)
             case Restarted() | Joined():
                 self._recoveries.handle_event(event)
+                if event.refused not in (None, NOBODY_TO_RESTART):
+                    self._without_room.append(event)
             case Killed() | Left() | Paused() | Resumed():
                 if event.nobody is None:
                     self._recoveries.handle_event(event)
@@ -177,7 +181,7 @@ class Judge:
             rows += [self._converged(phase) for phase in self.phases]
         if expect.reform_within_s is not None:
             rows.append(self._reformed(expect.reform_within_s))
-        return rows
+        return [*rows, *map(_started, self._without_room)]
 
     def invariants(self) -> dict[str, InvariantTally]:
         """Return the tally of each invariant.
@@ -238,3 +242,9 @@ class Judge:
         if self.min_separation_m is None or least < self.min_separation_m:
             self.min_separation_m = least
         return least < self._scenario.control.separation_m
+
+
+def _started(event: Restarted | Joined) -> Expectation:
+    """Return the expectation that a start without room does not meet: that agents start."""
+    name = f"{event.kind} at {event.t_s:g} s"
+    return Expectation(name=name, wanted=None, got=None, held=False)

@@ -5,6 +5,8 @@ from typing import Any, NamedTuple, TypedDict
 
 CONVERGE = "converge "
 """An expectation's name begins so where it is about a formation; the formation's name follows."""
+STARTS = ("join at ", "restart at ")
+"""An expectation's name begins so where agents were to start and found no room."""
 MAX_NAMED = 4
 """A change of more agents is described by their number."""
 
@@ -93,6 +95,8 @@ def _other(row: ExpectationRow, run: Circumstances) -> str:
             return f"{what}: {measured} (required >= {wanted:g} m)"
         case "reform_within_s":
             return _reform(row, run)
+    if wanted is None and name.startswith(STARTS):
+        return f"{name}: there was no room, so no agent started"
     return f"{name}: {got} (required {wanted})"
 
 

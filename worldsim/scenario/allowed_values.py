@@ -1,6 +1,7 @@
 """Error texts: what a type allows, and what was found instead."""
 
 from collections.abc import Iterable
+from datetime import date, time
 from typing import Annotated, Any
 
 from msgspec import Meta, inspect
@@ -36,6 +37,8 @@ def got(value: Any) -> str:
         return f"got {str(value).lower()}"
     if isinstance(value, str):
         return f"got the text {_short(repr(value))}"
+    if isinstance(value, date | time):
+        return f"got the date or time {value}, which is text only in quotes"
     if isinstance(value, dict):
         return "got a table"
     if isinstance(value, list):

@@ -13,6 +13,7 @@ from agent.config import LEAST
 from agent.messages import FLIGHT_M, Position
 from agent.qstructure.formation import Formation, formation_of
 from agent.qstructure.frame_path import tip_speed
+from worldsim.scenario.idle_keys import idle_keys
 from worldsim.scenario.obstacle_tables import obstacle_problem
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.start import BoxStart, ListStart
@@ -36,7 +37,7 @@ def check_rules(scenario: Scenario, file: str | Path) -> None:
 def warnings_for(scenario: Scenario) -> list[Problem]:
     """Return what a scenario is allowed to ask for but should not."""
     found = (warning(scenario) for warning in WARNINGS)
-    return [problem for problem in found if problem is not None]
+    return [*(problem for problem in found if problem is not None), *idle_keys(scenario)]
 
 
 def speed_problem(scenario: Scenario, command_ticks: int) -> Problem | None:

@@ -24,13 +24,16 @@ class ScenarioError(ValueError):
 
 
 def read(path: Path) -> str:
-    """Return a file's text. Raises ScenarioError: no such file, too large, not UTF-8."""
+    """Return a file's text, without a byte order mark.
+
+    Raises ScenarioError: no such file, too large, not UTF-8.
+    """
     try:
         with path.open("rb") as file:
             raw = file.read(MAX_FILE_B + 1)
         if len(raw) > MAX_FILE_B:
             raise ScenarioError(path, "", f"too large; at most {MAX_FILE_B} bytes are allowed")
-        return raw.decode()
+        return raw.decode("utf-8-sig")
     except FileNotFoundError:
         raise ScenarioError(path, "", "no such file") from None
     except UnicodeDecodeError as error:

@@ -1,7 +1,10 @@
 """Formations that cannot be flown are rejected, with the queue's name and the key."""
 
+from time import process_time
+
 import pytest
 
+from agent.messages import Place
 from agent.qstructure.formation import Formation, FormationError, FormationSpec, QueueSpec
 from agent.qstructure.orientation import OrientationSpec
 from agent.qstructure.shape import Arc, Curve, Polyline, Ray
@@ -116,3 +119,53 @@ SOUND = {
 @pytest.mark.parametrize("queue", SOUND.values(), ids=SOUND)
 def test_a_queue_that_can_be_flown_is_not_rejected(queue):
     checked(queue)
+
+
+GROWN = {
+    "a pole": curve("s", "1/(3.5-s)"),
+    "a curve that ends": curve("s", "sqrt(3.5-s)"),
+    "a yaw that is no number": oriented(yaw_deg="sqrt(3.5-d)"),
+    "a pitch that no vehicle has": oriented(pitch_deg="30*d"),
+}
+
+
+@pytest.mark.parametrize("queue", GROWN.values(), ids=GROWN)
+def test_a_team_that_grows_past_a_queues_end_meets_no_exception(queue):
+    vertices = {"V1": VERTICES["V1"]}
+    formation = Formation(FormationSpec("f", vertices, (queue,)), 1.0)
+    formation.check(3, LEAST_M)
+    for agents in range(12):
+        layout = formation.layout(agents, frozenset({Place(0, 1)}))
+        assert set(layout.places) == set(layout.slots)
+        assert len(layout.places) + layout.unplaced == agents
+        formation.slot(Place(0, agents), agents)
+    with pytest.raises(FormationError):
+        formation.check(12, LEAST_M)
+
+
+def test_places_that_no_queue_has_are_not_followed():
+    formation = Formation(FormationSpec("f", {"V1": VERTICES["V1"]}, (curve("2*s"),)), 1.0)
+    assert formation.slot(Place(0, 2**15 - 1), 3) is None
+    assert formation.slot(Place(7, 1), 3) is None
+
+
+def test_work_is_shared_by_the_queues_of_a_formation():
+    queues = tuple(QueueSpec(f"Q{k}", (f"V{k}",), Curve("s", "0.1*sin(s)", "0")) for k in range(64))
+    vertices = {f"V{k}": (0.0, 3.0 * k, 0.0) for k in range(64)}
+    began = process_time()
+    Formation(FormationSpec("f", vertices, queues), 1.0).check(640, LEAST_M)
+    assert process_time() - began < 3.0
+
+
+def test_closed_queues_pass_through_a_limited_number_of_vertices():
+    names = tuple(f"V{k}" for k in range(64))
+    queues = tuple(QueueSpec(f"Q{k}", names) for k in range(64))
+    vertices = {name: (5.0 * k, 0.0, 0.0) for k, name in enumerate(names)}
+    with pytest.raises(FormationError, match="4096 vertices in all; at most 256"):
+        Formation(FormationSpec("f", vertices, queues), 1.0)
+
+
+def test_coincident_vertices_of_a_closed_queue_are_named():
+    with pytest.raises(FormationError, match="'V1' and 'V3' are 0 m apart") as rejected:
+        checked(QueueSpec("bent", ("V1", "V3")), vertices={**VERTICES, "V3": (0.0, 0.0, 0.0)})
+    assert rejected.value.key == "queue 'bent', vertices"

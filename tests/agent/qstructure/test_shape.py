@@ -2,12 +2,13 @@
 
 from itertools import pairwise
 from math import cos, dist, pi, sin
+from time import process_time
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agent.qstructure.curve import CurveError
+from agent.qstructure.curve import ArcLengthCurve, CurveError
 from agent.qstructure.expression import ExpressionError
 from agent.qstructure.shape import (
     Arc,
@@ -162,3 +163,71 @@ WITHOUT_AN_END = {
 def test_a_curve_that_cannot_be_followed_is_an_error(texts):
     with pytest.raises((CurveError, ExpressionError)):
         shape_of(Curve(*texts)).check(5.0)
+
+
+EXACT = {
+    "a circle": (
+        Curve("2*cos(s)", "2*sin(s)", "0"),
+        lambda d: (2 * cos(d / 2) - 2, 2 * sin(d / 2)),
+    ),
+    "a large circle, quicker and quicker": (
+        Curve("90*cos(s**2)", "90*sin(s**2)", "0"),
+        lambda d: (90 * cos(d / 90) - 90, 90 * sin(d / 90)),
+    ),
+    "an arc": (Arc(1e4, 360.0, 90.0), lambda d: (1e4 * cos(d / 1e4) - 1e4, 1e4 * sin(d / 1e4))),
+    "a line, slower and slower": (Curve("sqrt(s)", "0", "0"), lambda d: (d, 0.0)),
+}
+
+
+@pytest.mark.parametrize(("spec", "at"), EXACT.values(), ids=EXACT)
+def test_arc_lengths_are_exact_to_a_millimetre_far_out(spec, at):
+    shape = shape_of(spec)
+    for far_m in (0.5, 19.9, 20.1, 77.7, 500.0, 1999.0):
+        assert dist(shape.point(far_m), (*at(far_m), 0.0)) < WITHIN_M
+
+
+def test_a_curve_is_measured_only_as_far_as_it_is_asked_for():
+    evaluated = []
+
+    def at(parameter):
+        evaluated.append(parameter)
+        return (parameter, 0.0, 0.0)
+
+    curve = ArcLengthCurve(at)
+    curve.point(1.0)
+    assert len(evaluated) < 1000
+    assert max(evaluated) < 1.1
+    few = len(evaluated)
+    curve.point(1000.0)
+    assert len(evaluated) < few + 40_000
+
+
+ENDLESS_WORK = {
+    "slow": Curve("s*1e-7", "0", "0"),
+    "tightly wound": Helix(0.001, 0.0),
+    "very long": Curve("2*cos(s)", "2*sin(s)", "s"),
+    "a long text": Curve("s+0*" + "*".join(["sin(s)"] * 40), "0", "0"),
+}
+
+
+@pytest.mark.parametrize("spec", ENDLESS_WORK.values(), ids=ENDLESS_WORK)
+def test_measuring_comes_to_an_end(spec):
+    began = process_time()
+    with pytest.raises(CurveError, match="too long, too slow or too tightly wound"):
+        shape_of(spec).point(1e6)
+    assert process_time() - began < 3.0
+
+
+@pytest.mark.parametrize(
+    ("spec", "key"),
+    [
+        (Arc(0.001, 1e-3), "sweep_deg"),
+        (Spline(((0.0, 0.0, 0.0), (0.0, 0.0, 5e-5))), "points_m"),
+        (Polyline(((0.0, 0.0, 0.0), (1e-320, 0.0, 0.0))), "points_m"),
+    ],
+    ids=["arc", "spline", "polyline"],
+)
+def test_a_shape_too_small_for_a_direction_is_rejected_by_its_key(spec, key):
+    with pytest.raises(ShapeError) as rejected:
+        shape_of(spec)
+    assert rejected.value.key == key
