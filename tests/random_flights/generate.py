@@ -1,0 +1,166 @@
+"""A random scenario of all kinds, as a pure function of a base seed and a number.
+
+``qswarm check`` judges each draft. Where it refuses or warns, the key or table that it names is
+left out, and it judges the rest; a draft that does not get through so is drawn anew.
+"""
+
+import re
+import tempfile
+from collections import Counter
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+from time import process_time
+from typing import Any, NamedTuple
+
+from tests.random_flights.draws import Draw, Tables
+from tests.random_flights.fleets import (
+    agents_that_differ,
+    comms,
+    control,
+    fleet,
+    sensor,
+    vehicle,
+)
+from tests.random_flights.formations import formation
+from tests.random_flights.radios import conditions
+from tests.random_flights.surroundings import field, frame, obstacles
+from tests.random_flights.timelines import Timeline
+from worldsim.commands.app import command
+from worldsim.scenario.file import as_toml
+
+STEPS = 5_000
+"""Steps of all agents together in a flight: so many take one or two seconds."""
+MAX_AGENTS = 24
+LONGEST_S = 60.0
+DRAFTS = 200
+REPAIRS = 12
+NAMED = re.compile(r"^.*?\.toml: (?P<key>[\w.\[\]]+): ", re.DOTALL)
+PART = re.compile(r"(\w+)(?:\[(\d+)\])?")
+NEEDED = ("fleet", "formation", "control", "vehicle", "duration_s")
+"""Tables and keys that no repair leaves out as a whole."""
+
+
+class Generated(NamedTuple):
+    """A scenario that ``check`` accepts without a warning, and how it came about."""
+
+    text: str
+    drafts: int
+    """How many were drawn until one got through."""
+    objections: Counter[str]
+    """The keys that ``check`` named on the way, without their indices."""
+    check_s: float = 0.0
+    """CPU time of the check that accepted it [s]."""
+
+
+def scenario(base: int, number: int, steps: int = STEPS) -> Generated:
+    """Return the scenario of a base and a number. Raises LookupError where no draft gets through.
+
+    steps: of all agents together, which bounds the length of the flight.
+    """
+    objections = Counter[str]()
+    for attempt in range(DRAFTS):
+        tables = draft(Draw(base, number, attempt), steps)
+        tables["name"] = f"random-{base}-{number}"
+        text = accepted(tables, objections)
+        if text is not None:
+            begun = process_time()
+            assert objection(text) == "", "check says now one thing, now another"
+            return Generated(text, attempt + 1, objections, process_time() - begun)
+    raise LookupError(f"no draft of {base}/{number} gets through: {objections.most_common(5)}")
+
+
+def draft(draw: Draw, steps: int) -> Tables:
+    """Return the tables of a scenario which ``check`` may still refuse."""
+    agents = draw.among((1, 2, 3, draw.whole(2, 9), draw.whole(4, 16), draw.whole(1, MAX_AGENTS)))
+    made: Tables = {"seed": draw.whole(0, 2**31), "control": control(draw)}
+    separation, spacing = made["control"]["separation_m"], made["control"]["spacing_m"]
+    made["fleet"] = fleet(draw, agents, separation)
+    tick_hz = made["fleet"]["tick_hz"]
+    made["duration_s"] = duration(draw, steps / (agents * tick_hz))
+    made["formation"] = formation(draw, agents, spacing, separation + 0.25)
+    made["vehicle"] = vehicle(draw, tick_hz)
+    made["agent"] = agents_that_differ(draw, agents, tick_hz)
+    made["sensor"] = sensor(draw)
+    made["comms"] = comms(draw, tick_hz)
+    made["netem"] = conditions(draw, agents, spacing)
+    about = centre(made["fleet"]["start"])
+    slowest = slowest_speed(made)
+    made["frame"] = frame(draw, slowest, about)
+    if draw.chance(0.5):
+        made["obstacle"] = obstacles(draw, slowest, about)
+    if draw.chance(0.15):
+        made["obstacle_field"] = field(draw, about)
+    made["event"] = Timeline(draw, made, slowest).events()
+    made["expect"] = expectations(draw, made)
+    return made
+
+
+def duration(draw: Draw, longest_s: float) -> float:
+    longest = min(LONGEST_S, longest_s)
+    return draw.number(0.5 * longest, longest, 1) if longest > 1.0 else round(longest + 0.1, 1)
+
+
+def centre(start: Tables) -> list[float]:
+    if start["kind"] == "box":
+        return list(start["centre_m"])
+    places = start["positions_m"]
+    return [round(sum(axis) / len(places), 2) for axis in zip(*places, strict=True)]
+
+
+def slowest_speed(made: Tables) -> float:
+    changes = [each["vehicle"].get("max_speed_mps") for each in made["agent"]]
+    return min(each for each in (made["vehicle"]["max_speed_mps"], *changes) if each is not None)
+
+
+def expectations(draw: Draw, made: Tables) -> Tables:
+    table: Tables = {"converge": made["control"].get("controller") != "flocking"}
+    if draw.chance(0.3):
+        table["converge_within_s"] = draw.number(1.0, made["duration_s"], 1)
+    if draw.chance(0.2):
+        table["reform_within_s"] = draw.number(1.0, 30.0, 1)
+    return table
+
+
+def accepted(tables: Tables, objections: Counter[str]) -> str | None:
+    """Return the text that ``check`` accepts without a word; None where repairs do not help."""
+    for _ in range(REPAIRS):
+        text = as_toml(tables)
+        said = objection(text)
+        if not said:
+            return text
+        named = NAMED.match(said)
+        key = named["key"] if named else "another key"
+        objections[re.sub(r"\[\d+\]", "", key)] += 1
+        if not without(tables, key):
+            return None
+    return None
+
+
+def objection(text: str) -> str:
+    """Return the errors and warnings of ``qswarm check`` about a scenario; empty: it accepts."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "random.toml"
+        file.write_text(text, encoding="utf-8")
+        said = StringIO()
+        with redirect_stderr(said), redirect_stdout(StringIO()):
+            status = command(["check", str(file)])
+    return said.getvalue() or ("refused without a word" if status else "")
+
+
+def without(tables: Tables, key: str) -> bool:
+    """Leave out a key, or the event, obstacle, link or table of its list; whether there was one."""
+    inner: Any = tables
+    for name, index in PART.findall(key):
+        if not isinstance(inner, dict) or name not in inner:
+            return False
+        if index:
+            del inner[name][int(index)]
+            return True
+        if not isinstance(inner[name], dict):
+            if inner is tables and name in NEEDED:
+                return False
+            del inner[name]
+            return True
+        inner = inner[name]
+    return False

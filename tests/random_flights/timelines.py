@@ -1,0 +1,111 @@
+"""Random timelines: events of every kind, many of them at the same times and over each other."""
+
+from collections.abc import Callable
+
+from tests.random_flights.draws import Draw, Tables
+from tests.random_flights.fleets import lattice
+from tests.random_flights.formations import formation
+from tests.random_flights.radios import fault
+from tests.random_flights.surroundings import moving
+
+MODES = ("stuck", "silent", "wrong")
+
+
+class Timeline:
+    """Draws the events of one scenario, whose other tables are given."""
+
+    def __init__(self, draw: Draw, scenario: Tables, slowest: float) -> None:
+        self._draw = draw
+        self._scenario = scenario
+        self._slowest = slowest
+        self._agents = scenario["fleet"]["agents"]
+        self._sensors = sorted({*scenario["vehicle"]["sensors"]})
+        self._times: list[float] = []
+
+    def events(self) -> list[Tables]:
+        count = self._draw.among((0, 1, 2, 4, 8))
+        return [self._event() for _ in range(count)]
+
+    def _event(self) -> Tables:
+        draw = self._draw
+        kinds: list[tuple[int, Callable[[], Tables]]] = [
+            (5, self._process),
+            (2, lambda: {"join": self._join()}),
+            (6, lambda: fault(draw, self._agents, self._spacing)),
+            (2, lambda: {"formation": self._formation()}),
+            (2, lambda: {"frame": self._frame()}),
+            (2, lambda: {"sensor": self._sensor()}),
+        ]
+        makers = [maker for weight, maker in kinds for _ in range(weight)]
+        made = draw.among(makers)()
+        event: Tables = {"at_s": self._time(), **made}
+        if draw.chance(0.6) and not event.keys() & {"join", "formation", "frame", "heal"}:
+            event["for_s"] = self._lasting(event["at_s"])
+        return event
+
+    @property
+    def _spacing(self) -> float:
+        spacing: float = self._scenario["control"]["spacing_m"]
+        return spacing
+
+    def _time(self) -> float:
+        """Return a time of one decimal; some are when another event begins or ends."""
+        if self._times and self._draw.chance(0.3):
+            return self._draw.among(self._times)
+        found = self._draw.number(0.0, 0.9 * self._scenario["duration_s"], 1)
+        self._times.append(found)
+        return found
+
+    def _lasting(self, at_s: float) -> float:
+        found = max(0.1, self._draw.number(0.1, 0.5 * self._scenario["duration_s"], 1))
+        if round(at_s + found, 1) < self._scenario["duration_s"]:
+            self._times.append(round(at_s + found, 1))
+        return found
+
+    def _process(self) -> Tables:
+        kind = self._draw.among(("kill", "kill", "leave", "pause", "restart", "resume"))
+        return {kind: self._selectors(by_place=kind not in ("restart", "resume"))}
+
+    def _selectors(self, by_place: bool) -> list[int | str]:
+        draw, agents = self._draw, self._agents
+        choices: list[Callable[[], list[int | str]]] = [
+            lambda: list(draw.some(range(agents), draw.whole(1, max(1, agents // 2)))),
+            lambda: [f"random:{draw.whole(1, max(1, agents // 2))}"],
+            lambda: [draw.whole(0, agents - 1)],
+        ]
+        if by_place:
+            choices += [lambda: ["vertex:V1"], lambda: ["queue:Q1"]]
+        return ["all"] if draw.chance(0.04) else draw.among(choices)()
+
+    def _join(self) -> int | Tables:
+        draw, count = self._draw, self._draw.whole(1, 3)
+        listed = self._scenario["fleet"]["start"]["kind"] == "list"
+        if not listed and draw.chance(0.5):
+            return count
+        pitch = self._scenario["control"]["separation_m"] * draw.number(1.0, 4.0)
+        away = draw.point(5.0)
+        return {
+            "count": count,
+            "start": {"kind": "list", "positions_m": lattice(draw, count, pitch, away)},
+        }
+
+    def _formation(self) -> Tables | str:
+        least = self._scenario["control"]["separation_m"] + 0.25
+        tables = formation(self._draw, self._agents, self._spacing, least)
+        name: Tables | str = tables.get("file", tables)
+        return name
+
+    def _frame(self) -> Tables:
+        draw = self._draw
+        if draw.chance(0.3):
+            return {"yaw_deg": draw.number(-180, 180, 0)}
+        here = self._scenario["frame"]["waypoints_m"][-1]
+        table = moving(draw, self._slowest, here)
+        table.pop("start_s", None)
+        return table
+
+    def _sensor(self) -> Tables:
+        table: Tables = {"agents": self._selectors(by_place=True), "mode": self._draw.among(MODES)}
+        if self._sensors and self._draw.chance(0.5):
+            table["kind"] = self._draw.among(self._sensors)
+        return table
