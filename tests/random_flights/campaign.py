@@ -15,6 +15,8 @@ from worldsim.results.progress_line import ProgressLine
 FAILURES = ("exception", "hang", "crash", "I1", "unequal traces")
 FRESH_EVERY = 8
 """The second flight of every eighth number is in an interpreter of its own."""
+ROUNDING_M = 1e-9
+"""A distance that is smaller than its bound by no more than this is not too small [m]."""
 SHOWN = 40
 SLOW_CHECK_S = 1.0
 """CPU time in which ``check`` must have answered [s]."""
@@ -73,7 +75,7 @@ class Campaign(NamedTuple):
         }
         first = flown(self.file(number))
         row |= asdict(first)
-        if "I1" in first.broken or min(first.separation_margin_m, first.clearance_margin_m) < -1e-9:
+        if "I1" in first.broken or first.least_margin_m < -ROUNDING_M:
             row |= {"failure": "I1", "detail": _nearest(row)}
         if self.twice_every and number % self.twice_every == 0:
             again = self._again(number)

@@ -20,8 +20,6 @@ from worldsim.scenario.tables import Scenario
 from worldsim.truth.obstacles import Obstacles
 
 ROOT = Path(__file__).resolve().parents[2]
-AGREE_M = 1e-5
-"""The judge sees ticks as float32; the exact figures differ from its figures by less than this."""
 
 
 @dataclass
@@ -83,12 +81,11 @@ class Flown:
     features: list[str]
 
     @property
-    def separation_margin_m(self) -> float:
-        return inf if self.separation_m is None else self.separation_m - self.separation_bound_m
-
-    @property
-    def clearance_margin_m(self) -> float:
-        return inf if self.clearance_m is None else self.clearance_m - self.clearance_bound_m
+    def least_margin_m(self) -> float:
+        """The least distance over its bound [m]; infinite where nothing was near anything."""
+        near, close = self.separation_m, self.clearance_m
+        apart = inf if near is None else near - self.separation_bound_m
+        return min(apart, inf if close is None else close - self.clearance_bound_m)
 
 
 def flown(file: Path) -> Flown:
