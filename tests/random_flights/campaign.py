@@ -73,14 +73,11 @@ class Campaign(NamedTuple):
             "objections": dict(made.objections),
             "check_s": round(made.check_s, 3),
         }
-        first = flown(self.file(number))
-        row |= asdict(first)
-        if "I1" in first.broken or first.least_margin_m < -ROUNDING_M:
-            row |= {"failure": "I1", "detail": _nearest(row)}
+        row |= failure(self.file(number))
         if self.twice_every and number % self.twice_every == 0:
             again = self._again(number)
-            if again != first.trace:
-                row |= {"failure": "unequal traces", "detail": f"{first.trace} {again}"}
+            if again != row["trace"]:
+                row |= {"failure": "unequal traces", "detail": f"{row['trace']} {again}"}
         return row
 
     def _again(self, number: int) -> str:
@@ -92,6 +89,15 @@ class Campaign(NamedTuple):
         """Keep the scenarios of those that failed only."""
         if "failure" not in row:
             self.file(number).unlink()
+
+
+def failure(file: Path) -> dict[str, Any]:
+    """Fly a file; return what it showed as a row, with its failure where I1 does not hold."""
+    shown = flown(file)
+    row = asdict(shown)
+    if "I1" in shown.broken or shown.least_margin_m < -ROUNDING_M:
+        row |= {"failure": "I1", "detail": _nearest(row)}
+    return row
 
 
 def _nearest(row: dict[str, Any]) -> str:
