@@ -30,11 +30,11 @@ Fails = Callable[[Tables], dict[str, Any] | None]
 """Returns the row of tables that fail as the given ones do, else None."""
 
 
-def shrunk(tables: Tables, fails: Fails) -> Tables:
-    """Return the smallest tables found that fail."""
+def shrunk(tables: Tables, fails: Fails) -> Tables | None:
+    """Return the smallest tables found that fail; None where the given ones do not."""
     row = fails(tables)
     if row is None:
-        return tables
+        return None
     smaller = True
     while smaller:
         smaller = False
@@ -158,6 +158,9 @@ def main() -> int:
     tables = tomllib.loads(Path(file).read_text(encoding="utf-8"))
     as_before = words[0] if words else "I1"
     small = shrunk(tables, lambda each: flies(each, as_before))
+    if small is None:
+        print(f"{file} does not fail so: {as_before}", file=sys.stderr)
+        return 1
     sys.stdout.write(as_toml({key: value for key, value in small.items() if value not in ([], {})}))
     return 0
 
