@@ -119,6 +119,10 @@ def expectations(draw: Draw, made: Tables) -> Tables:
         table["converge_within_s"] = draw.number(1.0, made["duration_s"], 1)
     if draw.chance(0.2):
         table["reform_within_s"] = draw.number(1.0, 30.0, 1)
+    if draw.chance(0.1):
+        table["min_separation_m"] = draw.number(0.0, made["control"]["separation_m"])
+    if draw.chance(0.1):
+        table["min_obstacle_distance_m"] = draw.number(0.0, made["control"].get("clearance_m", 0.5))
     return table
 
 

@@ -72,6 +72,7 @@ def bursts(draw: Draw) -> Tables:
 def path_loss(draw: Draw) -> Tables:
     return {
         "exponent": draw.number(1.5, 5.0),
+        "reference_distance_m": draw.among((1.0, draw.scale(0.1, 5.0))),
         "reference_loss_db": draw.number(20.0, 50.0),
         "budget_db": draw.number(50.0, 90.0),
         "shadowing_db": draw.number(0.5, 10.0),

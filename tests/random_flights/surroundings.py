@@ -56,6 +56,7 @@ def wall(draw: Draw, about: list[float]) -> Tables:
         "from_m": [*one[:2], foot],
         "to_m": [*two[:2], foot],
         "height_m": draw.number(0.5, 4.0),
+        "thickness_m": draw.among((0.1, draw.scale(0.02, 1.0))),
     }
 
 
@@ -74,11 +75,12 @@ def path(draw: Draw, place: list[float], slowest: float) -> Tables:
 def field(draw: Draw, about: list[float]) -> Tables:
     """Return a field of obstacles beside the start."""
     x, y, z = about
-    table: Tables = {"centre_m": [round(x + 6.0, 2), y, z], "count": draw.whole(1, 8)}
+    table: Tables = {"centre_m": [round(x + 6.0, 2), y, z]}
+    table |= draw.among(({"count": draw.whole(1, 8)}, {"density_per_m3": draw.scale(0.01, 0.1)}))
     table["size_m"] = [draw.number(4.0, 9.0), draw.number(4.0, 9.0), draw.number(0.0, 4.0)]
     table["shape"] = draw.among(("sphere", "cylinder"))
     if draw.chance(0.5):
-        table["corridor_m"] = draw.number(1.2, 2.5)
+        table |= {"corridor_m": draw.number(1.2, 2.5), "clear_of_start_m": draw.number(0.6, 3.0)}
     return table
 
 

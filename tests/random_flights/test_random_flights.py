@@ -4,6 +4,7 @@ import os
 import signal
 import time
 from collections import Counter
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,11 @@ import pytest
 from tests.random_flights import __main__ as the_command
 from tests.random_flights.campaign import Campaign, report
 from tests.random_flights.children import answers
-from tests.random_flights.generate import Generated, objection, scenario, without
+from tests.random_flights.draws import Draw
+from tests.random_flights.generate import Generated, draft, objection, scenario, without
 from tests.small_scenario import SMALL
 from worldsim.scenario.file import parse
+from worldsim.scenario.schema import schema
 
 BASE = 11
 SHORT = 300
@@ -37,7 +40,22 @@ def test_a_scenario_is_a_function_of_its_base_and_number() -> None:
     assert len({scenario(base, number).text for base in (3, 4) for number in (5, 6)}) == 4
 
 
-def test_what_is_generated_holds_every_kind_of_table() -> None:
+def keys(plain: Any) -> Iterator[str]:
+    inner = plain.values() if isinstance(plain, dict) else plain
+    if isinstance(plain, dict):
+        yield from plain
+    if isinstance(plain, dict | list):
+        for value in inner:
+            yield from keys(value)
+
+
+def test_drafts_use_every_key_of_a_scenario() -> None:
+    known = {key for each in schema()["$defs"].values() for key in each.get("properties", ())}
+    drafts = [draft(Draw("keys", number), SHORT) for number in range(100)]
+    assert known - {key for each in drafts for key in keys(each)} == {"schema"}
+
+
+def test_scenarios_are_of_all_kinds() -> None:
     scenarios = [parse(scenario(5, number).text) for number in range(30)]
     events = {event.kind for each in scenarios for event in each.event}
     assert events >= {"kill", "pause", "join", "sensor", "formation", "frame", "jam", "netem"}
