@@ -12,7 +12,7 @@ from math import hypot, sqrt
 
 from agent.guidance.movement import saturated
 from agent.guidance.safety_filter import Bound, approach_of, slid
-from agent.messages import Vector
+from agent.messages import ZERO, Vector
 
 UPRIGHT = 0.999
 """Sine of the elevation from which an approach leaves no way over or under."""
@@ -26,12 +26,15 @@ def evasive_velocity(
 ) -> Vector:
     """Return a velocity that keeps the bounds, negative ones as far as it can [m/s].
 
-    Of the ways that retreat fast enough the first is flown: aside, as wanted, straight back.
+    Of the ways that retreat fast enough the first is flown: aside of a moving surface, as wanted,
+    straight back.
     """
     firm = [bound for bound in bounds if bound.limit >= 0.0]
     retreats = [bound for bound in bounds if bound.limit < 0.0]
     worst = min(retreats, key=lambda bound: bound.limit)
-    ways = [*_ways_aside(worst, max_speed), velocity, _scaled(max_speed, worst.away)]
+    ways = [velocity, _scaled(max_speed, worst.away)]
+    if worst.surface_velocity != ZERO:
+        ways = [*_ways_aside(worst, max_speed), *ways]
     flown = [slid(saturated(slid(way, bounds), max_speed, max_climb), firm) for way in ways]
     return min(flown, key=lambda way: _shortfall(way, retreats))
 

@@ -22,6 +22,9 @@ from agent.messages import ZERO, Vector
 SHARE = 0.18
 """Share of the gap that one vehicle of a pair may close within H: 2 * SHARE <= 1/e."""
 PASSES = 3
+INNER_SHARE = 0.7
+"""Share of the margin for noise within which a vehicle only flies away: noise turns the measured
+line to the other vehicle, and a speed across that line is then a speed towards it."""
 ROUNDING_MPS = 1e-12
 """Tolerance: a velocity that slides along a limit of zero exceeds it by rounding."""
 
@@ -29,7 +32,8 @@ ROUNDING_MPS = 1e-12
 class Bound(NamedTuple):
     """The limits that one vehicle or surface sets to the velocity.
 
-    A negative limit asks for a retreat from a surface that approaches by itself.
+    A negative limit asks for a retreat: from a surface that approaches by itself, or that noise or
+    a motion too slow to notice has brought too near.
     """
 
     away: Vector  # unit vector away from the vehicle or surface [world axes]
@@ -38,32 +42,48 @@ class Bound(NamedTuple):
     surface_velocity: Vector = ZERO  # of an approaching surface [m/s; world axes]
 
 
+class Margins(NamedTuple):
+    """How a filter's law is adapted to a kind of vehicle, and to what a sensor leaves unknown."""
+
+    share: float = SHARE
+    """Share of the gap that may be closed within H; 2 * SHARE for what does not move."""
+    noise_m: float = 0.0
+    """Measured distances may be too long by this much [m]."""
+    creep: float = 0.0
+    """Speed across that is always allowed [m/s]: noise must not hold a vehicle before a surface."""
+    retreat_hz: float = 0.0
+    """Speed of retreat for each metre by which something measured is too near [1/s]."""
+    unnoticed_mps: float = 0.0
+    """Speed of approach that is taken for rest [m/s]; the retreat must outrun it."""
+    latency_s: float | None = None
+    """H without the braking time [s]; None: H."""
+
+
+EXACT = Margins()
+
+
 class RangingFilter:
     """Limits the approach speed by the gap to each sensed vehicle or point.
 
-    d_ob: least measured distance between centres [m], with the sensor's margin; max_speed: of any
-    vehicle [m/s]; horizon_s: H. share: of the gap, closed within H at most; 2 * SHARE for what does
-    not move. creep: speed across that is always allowed [m/s], since noise shows points nearer than
-    they are and must not hold the vehicle for ever. latency_s: H without the braking time, for the
-    margin; None: horizon_s.
+    d_ob: least distance between centres [m]; max_speed: of any vehicle [m/s]; horizon_s: H.
     """
 
     def __init__(
-        self,
-        d_ob: float,
-        max_speed: float,
-        horizon_s: float,
-        share: float = SHARE,
-        creep: float = 0.0,
-        latency_s: float | None = None,
+        self, d_ob: float, max_speed: float, horizon_s: float, margins: Margins = EXACT
     ) -> None:
-        reach = max_speed * (horizon_s if latency_s is None else latency_s)
+        latency_s = horizon_s if margins.latency_s is None else margins.latency_s
+        reach = max_speed * latency_s
+        turning_m = d_ob + margins.noise_m
         self._max_speed = max_speed
-        self._d_ob = d_ob
-        self._stop_m = d_ob + reach * reach / d_ob
-        self._turning_hz = max_speed / (self._stop_m - d_ob)
-        self._rate = share / horizon_s
-        self._creep = creep
+        self._inner_m = d_ob + INNER_SHARE * margins.noise_m
+        margin_m = reach * reach / turning_m
+        if margins.retreat_hz > 0.0:
+            margin_m = max(margin_m, margins.unnoticed_mps / margins.retreat_hz)
+        self._stop_m = turning_m + margin_m
+        self._turning_hz = max_speed / (self._stop_m - self._inner_m)
+        self._rate = margins.share / horizon_s
+        self._retreat_hz = margins.retreat_hz
+        self._creep = margins.creep
         self._ignore_m = self._stop_m + max_speed / self._rate
 
     def bounds(self, points: Sequence[Vector]) -> list[Bound]:
@@ -73,8 +93,9 @@ class RangingFilter:
             r = sqrt(x * x + y * y + z * z)
             if r >= self._ignore_m or r == 0.0:
                 continue
-            limit = self._rate * max(0.0, r - self._stop_m)
-            turning = self._turning_hz * max(0.0, r - self._d_ob)
+            gap = r - self._stop_m
+            limit = self._rate * gap if gap > 0.0 else self._retreat_hz * gap
+            turning = self._turning_hz * max(0.0, r - self._inner_m)
             across_limit = max(self._creep, turning) if r < self._stop_m else inf
             found.append(Bound((-x / r, -y / r, -z / r), limit, across_limit))
         return found

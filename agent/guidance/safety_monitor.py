@@ -20,6 +20,7 @@ from agent.guidance.safety_filter import (
     ROUNDING_MPS,
     SHARE,
     Bound,
+    Margins,
     RangingFilter,
     approach_of,
     limited,
@@ -34,10 +35,12 @@ from agent.guidance.sight import (
     vehicle_margin_m,
 )
 from agent.messages import ZERO, Beacon, Record, Vector
-from agent.sensing.surface_motion import SurfaceMotion
+from agent.sensing.surface_motion import LEAST_MPS, SurfaceMotion
 
+RETREAT_HZ = 5.0
+"""Speed of retreat from a surface at rest, for each metre within the distance to keep [1/s]."""
 CREEP = 0.3
-"""Share of its speed at which a vehicle may always fly across a point that noise may displace."""
+"""Share of its speed at which a vehicle may always fly along a surface that noise may displace."""
 
 
 class SafetyMonitor:
@@ -59,23 +62,24 @@ class SafetyMonitor:
         self._cone = cone_of(limits)
         self._speeds = limits.max_speed_mps, limits.max_climb_mps
         self._motion = None if scanners_of(limits) else SurfaceMotion(sensor.proximity.noise_m)
-        surface_margin, vehicle_margin = surface_margin_m(limits, sensor), vehicle_margin_m(sensor)
-        creep = CREEP * limits.max_speed_mps
         self._clearing = RangingFilter(
-            control.clearance_m + surface_margin,
+            control.clearance_m,
             limits.max_speed_mps,
             horizon_s,
-            2.0 * share,
-            creep if surface_margin > 0.0 else 0.0,
-            self._latency_s,
+            Margins(
+                share=2.0 * share,
+                noise_m=surface_margin_m(limits, sensor),
+                retreat_hz=0.0 if self._kind == "forward" else RETREAT_HZ,
+                unnoticed_mps=LEAST_MPS,
+                creep=CREEP * limits.max_speed_mps if surface_margin_m(limits, sensor) else 0.0,
+                latency_s=self._latency_s,
+            ),
         )
         self._ranging = RangingFilter(
-            control.separation_m + vehicle_margin,
+            control.separation_m,
             setup.fleet_max_speed_mps,
             horizon_s,
-            share,
-            creep if vehicle_margin > 0.0 else 0.0,
-            self._latency_s,
+            Margins(share=share, noise_m=vehicle_margin_m(sensor), latency_s=self._latency_s),
         )
         self._promises, self._whereabouts = None, Whereabouts(setup.id, setup.team)
         if "proximity" not in limits.sensors:
@@ -152,9 +156,10 @@ class SafetyMonitor:
         """Whether a vehicle under way must brake straight: -n.v (H + |v|/2a) > 0.25 gap."""
         needs_s = self._braking.horizon_s(hypot(*velocity))
         return any(
-            approach_of(velocity, bound) * needs_s > bound.limit * self._horizon_s + ROUNDING_MPS
+            approach_of(velocity, bound) * needs_s
+            > max(0.0, bound.limit) * self._horizon_s + ROUNDING_MPS
             for bound in bounds
-            if bound.limit >= 0.0
+            if bound.limit >= 0.0 or bound.surface_velocity == ZERO
         )
 
 

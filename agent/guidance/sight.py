@@ -10,7 +10,7 @@ from typing import NamedTuple, assert_never
 from agent.config import SCANNERS, Control, ScannerKind, Sensors, Vehicle
 from agent.messages import PROXIMITY_RANGE_M
 
-NOISE_SIGMAS = 4.0
+NOISE_SIGMAS = 5.0
 """Standard deviations of a sensor's noise that its margin covers."""
 SCAN_MARGIN_M = 0.05
 """Least margin of scanned points, for a coarse pattern [m]."""
