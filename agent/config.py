@@ -65,14 +65,16 @@ class Proximity(Table, frozen=True):
 class Laser(Table, frozen=True):
     """A scanner: ``rays`` over ``field_deg`` ahead, in ``rings`` spread over +-elevation_deg.
 
+    The defaults see all round; a sonar upwards and one downwards close the gaps at the poles.
+
     noise_m: normal, along the ray; dropout_percent: share of the echoes that are lost.
     """
 
     range_m: Annotated[float, Meta(ge=LEAST, le=60)] = 4.0
-    field_deg: Annotated[float, Meta(ge=LEAST, le=350)] = 180.0
+    field_deg: Annotated[float, Meta(ge=LEAST, le=350)] = 350.0
     rays: Annotated[int, Meta(ge=1, le=720)] = 61
-    elevation_deg: Annotated[float, Meta(ge=0, le=85)] = 0.0
-    rings: Annotated[int, Meta(ge=1, le=64)] = 1
+    elevation_deg: Annotated[float, Meta(ge=0, le=85)] = 80.0
+    rings: Annotated[int, Meta(ge=1, le=64)] = 17
     rate_hz: Hertz = 10.0
     noise_m: Noise = 0.0
     dropout_percent: Annotated[float, Meta(ge=0, le=100)] = 0.0
@@ -86,16 +88,25 @@ class Sonar(Table, frozen=True):
 
     range_m: Annotated[float, Meta(ge=LEAST, le=60)] = 2.0
     ring: Annotated[int, Meta(ge=1, le=64)] = 16
-    up_down: bool = False
+    up_down: bool = True
     beam_deg: Annotated[float, Meta(ge=LEAST, le=120)] = 22.5
     rate_hz: Hertz = 10.0
     noise_m: Noise = 0.0
     dropout_percent: Annotated[float, Meta(ge=0, le=100)] = 0.0
 
 
-class Sensors(Table, frozen=True):
-    """The properties of each kind of sensor."""
+Coverage = Literal["full", "planar"]
+PLANAR_FIELD_DEG = 180.0
 
+
+class Sensors(Table, frozen=True):
+    """The properties of each kind of sensor.
+
+    coverage: "full" as given; "planar" as in the paper's simulations: the laser has one level ring
+    of 180 degrees ahead, the sonars one level ring. It sees nothing above or below.
+    """
+
+    coverage: Coverage = "full"
     proximity: Proximity = Proximity()
     laser: Laser = Laser()
     sonar: Sonar = Sonar()
@@ -104,10 +115,31 @@ class Sensors(Table, frozen=True):
         """Return the properties of a scanning sensor."""
         match kind:
             case "laser":
-                return self.laser
+                return self._laser
             case "sonar":
-                return self.sonar
+                return self._sonar
         assert_never(kind)
+
+    @property
+    def _laser(self) -> Laser:
+        match self.coverage:
+            case "full":
+                return self.laser
+            case "planar":
+                field_deg = min(self.laser.field_deg, PLANAR_FIELD_DEG)
+                return msgspec.structs.replace(
+                    self.laser, field_deg=field_deg, elevation_deg=0.0, rings=1
+                )
+        assert_never(self.coverage)
+
+    @property
+    def _sonar(self) -> Sonar:
+        match self.coverage:
+            case "full":
+                return self.sonar
+            case "planar":
+                return msgspec.structs.replace(self.sonar, up_down=False)
+        assert_never(self.coverage)
 
 
 DEFAULT_CAST_FAR_M = 0.5

@@ -47,6 +47,10 @@ class Braking(NamedTuple):
         """Return the time in which a vehicle of this speed [m/s] has come to rest [s]."""
         return self.latency_s + speed / self.decel_mps2
 
+    def stopping_m(self, speed: float) -> float:
+        """Return the distance that a vehicle of this speed [m/s] flies until it rests [m]."""
+        return speed * self.horizon_s(speed)
+
     def horizon_s(self, speed: float) -> float:
         """Return the stopping distance over the speed [s]: H of a vehicle of this speed [m/s]."""
         return self.latency_s + 0.5 * speed / self.decel_mps2

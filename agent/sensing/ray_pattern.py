@@ -43,13 +43,14 @@ class Pattern(NamedTuple):
 
 def pattern_of(kind: ScannerKind, sensors: Sensors, tick_hz: float) -> Pattern:
     """Return the pattern of a scanning sensor."""
-    match kind:
-        case "laser":
-            return _laser_pattern(sensors.laser, tick_hz)
-        case "sonar":
-            return _sonar_pattern(sensors.sonar, tick_hz)
+    scanner = sensors.scanner(kind)
+    match scanner:
+        case Laser():
+            return _laser_pattern(scanner, tick_hz)
+        case Sonar():
+            return _sonar_pattern(scanner, tick_hz)
         case _:
-            assert_never(kind)
+            assert_never(scanner)
 
 
 def _sonar_pattern(sonar: Sonar, tick_hz: float) -> Pattern:

@@ -22,7 +22,10 @@ HERE = np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.0], [np.nan] * 3])
 YAW = np.array([0.0, pi / 2, np.nan])
 
 
-def scans(sensors=Sensors(), kinds=SCANNERS, obstacles=(), seed=1):  # noqa: B008
+PLANAR = Sensors(coverage="planar")
+
+
+def scans(sensors=PLANAR, kinds=SCANNERS, obstacles=(), seed=1):
     vehicles = [Vehicle(sensors=kinds)] * 3
     return ScanningSensors(vehicles, sensors, seed, 20.0, Obstacles(obstacles))
 
@@ -62,6 +65,21 @@ def test_up_and_down_look_up_and_down():
     above = Sphere(centre_m=(0, 0, 1.5), radius_m=0.5)
     seen = ranges(read([0], sensors=sensors, obstacles=[above])[0][1])
     assert (len(seen), seen[16], seen[17]) == (18, 1.0, None)
+
+
+def test_the_defaults_look_all_round():
+    around = [(0, 0, 1.5), (0, 0, -1.5), (-1.5, 0, 0), (0, 1.5, 0), (-1, 0, 1.1), (0.5, -0.3, -1.4)]
+    for centre in around:
+        ball = Sphere(centre_m=centre, radius_m=0.3)
+        both = read([0], sensors=Sensors(), obstacles=[ball])[0]
+        nearest = min(each for scan in both for each in ranges(scan)[:1037] if each is not None)
+        assert nearest < 1.5
+
+
+def test_planar_sees_nothing_above():
+    above = Sphere(centre_m=(0.6, 0, 1.5), radius_m=0.5)
+    for scan in read([0], obstacles=[above])[0]:
+        assert all(each is None or each < 1.0 for each in ranges(scan))
 
 
 def test_rings_look_above_and_below():

@@ -16,6 +16,7 @@ from agent.qstructure.frame_path import tip_speed
 from worldsim.scenario.idle_keys import idle_keys
 from worldsim.scenario.obstacle_tables import obstacle_problem
 from worldsim.scenario.problem import Problem
+from worldsim.scenario.safety_checks import SAFETY_WARNINGS
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.tables import CONVERGED_S, MIN_CAST_RATIO, SLOTS_PER_TICK, Scenario
 from worldsim.scenario.target_frame import frame_problem, path_of
@@ -319,4 +320,5 @@ WARNINGS = (
     _neighbours_within_range,
     _long_enough_to_converge,
     _frame_slow_enough,
+    *SAFETY_WARNINGS,
 )

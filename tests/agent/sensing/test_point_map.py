@@ -5,12 +5,12 @@ from math import hypot, pi
 
 import pytest
 
-from agent.config import Laser, Sensors
+from agent.config import Sensors
 from agent.messages import NO_ECHO_MM, Scan
 from agent.sensing.point_map import KEPT_S, MAX_NEAR_POINTS, PointMap
 from agent.sensing.ray_pattern import pattern_of
 
-SENSORS = Sensors(laser=Laser(rays=61))
+SENSORS = Sensors(coverage="planar")
 ORIGIN = (0.0, 0.0, 0.0)
 AHEAD = 30
 

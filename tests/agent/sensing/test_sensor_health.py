@@ -11,7 +11,7 @@ from agent.sensing.ray_pattern import pattern_of
 from agent.sensing.sensor_health import LOOKS, PROXIMITY, SensorHealth
 from tests.agent.comms.builders import beacon
 
-LASER = pattern_of("laser", Sensors(), 20.0)
+LASER = pattern_of("laser", Sensors(coverage="planar"), 20.0)
 
 
 def scan_of(ranges):

@@ -1,0 +1,253 @@
+"""Warnings where the safety filter cannot keep what a scenario asks of it, or only by standing.
+
+Each names what the vehicles lack. Without these warnings, no controller makes vehicles touch one
+another, or come nearer to an obstacle than ``control.clearance_m``.
+"""
+
+from collections.abc import Iterator
+from math import ceil, inf
+
+from agent.config import SCANNERS, Vehicle
+from agent.controller import BUILT_IN
+from agent.guidance.sight import (
+    braking_of,
+    scanners_of,
+    speed_cap_mps,
+    surface_margin_m,
+    vehicle_margin_m,
+)
+from agent.messages import PROXIMITY_RANGE_M
+from netem.faults import Flap, Jam, Partition
+from netem.link_parameters import Conditions
+from worldsim.scenario.faults import Join, Kill, Leave, Pause, Restart, SensorFault
+from worldsim.scenario.obstacle_tables import Obstacle, Wall
+from worldsim.scenario.problem import Problem
+from worldsim.scenario.tables import Scenario
+
+SILENCING = (Kill, Leave, Pause, Restart, Join, Partition, Jam, Flap)
+"""Faults after which an agent may be silent, or not know of another one."""
+STOPPING = (Kill, Pause, SensorFault)
+"""Faults that leave a vehicle hovering, so that it gives way to nothing."""
+LOSS_OF_SILENCE = 80.0
+"""From this loss on, a radio is silent for seconds at a time [%]."""
+ELEVATION_DEG = 75.0
+FIELD_DEG = 330.0
+"""From these angles on, laser and sonars together leave no direction unseen."""
+FLOWN_ELEVATION_DEG = 30.0
+FLOWN_FIELD_DEG = 180.0
+"""Enough for the built-in controllers, which fly where they look (docs/method.md)."""
+GAP_DEG = 12.0
+"""Widest gap between two rays through which no obstacle of 0.1 m is missed at 1 m."""
+MOST_DROPOUT_PERCENT = 30.0
+
+
+def vehicles_seen_by_radio_alone(scenario: Scenario) -> Problem | None:
+    """Warn of agents without a proximity sensor where members may fall silent."""
+    blind = [i for i, each in enumerate(scenario.vehicles) if "proximity" not in each.sensors]
+    if not blind or scenario.rows == 1 or not _may_be_silent(scenario):
+        return None
+    return Problem(
+        "vehicle.sensors",
+        f"{_agents(blind)} without 'proximity' know other vehicles by radio alone: they stand still"
+        " as soon as a silent one may be near, and do not know of one that was never heard",
+    )
+
+
+def obstacles_seen(scenario: Scenario) -> Problem | None:
+    """Warn of agents that cannot see obstacles."""
+    unable = [i for i, each in enumerate(scenario.vehicles) if not each.sensors]
+    if not unable or not scenario.obstacle:
+        return None
+    return Problem(
+        "vehicle.sensors",
+        f"{_agents(unable)} without a sensor cannot see obstacles; 'proximity' sees them all round",
+    )
+
+
+def scanners_see_all_round(scenario: Scenario) -> Problem | None:
+    """Warn of scanning sensors that leave directions unseen, where there are obstacles."""
+    if not scenario.obstacle or not any(_scans_alone(each) for each in scenario.vehicles):
+        return None
+    if any("laser" not in each.sensors for each in _scanning_alone(scenario)):
+        return Problem(
+            "vehicle.sensors",
+            "sonars alone see a ring: no distance is kept to what is above or below it; add 'laser'"
+            " or 'proximity'",
+        )
+    if scenario.sensor.coverage == "planar":
+        return Problem(
+            "sensor.coverage",
+            "'planar' sees one level slice: no distance is kept to what is above or below it, and"
+            " vehicles may touch it; 'full' sees all round",
+        )
+    return _laser_sees_all_round(scenario)
+
+
+def _laser_sees_all_round(scenario: Scenario) -> Problem | None:
+    laser, controller = scenario.sensor.laser, scenario.control.controller
+    built_in = controller in BUILT_IN
+    elevation_deg = FLOWN_ELEVATION_DEG if built_in else ELEVATION_DEG
+    field_deg = FLOWN_FIELD_DEG if built_in else FIELD_DEG
+    needs = (
+        ("elevation_deg", laser.elevation_deg, elevation_deg, "seen above and below"),
+        ("field_deg", laser.field_deg, field_deg, "seen round about"),
+        ("rays", laser.rays, ceil(laser.field_deg / GAP_DEG) + 1, "seen between two rays"),
+        ("rings", laser.rings, ceil(2 * laser.elevation_deg / GAP_DEG) + 1, "seen between rings"),
+    )
+    for key, value, least, seen in needs:
+        if value < least:
+            return Problem(
+                f"sensor.laser.{key}",
+                f"{value:g}; at least {least:g} for all that is {seen} under the controller"
+                f" {controller!r}: from the rest no distance is kept",
+            )
+    if laser.dropout_percent <= MOST_DROPOUT_PERCENT:
+        return None
+    return Problem(
+        "sensor.laser.dropout_percent",
+        f"{laser.dropout_percent:g}; up to {MOST_DROPOUT_PERCENT:g} a surface is seen in time",
+    )
+
+
+def seen_early_enough(scenario: Scenario) -> Problem | None:
+    """Warn where the safety filter caps a vehicle's speed to what it sees, and name the cap."""
+    for agent, vehicle in enumerate(scenario.vehicles):
+        braking = braking_of(vehicle, 1.0 / scenario.fleet.tick_hz)
+        cap = speed_cap_mps(vehicle, scenario.control, scenario.sensor, braking)
+        if cap < vehicle.max_speed_mps:
+            stops_m = braking.stopping_m(vehicle.max_speed_mps)
+            return Problem(
+                "vehicle.max_speed_mps",
+                f"agent {agent} stops within {stops_m:.2g} m from {vehicle.max_speed_mps:g} m/s and"
+                f" sees at most {PROXIMITY_RANGE_M:g} m ahead: the safety filter caps its speed at"
+                f" {cap:.2g} m/s",
+            )
+    return None
+
+
+def room_for_margins(scenario: Scenario) -> Problem | None:
+    """Warn where a sensor's noise asks for more distance than there is."""
+    control, sensor = scenario.control, scenario.sensor
+    keeps_m = control.separation_m + vehicle_margin_m(sensor)
+    ranging = any("proximity" in each.sensors for each in scenario.vehicles)
+    if ranging and sensor.proximity.noise_m > 0.0 and keeps_m > control.spacing_m:
+        return Problem(
+            "sensor.proximity.noise_m",
+            f"with {sensor.proximity.noise_m:g}, vehicles keep {keeps_m:.3g} m apart, and"
+            f" control.spacing_m is {control.spacing_m:g}: they may not reach their places",
+        )
+    if not scenario.obstacle:
+        return None
+    margin_m = max(surface_margin_m(each, sensor) for each in scenario.vehicles)
+    if control.clearance_m + margin_m < _sight_m(scenario):
+        return None
+    return Problem(
+        "control.clearance_m",
+        f"{control.clearance_m:g} and a margin of {margin_m:.2g} m for noise are not seen in time:"
+        f" the sensors see {_sight_m(scenario):g} m",
+    )
+
+
+def obstacles_give_way(scenario: Scenario) -> Problem | None:
+    """Warn of moving obstacles that vehicles cannot evade."""
+    return next(_obstacles_not_evaded(scenario), None)
+
+
+def sensor_faults_noticed(scenario: Scenario) -> Problem | None:
+    """Warn of sensor faults that agents cannot notice, for lack of reports to compare with."""
+    if not _may_be_silent(scenario):
+        return None
+    for index, event in enumerate(scenario.event):
+        if isinstance(event.action, SensorFault):
+            return Problem(
+                f"event[{index}].sensor",
+                "an agent notices that its sensor fails by the reports of others; where those are"
+                " silent, it may fly into what it does not see",
+            )
+    return None
+
+
+def _obstacles_not_evaded(scenario: Scenario) -> Iterator[Problem]:
+    for index, obstacle in enumerate(scenario.obstacle):
+        speed = _speed_mps(obstacle)
+        if speed > 0.0:
+            key = f"obstacle[{index}]"
+            yield from _not_evaded(scenario, speed, key)
+
+
+def _not_evaded(scenario: Scenario, speed: float, key: str) -> Iterator[Problem]:
+    for agent, vehicle in enumerate(scenario.vehicles):
+        evading = _evading_mps(vehicle)
+        if speed >= evading:
+            yield Problem(
+                f"{key}.speed_mps",
+                f"{speed:g} is not below the {evading:.3g} m/s at which agent {agent} gives way",
+            )
+        if _scans_alone(vehicle):
+            yield Problem(
+                key, f"moves, and agent {agent} takes what it scans for at rest; fit 'proximity'"
+            )
+    for number, event in enumerate(scenario.event):
+        if isinstance(event.action, STOPPING):
+            yield Problem(
+                key, f"may hit vehicles that hover after event[{number}]: they cannot give way"
+            )
+
+
+def _evading_mps(vehicle: Vehicle) -> float:
+    """Return the speed below which a vehicle of its kind evades an obstacle [m/s]."""
+    least = min(vehicle.max_speed_mps, vehicle.max_climb_mps)
+    return least if vehicle.kind == "forward" else vehicle.max_speed_mps
+
+
+def _speed_mps(obstacle: Obstacle) -> float:
+    if isinstance(obstacle, Wall) or obstacle.waypoints_m is None:
+        return 0.0
+    return obstacle.speed_mps or 0.0
+
+
+def _may_be_silent(scenario: Scenario) -> bool:
+    """Whether agents may be silent, or unknown to others, for longer than the radio explains."""
+    worst = max([scenario.netem.loss_percent or 0.0, *_losses(scenario)])
+    return worst >= LOSS_OF_SILENCE or any(
+        isinstance(event.action, SILENCING) for event in scenario.event
+    )
+
+
+def _losses(scenario: Scenario) -> Iterator[float]:
+    """Yield the losses of single links, and those of events [%]."""
+    for link in scenario.netem.link:
+        yield link.loss_percent or 0.0
+    for event in scenario.event:
+        if isinstance(event.action, Conditions):
+            yield event.action.loss_percent or 0.0
+
+
+def _scans_alone(vehicle: Vehicle) -> bool:
+    return bool(scanners_of(vehicle)) and "proximity" not in vehicle.sensors
+
+
+def _scanning_alone(scenario: Scenario) -> list[Vehicle]:
+    return [each for each in scenario.vehicles if _scans_alone(each)]
+
+
+def _sight_m(scenario: Scenario) -> float:
+    """Return the least distance at which every vehicle sees a surface [m]."""
+    ranges = {kind: scenario.sensor.scanner(kind).range_m for kind in SCANNERS}
+    scanned = [ranges[kind] for each in _scanning_alone(scenario) for kind in scanners_of(each)]
+    return min(PROXIMITY_RANGE_M, *scanned, inf)
+
+
+def _agents(ids: list[int]) -> str:
+    return f"agent {ids[0]}" if len(ids) == 1 else f"{len(ids)} agents"
+
+
+SAFETY_WARNINGS = (
+    vehicles_seen_by_radio_alone,
+    obstacles_seen,
+    scanners_see_all_round,
+    seen_early_enough,
+    room_for_margins,
+    obstacles_give_way,
+    sensor_faults_noticed,
+)
