@@ -115,12 +115,20 @@ def agents_that_differ(draw: Draw, agents: int, tick_hz: float) -> list[Tables]:
     return tables
 
 
-def sensor(draw: Draw) -> Tables:
-    return {
+def sensor(draw: Draw, carried: set[str]) -> Tables:
+    """Return the properties of the sensors that some vehicle carries."""
+    tables = {
         "proximity": {"noise_m": draw.among((0.0, 0.0, 0.01, draw.number(0.0, 0.08)))},
         "laser": laser(draw),
         "sonar": sonar(draw),
     }
+    return {kind: table for kind, table in tables.items() if kind in carried}
+
+
+def carried(vehicle: Tables, differing: list[Tables]) -> set[str]:
+    """Return the sensors of [vehicle] and of the [[agent]] tables."""
+    changes = [each["vehicle"].get("sensors", []) for each in differing]
+    return {kind for kinds in (vehicle["sensors"], *changes) for kind in kinds}
 
 
 def laser(draw: Draw) -> Tables:

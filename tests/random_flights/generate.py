@@ -11,11 +11,12 @@ from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
 from time import process_time
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from tests.random_flights.draws import Draw, Tables
 from tests.random_flights.fleets import (
     agents_that_differ,
+    carried,
     comms,
     control,
     fleet,
@@ -37,8 +38,8 @@ DRAFTS = 200
 REPAIRS = 12
 NAMED = re.compile(r"^.*?\.toml: (?P<key>[\w.\[\]]+): ", re.DOTALL)
 PART = re.compile(r"(\w+)(?:\[(\d+)\])?")
-NEEDED = ("fleet", "formation", "control", "vehicle", "duration_s")
-"""Tables and keys that no repair leaves out as a whole."""
+NEEDED = ("fleet", "fleet.agents", "formation", "control", "vehicle", "duration_s")
+"""Tables and keys that no repair leaves out."""
 
 
 class Generated(NamedTuple):
@@ -81,7 +82,7 @@ def draft(draw: Draw, steps: int) -> Tables:
     made["formation"] = formation(draw, agents, spacing, separation + 0.25)
     made["vehicle"] = vehicle(draw, tick_hz)
     made["agent"] = agents_that_differ(draw, agents, tick_hz)
-    made["sensor"] = sensor(draw)
+    made["sensor"] = sensor(draw, carried(made["vehicle"], made["agent"]))
     made["comms"] = comms(draw, tick_hz)
     made["netem"] = conditions(draw, agents, spacing)
     about = centre(made["fleet"]["start"])
@@ -153,18 +154,17 @@ def objection(text: str) -> str:
 
 
 def without(tables: Tables, key: str) -> bool:
-    """Leave out a key, or the event, obstacle, link or table of its list; whether there was one."""
-    inner: Any = tables
+    """Leave out a key, a table, or the item of a list; return whether there was one to spare."""
+    outer: Tables = tables
+    inner, last = tables, ""
     for name, index in PART.findall(key):
         if not isinstance(inner, dict) or name not in inner:
             return False
         if index:
             del inner[name][int(index)]
             return True
-        if not isinstance(inner[name], dict):
-            if inner is tables and name in NEEDED:
-                return False
-            del inner[name]
-            return True
-        inner = inner[name]
-    return False
+        outer, inner, last = inner, inner[name], name
+    if not last or (outer is tables and last in NEEDED) or key in NEEDED:
+        return False
+    del outer[last]
+    return True

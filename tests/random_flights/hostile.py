@@ -98,7 +98,8 @@ def draft(draw: Draw, case: Case, steps: int) -> Tables:
     made["formation"] = FALLBACK
     made["vehicle"] = vehicle(draw, case, tick_hz)
     made["agent"] = [others_speed(draw, agents, tick_hz)] if draw.chance(0.2) else []
-    made["sensor"] = sensor(draw)
+    made["sensor"] = sensor(draw, set(case.sensors))
+    made["comms"] = {"local_hz": min(20.0, tick_hz)}
     slowest = min([made["vehicle"]["max_speed_mps"], *speeds_of(made["agent"])])
     about = centre(made["fleet"]["start"])
     made["obstacle"] = obstacles(draw, slowest, about) if draw.chance(0.7) else []

@@ -82,6 +82,7 @@ def test_a_warning_of_check_is_an_objection() -> None:
         ("event[1].kill[0]", {"event": [1, 3], "netem": {"a": 1, "b": {"c": 2}}}),
         ("netem.b.c", {"event": [1, 2, 3], "netem": {"a": 1, "b": {}}}),
         ("netem.a", {"event": [1, 2, 3], "netem": {"b": {"c": 2}}}),
+        ("netem.b", {"event": [1, 2, 3], "netem": {"a": 1}}),
         ("fleet.agents", None),
     ],
 )
