@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.small_scenario import SMALL
 from worldsim.scenario.file import load, parse
 from worldsim.scenario.toml import ScenarioError
 
@@ -240,3 +241,52 @@ def test_a_list_of_starts(start: str, key: str, says: str) -> None:
 
 def test_jitter_may_exceed_the_delay() -> None:
     assert load(WEDGE, {"netem.jitter_ms": "40"}).netem.jitter_ms == 40.0
+
+
+def test_a_byte_order_mark_is_read(tmp_path: Path) -> None:
+    file = tmp_path / "marked.toml"
+    file.write_bytes(b"\xef\xbb\xbf" + SMALL.encode())
+    assert load(file) == parse(SMALL)
+
+
+DATES = ["2024-01-01", "10:30:00", "2024-01-01T10:30:00"]
+
+
+@pytest.mark.parametrize("value", DATES)
+@pytest.mark.parametrize("key", ["name", "formation.name", "control.controller"])
+def test_a_date_for_a_text_is_named(key: str, value: str) -> None:
+    with pytest.raises(ScenarioError, match="got the date or time ") as error:
+        parse(SMALL, overrides={key: value})
+    assert error.value.key == key
+
+
+TOO_SMALL = ["5e-324", "1e-310", "1e-9", "0.0009"]
+
+
+@pytest.mark.parametrize("value", TOO_SMALL)
+@pytest.mark.parametrize(
+    "key",
+    [
+        "fleet.tick_hz",
+        "comms.local_hz",
+        "comms.multihop_hz",
+        "vehicle.max_speed_mps",
+        "vehicle.max_turn_deg",
+        "vehicle.max_yaw_rate_dps",
+        "control.spacing_m",
+        "control.cast_near_m",
+        "frame.turn_dps",
+        "sensor.laser.rate_hz",
+        "netem.range_m",
+    ],
+)
+def test_a_number_too_small_to_fly_with_is_refused_by_its_key(key: str, value: str) -> None:
+    with pytest.raises(ScenarioError) as error:
+        parse(SMALL, overrides={key: value})
+    assert error.value.key == key
+
+
+def test_a_ring_needs_an_elevation_that_is_more_than_nothing() -> None:
+    laser = {"sensor.laser.rings": "9", "sensor.laser.elevation_deg": "1e-310"}
+    with pytest.raises(ScenarioError, match=r"sensor\.laser\.rings: 9 rings need elevation_deg"):
+        parse(SMALL, overrides=laser)

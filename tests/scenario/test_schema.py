@@ -50,3 +50,22 @@ def test_it_accepts_an_inline_formation_and_a_resolved_scenario() -> None:
 def test_it_rejects_invalid_values(key: str, value: Any) -> None:
     with pytest.raises(ValidationError):
         VALIDATOR.validate({**tomllib.loads(template("bad")), key: value})
+
+
+MAY_BE_ANY_SHARE = {"capacity", "density_per_m3"}
+
+
+def open_bounds(value: Any, name: str = "") -> list[str]:
+    """Return the keys whose numbers come as near to 0 as a file can write."""
+    if isinstance(value, list):
+        return [key for each in value for key in open_bounds(each, name)]
+    if not isinstance(value, dict):
+        return []
+    own = [name] if "exclusiveMinimum" in value else []
+    return own + [key for inner, each in value.items() for key in open_bounds(each, inner)]
+
+
+def test_a_number_above_0_has_a_least_value() -> None:
+    found = open_bounds(schema())
+    assert {key for key in found if key != "anyOf"} <= MAY_BE_ANY_SHARE
+    assert len(found) == len(MAY_BE_ANY_SHARE)
