@@ -54,6 +54,16 @@ FULL_EFFORT = Effort(fine_m=20.0, pieces=20_000, samples=1000)
 """Of a curve that is alone in its formation."""
 
 
+class _Piece(NamedTuple):
+    """A piece of a curve, measured by two chords."""
+
+    step: float  # in the curve's own parameter
+    end: Vector  # [m]
+    first_m: float
+    second_m: float
+    bend_m: float  # by which the two chords are longer than one
+
+
 class ArcLengthCurve:
     """A curve by arc length, measured from parameter 0 on.
 
@@ -141,31 +151,36 @@ class ArcLengthCurve:
                 " it is too long, too slow or too tightly wound"
             )
         start, fine = self._parameters[-1], self._lengths[-1] < self._effort.fine_m
+        piece = self._next_piece(start, fine)
+        length_m = piece.first_m + piece.second_m
+        share = piece.first_m / length_m if length_m > 0.0 else 1.0
+        if piece.bend_m > TIGHT_M:
+            length_m += piece.bend_m / 3.0
+        if not fine and share < 1.0:
+            self._append(start + 0.5 * piece.step, share * length_m)
+            self._append(start + piece.step, (1.0 - share) * length_m)
+        else:
+            self._append(start + piece.step, length_m)
+        self._pieces += 1
+        self._here = piece.end
+        if length_m < 0.4 * (PIECE_M if fine else LONG_PIECE_M) and piece.step == self._step:
+            greatest = GREATEST_STEP if fine else max(GREATEST_STEP, GREATEST_SHARE * start)
+            self._step = min(2.0 * piece.step, greatest)
+        self._check_progress()
+
+    def _next_piece(self, start: float, fine: bool) -> _Piece:
+        """Return the next piece, from a parameter on; halve the step until it is short enough."""
         longest = PIECE_M if fine else LONG_PIECE_M
         while True:
             step = min(self._step, self._ends - start)
             middle, end = self._at(start + 0.5 * step), self._at(start + step)
             first, second = dist(self._here, middle), dist(middle, end)
-            piece = first + second
-            bend = piece - dist(self._here, end)
-            if piece <= longest and _is_regular(bend, first - second, fine):
-                break
+            bend = first + second - dist(self._here, end)
+            if first + second <= longest and _is_regular(bend, first - second, fine):
+                return _Piece(step, end, first, second, bend)
             self._step = 0.5 * step
             if self._step < LEAST_STEP:
                 raise CurveError(f"it jumps near {start:.6g}: a pole?")
-        if bend > TIGHT_M:
-            piece += bend / 3.0
-        if not fine and piece > 0.0:
-            self._append(start + 0.5 * step, piece * first / (first + second))
-            self._append(start + step, piece * second / (first + second))
-        else:
-            self._append(start + step, piece)
-        self._pieces += 1
-        self._here = end
-        if piece < 0.4 * longest:
-            greatest = GREATEST_STEP if fine else max(GREATEST_STEP, GREATEST_SHARE * start)
-            self._step = min(2.0 * step, greatest) if step == self._step else self._step
-        self._check_progress()
 
     def _append(self, parameter: float, length_m: float) -> None:
         self._parameters.append(parameter)
