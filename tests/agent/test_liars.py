@@ -5,8 +5,8 @@ from time import process_time
 import msgspec
 import pytest
 
-from agent.codec import add_checksum, encode
-from agent.comms.mission import FIRST_VERSIONS, KEYS_PER_VERSION
+from agent.codec import add_checksum, decode_beacon, encode
+from agent.comms.mission import FIRST_VERSIONS, FRAME_VERSIONS_AHEAD, KEYS_PER_VERSION
 from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.core import Agent
 from agent.messages import AT_HOME, PIECE_B, Drift, FramePath, Mission, Piece, Pose
@@ -17,6 +17,7 @@ from tests.agent.test_core import TICK_S, observation
 
 LIAR, HONEST, IDS = 5, 6, 12
 HIGHEST = 2**53 - 1
+HOME_2 = FramePath(waypoints=((2.0, 0.0, 0.0),))
 RAY = {"kind": "ray", "direction": [-1, 1, 0]}
 
 
@@ -200,6 +201,17 @@ def test_a_liar_cannot_spoil_the_pieces_of_another(core):
         send(core, msgspec.structs.replace(piece, data=b"\x00"))
         send(core, piece, HONEST)
     assert telemetry(core).mission == key_of(1)
+
+
+def test_an_invented_frame_is_superseded_by_few_missions(core):
+    for sequence, version in enumerate((FRAME_VERSIONS_AHEAD + 1, FRAME_VERSIONS_AHEAD), start=1):
+        lie = Pose(float(version), 0.0, 0.0, 0.0)
+        ahead = beacon(LIAR, sequence, 0.05 * sequence, frame_key=key_of(version), frame=lie)
+        core.receive(LIAR, LOCAL, add_checksum(encode(ahead)), 0.05 * sequence)
+    assert core.rejected["mission"] == 1
+    send_mission(core, key_of(FRAME_VERSIONS_AHEAD + 1), formation(), HOME_2, now_s=0.2)
+    sent = [each for each in core.step(observation(4)).frames if each[0] == LOCAL]
+    assert decode_beacon(sent[0][1]).frame == Pose(2.0, 0.0, 0.0, 0.0)
 
 
 def test_a_frame_that_would_fling_slots_is_counted(core):
