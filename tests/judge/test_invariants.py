@@ -68,7 +68,7 @@ def test_without_delivery_the_number_of_rounds_is_infinite() -> None:
 
 def test_components_follow_range_and_partition() -> None:
     (tick, *_) = flight(4)
-    line = replace(tick, position=np.array([[k, 0, 0] for k in (0, 1, 2, 9)], dtype=np.float32))
+    line = replace(tick, position=np.array([[k, 0, 0] for k in (0.0, 1.0, 2.0, 9.0)]))
     connectivity = Connectivity(wedge(4))
     assert connectivity.components(line).members() == [[0, 1, 2, 3]]
     connectivity.handle_event(changed(1, Conditions(range_m=1.5)))

@@ -6,6 +6,7 @@ from tempfile import TemporaryDirectory
 
 import msgspec
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,8 +16,11 @@ from worldsim.judge.radio_events import ConditionsChanged
 from worldsim.judge.run_events import Killed, SlotChanged
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge
+from worldsim.recording import layout
 from worldsim.recording.readback import read_run
 from worldsim.recording.recorder import RunRecorder
+from worldsim.recording.verify import verify
+from worldsim.results.verdict_text import verified
 from worldsim.scenario.tables import Fleet
 
 AGENTS = 5
@@ -35,10 +39,13 @@ def _wild_tick(generator: np.random.Generator, index: int) -> Tick:
     def row(*shape: int) -> np.ndarray:
         return generator.normal(0.0, 2.0, (AGENTS, *shape)).astype(np.float32)
 
+    def exact_row(*shape: int) -> np.ndarray:
+        return generator.normal(1e6, 2.0, (AGENTS, *shape))
+
     def absent() -> np.ndarray:
         return generator.random(AGENTS) < 0.2
 
-    position, target, force, turn = row(3), row(3), np.abs(row()), 60.0 * row()
+    position, target, force, turn = exact_row(3), row(3), np.abs(row()), exact_row()
     for some in (position, target, force, turn):
         some[absent()] = np.nan
     links = generator.integers(0, AGENTS, (generator.integers(0, 8), 2))
@@ -115,3 +122,20 @@ def test_times_are_exact_where_a_tick_is_no_whole_number_of_nanoseconds(tmp_path
     assert [tick.time_s for tick in read_run(tmp_path / "run.rrd").ticks] == [
         tick.time_s for tick in ticks
     ]
+
+
+def test_an_older_recording_is_judged_by_what_was_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Older recordings have positions in single precision only, and say so."""
+    scenario = wedge(4)
+    with monkeypatch.context() as older:
+        older.setattr(layout, "POSITION", "unknown")
+        recorder = RunRecorder(tmp_path / "run.rrd", scenario, "older", mode="virtual")
+        record(recorder, scenario, list(straight_flight(scenario)))
+    readback = read_run(tmp_path / "run.rrd")
+    assert not readback.exact
+    for before, after in zip(straight_flight(scenario), readback.ticks, strict=True):
+        np.testing.assert_array_equal(after.position, before.position.astype(np.float32))
+    shown = verified(verify(tmp_path))
+    assert "positions in single precision: recorded by an older version" in shown

@@ -13,6 +13,7 @@ from worldsim.judge.verdict import Judge
 from worldsim.recording.recorder import RunRecorder
 from worldsim.recording.verify import Difference, verify
 from worldsim.results.verdict_text import verified
+from worldsim.scenario.tables import Scenario
 
 
 @pytest.fixture
@@ -23,16 +24,27 @@ def judge(tmp_path: Path) -> Judge:
     return record(recorder, scenario, list(straight_flight(scenario)))
 
 
-def summary_of(judge: Judge) -> dict[str, Any]:
+def summary_of(judge: Judge, scenario: Scenario | None = None) -> dict[str, Any]:
+    """Return a run's summary, as far as its recording shows it."""
+    flown = scenario or wedge(4)
     return {
         "outcome": "pass",
+        "scenario": flown.name,
+        "seed": flown.seed,
+        "mode": "virtual",
+        "agents": flown.fleet.agents,
+        "duration_s": flown.duration_s,
         "expectations": [
             {"name": row.name, "wanted": row.wanted, "got": row.got, "held": row.held}
             for row in judge.expectations()
         ],
         "min_separation_m": judge.min_separation_m,
+        "min_obstacle_distance_m": None,
+        "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "invariants": msgspec.to_builtins(judge.invariants()),
+        "recoveries": [],
+        "packets": list(straight_flight(flown))[-1].packets,
         "phases": [
             {
                 "formation": phase.formation.name,
@@ -40,14 +52,17 @@ def summary_of(judge: Judge) -> dict[str, Any]:
                 "converged": phase.converge_s is not None,
                 "converge_s": phase.converge_s,
                 "residual_m": phase.residual_m,
+                "queues_converge_s": dict(zip(queues.names, queues.converge_s, strict=True)),
             }
-            for phase in judge.phases
+            for phase, queues in zip(judge.phases, judge.queues, strict=True)
         ],
     }
 
 
-def write_summary(folder: Path, judge: Judge, **changes: object) -> None:
-    (folder / "summary.json").write_text(json.dumps({**summary_of(judge), **changes}))
+def write_summary(
+    folder: Path, judge: Judge, scenario: Scenario | None = None, **changes: object
+) -> None:
+    (folder / "summary.json").write_text(json.dumps({**summary_of(judge, scenario), **changes}))
 
 
 def test_without_a_summary_the_recording_is_judged_but_inconclusive(
@@ -101,7 +116,8 @@ def test_a_changed_summary_differs(tmp_path: Path, judge: Judge, key: str, chang
     (tmp_path / "summary.json").write_text(json.dumps({**summary_of(judge), key: changed}))
     verification = verify(tmp_path)
     assert {difference.key.split(".")[0] for difference in verification.differences} == {key}
-    assert verification.exit_status == 1
+    assert verification.exit_status == 3
+    assert f"inconclusive (summary.json differs in {key}" in verified(verification)
 
 
 def test_a_changed_figure_in_a_list_differs(tmp_path: Path, judge: Judge) -> None:
@@ -129,7 +145,8 @@ def test_held_is_exit_0_and_a_missed_expectation_1(tmp_path: Path) -> None:
         (tmp_path / name).mkdir()
         recorder = RunRecorder(tmp_path / name / "run.rrd", scenario, name, mode="virtual")
         judge = record(recorder, scenario, list(straight_flight(scenario)))
-        write_summary(tmp_path / name, judge, outcome="pass" if name == "calm" else "fail")
+        outcome = "pass" if name == "calm" else "fail"
+        write_summary(tmp_path / name, judge, scenario, outcome=outcome)
     assert verify(tmp_path / "calm").exit_status == 0
     assert verify(tmp_path / "short").exit_status == 1
 
@@ -139,7 +156,10 @@ def test_missing_packets_are_found_in_the_recording(tmp_path: Path) -> None:
     *ticks, last = straight_flight(scenario)
     last.packets["in_flight"] -= 1
     recorder = RunRecorder(tmp_path / "run.rrd", scenario, "leaky", mode="virtual")
-    write_summary(tmp_path, record(recorder, scenario, [*ticks, last]), outcome="fail")
+    packets = last.packets
+    write_summary(
+        tmp_path, record(recorder, scenario, [*ticks, last]), outcome="fail", packets=packets
+    )
     verification = verify(tmp_path)
     assert verification.invariants["I8"] == InvariantTally(len(ticks) + 1, 1)
     assert verification.exit_status == 1
@@ -152,7 +172,7 @@ def test_packets_are_judged_from_the_first_counters_on(tmp_path: Path) -> None:
         tick.packets.clear()
     recorder = RunRecorder(tmp_path / "run.rrd", scenario, "late", mode="lockstep")
     judge = record(recorder, scenario, ticks)
-    (tmp_path / "summary.json").write_text(json.dumps(summary_of(judge)))
+    write_summary(tmp_path, judge, mode="lockstep")
     verification = verify(tmp_path)
     assert verification.invariants["I8"] == InvariantTally(len(ticks) - 3, 0)
     assert verification.differences == ()

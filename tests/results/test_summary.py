@@ -14,7 +14,7 @@ from worldsim.campaign.pool import finished
 from worldsim.engine.step import SlotLoop, world_of
 from worldsim.engine.virtual import fly
 from worldsim.judge.hovering_vehicles import HoveringVehicles
-from worldsim.judge.invariants import Invariants
+from worldsim.judge.invariants import Invariants, InvariantTally
 from worldsim.results.exit_status import EXIT_STATUS
 from worldsim.results.provenance import provenance
 from worldsim.results.summary import FATES, INVARIANT_WORDS, FinishedRun, Summary, summarise
@@ -132,6 +132,24 @@ def test_a_slow_host_does_not_excuse_a_collision(run: FinishedRun) -> None:
     assert made["reason"] == (
         "violated: I1 (two vehicles, or a vehicle and an obstacle, were too near)"
     )
+
+
+@pytest.mark.parametrize("name", ["I2", "I3", "I4", "I6", "I7"])
+def test_news_that_comes_late_on_a_slow_host_is_no_failure_of_the_team(
+    run: FinishedRun, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tallies = {"I1": InvariantTally(20), name: InvariantTally(20, 3), "I8": InvariantTally(20)}
+    monkeypatch.setattr(run.loop.judge, "invariants", lambda: tallies)
+    words = f"{name} ({INVARIANT_WORDS[name]})"
+    assert summary(run)["reason"] == f"violated: {words}"
+    made = summary(run, late_tick_fraction=0.02)
+    assert made["outcome"] == "inconclusive"
+    assert made["reason"] == (
+        f"the host was too slow: 2.0 % of ticks were late; violated meanwhile: {words}"
+    )
+    blamed = summary(run, late_tick_fraction=0.02, slowed_by="netem was stopped")
+    assert blamed["reason"] is not None
+    assert blamed["reason"].startswith("netem was stopped: 2.0 % of ticks were late; ")
 
 
 def test_every_invariant_has_words() -> None:

@@ -63,7 +63,7 @@ def _flight(scenario: Scenario) -> Iterator[tuple[Tick, Figures]]:
     phase = generator.uniform(0.0, 2.0 * np.pi, (agents, 3))
     for index in range(round(DURATION_S * tick_hz)):
         time_s = index / tick_hz
-        position = (lattice + SWAY_M * np.sin(time_s + phase)).astype(np.float32)
+        position = lattice + SWAY_M * np.sin(time_s + phase)
         error = generator.uniform(0.0, 2.0, (4, agents))
         changed = index // round(tick_hz)
         tick = Tick(
@@ -74,7 +74,7 @@ def _flight(scenario: Scenario) -> Iterator[tuple[Tick, Figures]]:
             target=lattice.astype(np.float32),
             place=_places(agents, changed),
             force=error[2].astype(np.float32),
-            turn_deg=error[3].astype(np.float32),
+            turn_deg=error[3],
             alive=np.ones(agents, dtype=np.bool_),
             links=_links(position),
             mission=np.zeros(agents, dtype=np.int64),

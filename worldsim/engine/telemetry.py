@@ -56,21 +56,17 @@ class FleetTelemetry:
         """
         rows, turns_deg = self._rows(running)
         reasons = np.array(
-            [
-                (*(row.target or NO_TARGET), row.force, turn_deg)
-                for row, turn_deg in zip(rows, turns_deg, strict=True)
-            ],
-            dtype=np.float32,
+            [(*(row.target or NO_TARGET), row.force) for row in rows], dtype=np.float32
         )
         return Tick(
             index=world.slot // world.clock.slots_per_tick,
             time_s=world.time_s,
-            position=world.vehicles.position.astype(np.float32),
+            position=world.vehicles.position.copy(),
             attitude=_attitude(world),
             target=reasons[:, :3],
             place=np.array([row.place or NO_PLACE for row in rows], dtype=np.int16),
             force=reasons[:, 3],
-            turn_deg=reasons[:, 4],
+            turn_deg=np.array(turns_deg, dtype=np.float64),
             alive=running.copy(),
             mission=np.array([row.mission for row in rows], dtype=np.int64),
             links=_links(rows) if recorded else NO_LINKS,

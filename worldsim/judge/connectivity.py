@@ -97,7 +97,7 @@ class Connectivity:
 
     def _linked(self, tick: Tick) -> NDArray[np.bool_]:
         """Return which pairs of running agents are linked (N, N)."""
-        position = tick.position.astype(np.float64)
+        position = tick.position
         away = position[:, None] - position[None]
         near = np.sqrt(np.sum(away * away, axis=2)) <= self._range_m
         near &= self._uncut

@@ -16,7 +16,8 @@ from agent.guidance.target_on_queue import TargetOnQueue
 from agent.messages import Place
 from agent.qstructure.formation import Layout
 from worldsim.judge.phase import Phase
-from worldsim.judge.tick import Float32s, Tick
+from worldsim.judge.tick import Tick
+from worldsim.truth.vehicle import Floats
 
 NO_AGENT = -1
 
@@ -29,7 +30,7 @@ class HoveringVehicles:
 
     def __init__(self, spacing: float) -> None:
         self._targets = TargetOnQueue(NO_AGENT, spacing)
-        self._positions: deque[tuple[float, Float32s]] = deque()
+        self._positions: deque[tuple[float, Floats]] = deque()
 
     def see(self, tick: Tick) -> None:
         """Remember where all vehicles are; ticks come in order."""

@@ -2,12 +2,14 @@
 
 import numpy as np
 
-from worldsim.judge.tick import Float32s, Packets
+from worldsim.judge.tick import Packets
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
 
 MIN_SQUARE_M2 = 1e-300
 """The divisor used for the square of a path without length [m^2]."""
+ROUNDING_M = 1e-9
+"""A distance this much below its bound keeps it [m]: at 1e6 m, positions are rounded to 1e-10 m."""
 FATES = ("delivered", "dropped_", "in_flight")
 """Prefixes of the counters that together hold every addressed packet."""
 
@@ -18,7 +20,7 @@ class Separation:
     def __init__(self) -> None:
         self._relative_before: Floats | None = None
 
-    def swept(self, position: Float32s) -> Floats:
+    def swept(self, position: Floats) -> Floats:
         """Return the distances (N,) [m] since the previous tick; at the first tick, those now.
 
         position: (N, 3) [m; world frame]. Motion between ticks is taken as straight. NaN rows, and
@@ -51,15 +53,20 @@ def swept_obstacle_distance(
     return least
 
 
+def keeps(distance_m: float, bound_m: float) -> bool:
+    """Return whether a distance [m] is no less than its bound, but for rounding."""
+    return distance_m >= bound_m - ROUNDING_M
+
+
 def conserved(packets: Packets) -> bool:
     """Return whether every addressed packet was delivered or dropped, or is in flight (I8)."""
     known = sum(count for name, count in packets.items() if name.startswith(FATES))
     return known == packets["addressed"]
 
 
-def _relative_positions(position: Float32s) -> Floats:
+def _relative_positions(position: Floats) -> Floats:
     """Return x, y, z of vehicle j relative to vehicle i, (3, N, N) [m; world axes]."""
-    axes: Floats = position.T.astype(np.float64)
+    axes = position.T
     return axes[:, None, :] - axes[:, :, None]
 
 

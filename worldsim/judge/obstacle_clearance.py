@@ -28,9 +28,8 @@ class ObstacleClearance:
 
         Too near is less than ``bound_m``.
         """
-        starts, ends = before.position.astype(np.float64), tick.position.astype(np.float64)
         times_s = (before.time_s, tick.time_s)
-        distance = swept_obstacle_distance(starts, ends, self._obstacles, times_s)
+        distance = swept_obstacle_distance(before.position, tick.position, self._obstacles, times_s)
         least = float(np.fmin.reduce(distance, initial=np.inf))
         if least < inf and (self.least_m is None or least < self.least_m):
             self.least_m = least

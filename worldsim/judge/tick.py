@@ -1,13 +1,16 @@
 """What is judged and recorded once a tick: the same rows for both, so that both agree.
 
-Rows are single precision, as the recording stores them. A verdict recomputed from the recording
-therefore has the numbers of the first one. (The trace hash covers every slot in double precision.)
+What is judged is stored as it is: positions and turns in double precision, so that a figure is as
+exact far from the origin as at it. A verdict recomputed from the recording therefore has the
+numbers of the first one.
 """
 
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+
+from worldsim.truth.vehicle import Floats
 
 Float32s = NDArray[np.float32]
 Packets = dict[str, int]
@@ -38,12 +41,12 @@ class Tick:
 
     index: int
     time_s: float  # simulated time [s]
-    position: Float32s  # (N, 3) [m; world frame]
+    position: Floats  # (N, 3) [m; world frame]
     attitude: Float32s  # (N, 3) yaw, pitch, roll [rad]
     target: Float32s  # (N, 3) target-on-queue [m; world frame], NaN for none
     place: NDArray[np.int16]  # (N, 2) queue and rank claimed, -1 for none
     force: Float32s  # (N,) |u_i| of (28)
-    turn_deg: Float32s  # (N,) desired azimuth minus heading [deg], NaN for a step without motion
+    turn_deg: Floats  # (N,) desired azimuth minus heading [deg], NaN for a step without motion
     alive: NDArray[np.bool_]  # (N,) whether the process takes part, and is not paused
     links: NDArray[np.int32]  # (L, 2) hearer and heard
     mission: NDArray[np.int64]  # (N,) key of the mission that the agent flies

@@ -6,7 +6,7 @@ of a recording, it reaches the same verdict.
 
 from dataclasses import dataclass
 from math import inf
-from typing import assert_never
+from typing import NamedTuple, assert_never
 
 import msgspec
 import numpy as np
@@ -15,7 +15,7 @@ from agent.guidance.cone import cone_of
 from agent.qstructure.formation import formation_of
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.invariants import Invariants, InvariantTally
-from worldsim.judge.metrics import Separation, conserved
+from worldsim.judge.metrics import Separation, conserved, keeps
 from worldsim.judge.obstacle_clearance import ObstacleClearance
 from worldsim.judge.phase import Phase
 from worldsim.judge.queue_convergence import QueueConvergence
@@ -74,6 +74,17 @@ class Expectation(msgspec.Struct, frozen=True, kw_only=True):
     """The measured value; None where there is none."""
     held: bool
     """Whether the requirement is met."""
+
+
+class Shortcomings(NamedTuple):
+    """What speaks against a run; a run without any passes."""
+
+    violated: list[str]
+    """Invariants that were violated."""
+    unseen: list[str]
+    """Invariants that were never evaluated, and have to be."""
+    missed: list[str]
+    """Names of expectations that were not met."""
 
 
 class Judge:
@@ -195,6 +206,15 @@ class Judge:
         allocation = {name: tally for name, tally in tallies.items() if tally.ticks}
         return {"I1": self._safety, **allocation, "I8": self._conservation}
 
+    def shortcomings(self) -> Shortcomings:
+        """Return what speaks against the run."""
+        tallies = self.invariants()
+        return Shortcomings(
+            violated=[name for name, tally in tallies.items() if tally.violations],
+            unseen=[name for name, tally in tallies.items() if not tally.ticks],
+            missed=[row.name for row in self.expectations() if not row.held],
+        )
+
     def _open_phase(self, event: MissionRunEvent) -> None:
         formation = formation_of(event.tables, self._scenario.control.spacing_m)
         self.phases.append(Phase(formation, event.t_s, event.path, event.mission))
@@ -203,12 +223,12 @@ class Judge:
     def _separated(self) -> Expectation:
         wanted_m = self._scenario.separation_bound_m
         least_m = self.min_separation_m
-        held = least_m >= wanted_m if least_m is not None else self._scenario.fleet.agents == 1
+        held = keeps(least_m, wanted_m) if least_m is not None else self._scenario.fleet.agents == 1
         return Expectation(name="min_separation_m", wanted=wanted_m, got=least_m, held=held)
 
     def _cleared(self) -> Expectation:
         wanted_m, least_m = self.clearance.bound_m, self.min_obstacle_distance_m
-        held = least_m is not None and least_m >= wanted_m
+        held = least_m is not None and keeps(least_m, wanted_m)
         return Expectation(name="min_obstacle_distance_m", wanted=wanted_m, got=least_m, held=held)
 
     def _converged(self, phase: Phase) -> Expectation:
@@ -241,7 +261,7 @@ class Judge:
             return False
         if self.min_separation_m is None or least < self.min_separation_m:
             self.min_separation_m = least
-        return least < self._scenario.control.separation_m
+        return not keeps(least, self._scenario.control.separation_m)
 
 
 def _started(event: Restarted | Joined) -> Expectation:

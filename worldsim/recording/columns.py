@@ -84,7 +84,7 @@ def number_column(component: str, rows: NDArray[Any]) -> rr.ComponentColumn:
     return rr.ComponentColumn(component, rr.AnyBatchValue(component, values), lengths=lengths)
 
 
-def line_strips(lines: NDArray[np.float32]) -> Array:
+def line_strips(lines: NDArray[np.float64]) -> Array:
     """Return lines (K, 2, 3) [m; world frame] as rerun stores strips.
 
     The strips are given as an Arrow array, because rerun converts other types one by one.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from agent.comms.hierarchy import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
 from agent.messages import ROLES
-from worldsim.judge.tick import NO_ROLE, Float32s, HierarchyRows, Tick
+from worldsim.judge.tick import NO_ROLE, HierarchyRows, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout, palette
 from worldsim.recording.columns import (
@@ -20,6 +20,7 @@ from worldsim.recording.columns import (
     LineRateLimiter,
     line_strips,
 )
+from worldsim.truth.vehicle import Floats
 
 SAMPLES_HZ = 4.0
 LINES_PER_S = 500
@@ -142,9 +143,7 @@ def role_name(role: int) -> str:
     return palette.ABSENT if role == NO_ROLE else ROLES[role]
 
 
-def parent_lines(
-    position: Float32s, hierarchy: HierarchyRows
-) -> tuple[Float32s, NDArray[np.int16]]:
+def parent_lines(position: Floats, hierarchy: HierarchyRows) -> tuple[Floats, NDArray[np.int16]]:
     """Return a line from each agent to its parent (K, 2, 3) [m; world frame], and its tier (K,).
 
     position (N, 3) [m; world frame].

@@ -9,7 +9,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from worldsim.judge.tick import Float32s, Tick
+from worldsim.judge.tick import Tick
 from worldsim.recording import layout
 from worldsim.recording.columns import (
     ChangeDetector,
@@ -18,6 +18,7 @@ from worldsim.recording.columns import (
     line_strips,
     number_column,
 )
+from worldsim.truth.vehicle import Floats
 
 LINES_MAX = 400
 LINES_PER_S = 2000
@@ -62,7 +63,7 @@ class LinkColumns:
             yield ColumnBlock(layout.LINKS, rows, columns.partition(lengths))
 
 
-def link_lines(tick: Tick) -> Float32s:
+def link_lines(tick: Tick) -> Floats:
     """Return a line (K, 2, 3) [m; world frame] for each pair of agents with a link.
 
     A pair has one line, whether one or both hear the other. Of more than LINES_MAX, the shortest
@@ -72,12 +73,12 @@ def link_lines(tick: Tick) -> Float32s:
     hearer, heard = np.divmod(_pair_codes(tick), agents)
     low, high = np.minimum(hearer, heard), np.maximum(hearer, heard)
     pairs = np.unique((low * agents + high)[low < high])
-    ends: Float32s = tick.position[np.stack(np.divmod(pairs, agents), axis=1)]
+    ends: Floats = tick.position[np.stack(np.divmod(pairs, agents), axis=1)]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     if len(ends) > LINES_MAX:
         shortest = np.sort(np.argsort(length, kind="stable")[:LINES_MAX])
         ends, length = ends[shortest], length[shortest]
-    in_world: Float32s = ends[np.isfinite(length)]
+    in_world: Floats = ends[np.isfinite(length)]
     return in_world
 
 

@@ -22,15 +22,16 @@ from rerun.error_utils import RerunWarning
 from worldsim.judge.run_events import RunEvent, event_of
 from worldsim.judge.tick import Packets, Tick
 from worldsim.recording import layout
-from worldsim.recording.rrd_file import readable
+from worldsim.recording.rrd_file import is_finished, is_recording, readable
 from worldsim.scenario.file import parse
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
+from worldsim.scenario.toml import ScenarioError
 
 Column = dict[int, NDArray[Any]]
 """One component of one entity: a flat row for each tick that has one."""
 
 EVERY_TICK = (
-    (layout.AGENTS, layout.POSITIONS),
+    (layout.AGENT_STATE, layout.POSITION),
     (layout.TARGETS, layout.POSITIONS),
     (layout.FORCE, layout.SCALARS),
     (layout.TURN_DEG, layout.SCALARS),
@@ -39,11 +40,17 @@ EVERY_TICK = (
     (layout.AGENT_STATE, layout.ATTITUDE),
 )
 """Columns with a row for every tick; ``_ticks`` takes them in this order."""
+DRAWN_POSITION = (layout.AGENTS, layout.POSITIONS)
+"""What the viewer draws, in single precision: all that an older recording has of positions."""
 COMPONENTS = {component for _, component in EVERY_TICK} | {layout.HEARS, layout.MISSION}
 
 
 class RecordingError(Exception):
-    """A missing recording, or a file without a readable run; the text names it and says why."""
+    """A missing recording, or a file that is none; the text names it and says why."""
+
+
+class DamagedError(RecordingError):
+    """A recording that cannot be read, or not as a whole: it proves nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,18 +63,40 @@ class Readback:
     """In order; without ``hierarchy``, which is not judged."""
     events: list[RunEvent]
     """As in events.jsonl, in order of recording."""
+    mode: str | None
+    """"processes", "lockstep" or "virtual"; None where the recording does not say it."""
+    finished: bool
+    """Whether its recorder wrote it to its end."""
+    exact: bool
+    """Whether positions are those that were judged. An older recording has them only as drawn."""
 
 
 def read_run(path: Path) -> Readback:
-    """Return the run that a recording holds. Raises RecordingError."""
+    """Return the run that a recording holds. Raises RecordingError.
+
+    A damaged file can end this process: rerun's reader aborts on some. See ``isolated_reader``.
+    """
     if not path.is_file():
         raise RecordingError(f"{path}: no such recording")
+    if not is_recording(path):
+        raise RecordingError(f"{path}: not a recording")
     try:
         columns = _RecordedColumns(_chunks(path))
     except msgspec.ValidationError as error:
-        raise RecordingError(f"{path}: holds an unknown event: {error}") from error
-    scenario = _scenario(columns, path)
-    return Readback(scenario=scenario, ticks=_ticks(columns, scenario), events=columns.events)
+        raise DamagedError(f"{path}: holds an unknown event: {error}") from error
+    scenario, exact = _scenario(columns, path), bool(columns.column(*EVERY_TICK[0]))
+    try:
+        ticks = _ticks(columns, scenario, EVERY_TICK[0] if exact else DRAWN_POSITION)
+    except (ValueError, OverflowError) as error:
+        raise DamagedError(f"{path}: damaged: {error}") from error
+    return Readback(
+        scenario=scenario,
+        ticks=ticks,
+        events=columns.events,
+        mode=columns.mode,
+        finished=is_finished(path),
+        exact=exact,
+    )
 
 
 class _RecordedColumns:
@@ -77,6 +106,7 @@ class _RecordedColumns:
         self._columns: dict[tuple[str, str], Column] = {}
         self.events: list[RunEvent] = []
         self.scenario_text: str | None = None
+        self.mode: str | None = None
         for chunk in chunks:
             self._read(chunk)
 
@@ -93,6 +123,8 @@ class _RecordedColumns:
         batch = chunk.to_record_batch()
         if chunk.entity_path == layout.SCENARIO:
             self.scenario_text = batch.column("TextDocument:text")[0].as_py()[0]
+        elif chunk.entity_path == layout.RUN_PROPERTIES:
+            self.mode = batch.column(layout.MODE)[0].as_py()[0]
         elif chunk.is_static:
             return
         elif chunk.entity_path == layout.EVENTS:
@@ -127,20 +159,23 @@ def _chunks(path: Path) -> list[Chunk]:
             simplefilter("ignore", RerunWarning)
             return list(RrdReader(file).stream())
     except (RuntimeError, ValueError, OSError) as error:
-        raise RecordingError(f"{path}: cannot be read: {error}") from error
+        raise DamagedError(f"{path}: cannot be read: {error}") from error
 
 
 def _scenario(columns: _RecordedColumns, path: Path) -> Scenario:
     text = columns.scenario_text
     if text is None:
-        raise RecordingError(f"{path}: not a recording of a run: it holds no scenario")
-    return parse(text.removeprefix("```toml\n").removesuffix("```\n"), path)
+        raise DamagedError(f"{path}: holds no scenario: it is no run's, or not whole")
+    try:
+        return parse(text.removeprefix("```toml\n").removesuffix("```\n"), path)
+    except ScenarioError as error:
+        raise DamagedError(f"{error} (the scenario in the recording)") from error
 
 
-def _ticks(columns: _RecordedColumns, scenario: Scenario) -> list[Tick]:
-    """Return the ticks of which every row is there."""
+def _ticks(columns: _RecordedColumns, scenario: Scenario, positions: tuple[str, str]) -> list[Tick]:
+    """Return the ticks of which every row is there. Raises ValueError for rows of a wrong size."""
     agents = scenario.rows
-    always = [columns.column(*name) for name in EVERY_TICK]
+    always = [columns.column(*name) for name in (positions, *EVERY_TICK[1:])]
     position, target, force, turn, place, alive, attitude = always
     complete = sorted(set(position).intersection(*always))
     hears = _latest(columns.column(layout.LINK_STATE, layout.HEARS), complete, _no_links(agents))
@@ -151,15 +186,15 @@ def _ticks(columns: _RecordedColumns, scenario: Scenario) -> list[Tick]:
         Tick(
             index=index,
             time_s=index * SLOTS_PER_TICK / scenario.slot_hz,
-            position=position[index].reshape(-1, 3),
-            attitude=attitude[index].reshape(-1, 3),
-            target=target[index].reshape(-1, 3),
-            place=place[index].reshape(-1, 2),
-            force=force[index].astype(np.float32),
-            turn_deg=turn[index].astype(np.float32),
-            alive=alive[index].astype(np.bool_),
+            position=position[index].astype(np.float64).reshape(agents, 3),
+            attitude=attitude[index].reshape(agents, 3),
+            target=target[index].reshape(agents, 3),
+            place=place[index].reshape(agents, 2),
+            force=force[index].astype(np.float32).reshape(agents),
+            turn_deg=turn[index].astype(np.float64).reshape(agents),
+            alive=alive[index].astype(np.bool_).reshape(agents),
             links=_links(hears[row], agents),
-            mission=mission[row].astype(np.int64),
+            mission=mission[row].astype(np.int64).reshape(agents),
             packets=packets[row],
         )
         for row, index in enumerate(complete)

@@ -11,13 +11,35 @@ from pathlib import Path
 from shutil import copyfileobj
 from struct import Struct
 from tempfile import TemporaryDirectory
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
+MAGIC = b"RRF2"
 HEADER_B = 12
 FOOTER_B = 32
 COPY_STEP_B = 1024 * 1024
 _FRAME_HEAD = Struct("<QQ")
 _INDEX_KIND = 0
+
+
+class _Frame(NamedTuple):
+    """One frame of a file."""
+
+    kind: int
+    end: int
+    """Its end in the file, with the footer after an index [bytes]."""
+
+
+def is_recording(path: Path) -> bool:
+    """Return whether a file begins as a recording does."""
+    with path.open("rb") as file:
+        return file.read(len(MAGIC)) == MAGIC
+
+
+def is_finished(path: Path) -> bool:
+    """Return whether a recording ends with its index, which its recorder writes last."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        return any(frame.kind == _INDEX_KIND for frame in _frames(file, size))
 
 
 @contextmanager
@@ -43,17 +65,23 @@ def readable(path: Path) -> Iterator[Path]:
 
 def complete_b(file: BinaryIO, size: int) -> int:
     """Return the length [bytes] of the part with complete frames, of a file of ``size`` [bytes]."""
+    return max((frame.end for frame in _frames(file, size)), default=min(HEADER_B, size))
+
+
+def _frames(file: BinaryIO, size: int) -> Iterator[_Frame]:
+    """Yield the complete frames of a file of ``size`` [bytes], in order."""
     at = HEADER_B
     while at < size:
         file.seek(at)
         head = file.read(_FRAME_HEAD.size)
         if len(head) < _FRAME_HEAD.size:
-            return at
+            return
         kind, length = _FRAME_HEAD.unpack(head)
-        end = at + _FRAME_HEAD.size + length
+        at += _FRAME_HEAD.size + length
         if kind == _INDEX_KIND:
-            return size if end + FOOTER_B == size else at
-        if end > size:
-            return at
-        at = end
-    return size
+            if at + FOOTER_B == size:
+                yield _Frame(kind, size)
+            return
+        if at > size:
+            return
+        yield _Frame(kind, at)

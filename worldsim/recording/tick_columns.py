@@ -156,6 +156,7 @@ def _metrics(ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Colu
 def _state(ticks: Sequence[Tick]) -> ColumnBlock:
     """Return what a judge needs to repeat the verdict and no view shows."""
     columns = [
+        number_column(layout.POSITION, np.stack([tick.position for tick in ticks])),
         number_column(layout.PLACE, np.stack([tick.place for tick in ticks])),
         number_column(layout.ALIVE, np.stack([tick.alive for tick in ticks]).astype(np.uint8)),
         number_column(layout.ATTITUDE, np.stack([tick.attitude for tick in ticks])),

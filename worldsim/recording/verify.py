@@ -1,33 +1,43 @@
 """The verdict recomputed from a recording alone, and compared with the run's summary.
 
 A new judge sees the recorded ticks. They are the rows that the run's judge saw, so its figures are
-equal, not merely close: any difference means that summary and recording do not belong together.
+equal, not merely close: any difference means that summary and recording do not belong together, and
+then neither proves anything.
 """
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from math import isfinite
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 import msgspec
 
 from worldsim.judge.event import PlannedEvent
 from worldsim.judge.invariants import InvariantTally
-from worldsim.judge.phase import Phase
 from worldsim.judge.recovery import Recovery
 from worldsim.judge.run_events import RunEvent
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Expectation, Judge
+from worldsim.recording.isolated_reader import read_run_apart
 from worldsim.recording.layout import RECORDING_FILE, SUMMARY_FILE
-from worldsim.recording.readback import Readback, RecordingError, read_run
+from worldsim.recording.readback import DamagedError, Readback, RecordingError
 
 EVENT_TIME_SLACK_S = 1e-6
 """Event times are rounded to the microsecond."""
+Figure = float | None
 HELD, NOT_HELD, UNREADABLE, INCONCLUSIVE = 0, 1, 2, 3
 TIME_SLACK_S = 1e-9
-
-Figure = float | None
+ABSENT = "no such key"
+"""Stands for a value that is not there."""
+MAX_NAMED = 4
+"""Of more differences, the first are named."""
+MAX_REASON = 300
+"""Length of the reason for which a recording cannot be read [characters]."""
+REPEATABLE = ("lockstep", "virtual")
+"""Modes in which the radio's counters at the last tick are those of the summary."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +58,7 @@ class PhaseFigures:
     converged: bool
     converge_s: Figure
     residual_m: Figure
+    queues_converge_s: dict[str, Figure]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +68,12 @@ class Verification:
     run: Path
     problem: str | None = None
     """Why nothing could be judged, in one line; None where the recording was judged."""
+    damaged: bool = False
+    """Whether there is a recording, but it cannot be read."""
+    finished: bool = True
+    """Whether the recording was written to its end."""
+    exact: bool = True
+    """Whether the recording holds the positions that were judged; an older one has them rounded."""
     scenario: str | None = None
     ticks: int = 0
     until_s: float = 0.0
@@ -72,6 +89,10 @@ class Verification:
     phases: tuple[PhaseFigures, ...] = ()
     recoveries: tuple[Recovery, ...] = ()
     invariants: dict[str, InvariantTally] = field(default_factory=dict)
+    passes: bool = False
+    """Whether nothing that the recording shows speaks against the run."""
+    figures: dict[str, Any] = field(default_factory=dict)
+    """Everything that was recomputed, under the keys of summary.json."""
     summary: bool = False
     """Whether there is a summary to compare with."""
     doubt: str | None = None
@@ -80,34 +101,34 @@ class Verification:
 
     @property
     def whole(self) -> bool:
-        """Whether the recording reaches the end that its scenario asks for."""
+        """Whether the recording is all there, to the end that its scenario asks for."""
         last_s = self.duration_s - self.tick_s  # a duration need not end with a tick
-        return self.problem is None and self.until_s >= last_s - TIME_SLACK_S
+        reaches = self.until_s >= last_s - TIME_SLACK_S
+        return self.problem is None and self.finished and reaches
 
     @property
     def inconclusive(self) -> str | None:
         """Why the recording neither passes nor fails; None where it does."""
         if self.doubt is None and not self.whole:
-            return f"the recording ends at {self.until_s:.4g} s of {self.duration_s:g} s"
+            ends = "ends" if self.finished else "is cut off: it ends"
+            return f"the recording {ends} at {self.until_s:.4g} s of {self.duration_s:g} s"
+        if self.doubt is None and self.differences:
+            keys = ", ".join(each.key for each in self.differences[:MAX_NAMED])
+            more = f" and {len(self.differences) - MAX_NAMED} more"
+            return f"{SUMMARY_FILE} differs in {keys}{more * (len(self.differences) > MAX_NAMED)}"
         return self.doubt
 
     @property
     def held(self) -> bool:
         """Whether the recorded run passes, and no figure differs from the summary's."""
-        return self.inconclusive is None and self.passes and not self.differences
-
-    @property
-    def passes(self) -> bool:
-        """Whether every expectation held and no invariant was violated, at one tick or more."""
-        violations = sum(tally.violations for tally in self.invariants.values())
-        return self.ticks > 0 and not violations and all(row.held for row in self.expectations)
+        return self.problem is None and self.inconclusive is None and self.passes
 
     @property
     def exit_status(self) -> int:
-        """0: held; 1: not held; 2: no such run, or no readable recording; 3: inconclusive."""
-        if self.problem is not None:
+        """0: held; 1: not held; 2: no such run, or no recording; 3: inconclusive."""
+        if self.problem is not None and not self.damaged:
             return UNREADABLE
-        if self.inconclusive is not None:
+        if self.damaged or self.inconclusive is not None:
             return INCONCLUSIVE
         return HELD if self.held else NOT_HELD
 
@@ -118,40 +139,75 @@ def verify(run: Path) -> Verification:
     if not recording.is_file() and any(run.glob("*/scenario.toml")):
         return Verification(run, problem=f"{run}: a folder of many runs; name one of them")
     try:
-        judged = _judged(run, recording)
-        return _compared(judged, recording.with_name(SUMMARY_FILE))
+        return compared(judged_again(run, recording), recording.with_name(SUMMARY_FILE))
+    except DamagedError as error:
+        return Verification(run, problem=f"inconclusive: {_one_line(str(error))}", damaged=True)
     except RecordingError as error:
-        return Verification(run, problem=str(error))
+        damaged = run.is_dir() and recording.is_file()
+        return Verification(run, problem=str(error), damaged=damaged)
 
 
-def _judged(run: Path, recording: Path) -> Verification:
-    readback = read_run(recording)
-    judge = _judge_of(readback)
+def judged_again(run: Path, recording: Path) -> Verification:
+    """Judge a recording again. Raises RecordingError."""
+    readback = read_run_apart(recording)
+    judge, scenario = _judge_of(readback), readback.scenario
+    found = judge.shortcomings()
     return Verification(
         run=run,
-        scenario=readback.scenario.name,
+        finished=readback.finished,
+        exact=readback.exact,
+        scenario=scenario.name,
         ticks=judge.ticks,
         until_s=readback.ticks[-1].time_s if readback.ticks else 0.0,
-        duration_s=readback.scenario.duration_s,
-        tick_s=1.0 / readback.scenario.fleet.tick_hz,
+        duration_s=scenario.duration_s,
+        tick_s=1.0 / scenario.fleet.tick_hz,
         expectations=tuple(judge.expectations()),
         min_separation_m=judge.min_separation_m,
         min_obstacle_distance_m=judge.min_obstacle_distance_m,
         turns_over_limit_fraction=judge.turns_over_limit_fraction,
-        phases=tuple(_phase_figures(phase) for phase in judge.phases),
+        phases=tuple(_phases(judge)),
         recoveries=tuple(judge.recoveries),
         invariants=judge.invariants(),
+        passes=judge.ticks > 0 and not any(found),
+        figures=_figures(readback, judge),
     )
 
 
-def _phase_figures(phase: Phase) -> PhaseFigures:
-    return PhaseFigures(
-        formation=phase.formation.name,
-        from_s=phase.from_s,
-        converged=phase.converge_s is not None,
-        converge_s=phase.converge_s,
-        residual_m=phase.residual_m,
-    )
+def _figures(readback: Readback, judge: Judge) -> dict[str, Any]:
+    """Return the figures of a run that its recording shows, under the keys of summary.json."""
+    scenario, last = readback.scenario, readback.ticks[-1:]
+    packets = last[0].packets if last and readback.mode in REPEATABLE else {}
+    figures = {
+        "scenario": scenario.name,
+        "seed": scenario.seed,
+        "mode": readback.mode,
+        "agents": scenario.fleet.agents,
+        "duration_s": scenario.slots / scenario.slot_hz,
+        "expectations": [msgspec.structs.asdict(row) for row in judge.expectations()],
+        "min_separation_m": judge.min_separation_m,
+        "min_obstacle_distance_m": judge.min_obstacle_distance_m,
+        "phases": [asdict(phase) for phase in _phases(judge)],
+        "recoveries": [msgspec.structs.asdict(recovery) for recovery in judge.recoveries],
+        "attitude_error_deg": judge.attitude_error_deg,
+        "turns_over_limit_fraction": judge.turns_over_limit_fraction,
+        "packets": packets,
+        "invariants": {
+            name: msgspec.structs.asdict(tally) for name, tally in judge.invariants().items()
+        },
+    }
+    return {key: _finite(value) for key, value in figures.items()}
+
+
+def _phases(judge: Judge) -> Iterator[PhaseFigures]:
+    for phase, queues in zip(judge.phases, judge.queues, strict=True):
+        yield PhaseFigures(
+            formation=phase.formation.name,
+            from_s=phase.from_s,
+            converged=phase.converge_s is not None,
+            converge_s=phase.converge_s,
+            residual_m=phase.residual_m,
+            queues_converge_s=dict(zip(queues.names, queues.converge_s, strict=True)),
+        )
 
 
 def _judge_of(readback: Readback) -> Judge:
@@ -176,15 +232,16 @@ def _comes_before(event: RunEvent, tick: Tick) -> bool:
     return event.t_s <= tick.time_s + slack_s
 
 
-def _compared(judged: Verification, file: Path) -> Verification:
+def compared(judged: Verification, file: Path) -> Verification:
+    """Return a judged recording with what differs in a summary."""
     if not file.is_file():
         doubt = f"no {SUMMARY_FILE}: the run has not finished, or was ended by force"
         return replace(judged, doubt=doubt)
     try:
-        summary = json.loads(file.read_text())
-    except ValueError as error:
-        raise RecordingError(f"{file}: cannot be read: {error}") from error
-    differences = tuple(_differences(summary, judged))
+        summary = json.loads(file.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        return replace(judged, doubt=f"{SUMMARY_FILE} cannot be read: {error}")
+    differences = tuple(_differences(summary, judged)) if judged.whole else ()
     return replace(judged, summary=True, doubt=_doubt(summary), differences=differences)
 
 
@@ -192,47 +249,58 @@ def _doubt(summary: Any) -> str | None:
     """Return why a run is inconclusive by its summary; None where it is not."""
     if _value_at(summary, "outcome") != "inconclusive":
         return None
-    reason = _value_at(summary, "reason")
-    return f"{SUMMARY_FILE}: {reason or 'inconclusive'}"
+    reason = summary.get("reason") or "inconclusive"
+    return f"{SUMMARY_FILE}: {_one_line(str(reason))}"
 
 
 def _differences(summary: Any, judged: Verification) -> Iterator[Difference]:
     """Yield the figures that differ; a figure that the summary lacks differs too."""
-    for key, recorded in _figures_by_path(judged).items():
+    for key, recorded in judged.figures.items():
         summarised = _value_at(summary, key)
-        if summarised != recorded:
-            yield Difference(key=key, summary=summarised, recording=recorded)
-    if _value_at(summary, "outcome") == "pass" and not judged.passes:
-        yield Difference(key="outcome", summary="pass", recording="fail")
+        if key == "packets" and isinstance(summarised, dict):
+            summarised = {name: summarised[name] for name in recorded if name in summarised}
+        yield from _unequal(key, summarised, recorded)
+    outcome = _value_at(summary, "outcome")
+    recorded = "pass" if judged.passes else "fail"
+    if str(outcome) not in {"inconclusive", recorded}:
+        yield Difference("outcome", outcome, recorded)
 
 
-def _figures_by_path(judged: Verification) -> dict[str, object]:
-    """Return the figures that must be equal, by their path in summary.json."""
-    figures: dict[str, object] = {
-        "min_separation_m": judged.min_separation_m,
-        "min_obstacle_distance_m": judged.min_obstacle_distance_m,
-        "turns_over_limit_fraction": judged.turns_over_limit_fraction,
-    }
-    for name, tally in judged.invariants.items():
-        figures[f"invariants.{name}"] = msgspec.structs.asdict(tally)
-    for index, phase in enumerate(judged.phases):
-        for key in ("formation", "from_s", "converged", "converge_s", "residual_m"):
-            figures[f"phases.{index}.{key}"] = getattr(phase, key)
-    for index, recovery in enumerate(judged.recoveries):
-        for key in ("t_s", "kind", "agents", "reformed_s"):
-            figures[f"recoveries.{index}.{key}"] = getattr(recovery, key)
-    for index, row in enumerate(judged.expectations):
-        for key in ("name", "wanted", "got", "held"):
-            figures[f"expectations.{index}.{key}"] = getattr(row, key)
-    return figures
+def _unequal(key: str, summarised: Any, recorded: Any) -> Iterator[Difference]:
+    """Yield the differences of two values and of all that they hold."""
+    before, after = _items(summarised), _items(recorded)
+    if after is None or (before is None and not after):
+        # JSON has true and 1 apart, Python takes them for equal.
+        if summarised != recorded or isinstance(summarised, bool) != isinstance(recorded, bool):
+            yield Difference(key, summarised, recorded)
+        return
+    for name in dict.fromkeys((*after, *(before or {}))):
+        summarised, recorded = (before or {}).get(name, ABSENT), after.get(name, ABSENT)
+        yield from _unequal(f"{key}.{name}", summarised, recorded)
 
 
-def _value_at(summary: Any, path: str) -> Any:
-    """Return the value at a path of keys and list indices; None where there is none."""
-    value = summary
-    for key in path.split("."):
-        try:
-            value = value[int(key)] if isinstance(value, list) else value[key]
-        except (KeyError, IndexError, TypeError, ValueError):
-            return None
-    return value
+def _items(value: Any) -> dict[str, Any] | None:
+    """Return what a table, or a list of tables, holds; None for a plain value."""
+    if isinstance(value, list) and any(isinstance(each, dict) for each in value):
+        return {str(index): each for index, each in enumerate(value)}
+    return value if isinstance(value, dict) else None
+
+
+def _value_at(summary: Any, key: str) -> Any:
+    """Return the value of a key; ABSENT where there is none."""
+    return summary.get(key, ABSENT) if isinstance(summary, dict) else ABSENT
+
+
+def _finite(value: Any) -> Any:
+    """Replace NaN and infinity by None, as summary.json does."""
+    if isinstance(value, dict):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def _one_line(text: str) -> str:
+    """Return a text without line breaks and control characters, cut to a readable length."""
+    words = "".join(each if each.isprintable() else " " for each in text).split()
+    return shorten(" ".join(words), MAX_REASON, placeholder=" ...")

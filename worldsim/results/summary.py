@@ -12,7 +12,6 @@ import msgspec
 
 from netem.messages import MediumCounters
 from worldsim.engine.step import SlotLoop
-from worldsim.judge.invariants import InvariantTally
 from worldsim.judge.verdict import Expectation, Judge
 from worldsim.results.expectation_text import (
     Circumstances,
@@ -36,6 +35,9 @@ FATES = (
 )
 TOO_LATE_FRACTION = 0.01
 """From this share of late ticks on, the host is too slow for a verdict."""
+
+TIMELESS = ("I1", "I8")
+"""Invariants that hold however late messages come: safety, and the counters of packets."""
 
 INVARIANT_WORDS = {
     "I1": "two vehicles, or a vehicle and an obstacle, were too near",
@@ -63,6 +65,7 @@ class FinishedRun:
     real_time_factor: float | None  # simulated seconds in a second of wall time
     cut_off_by: str | None = None  # what ended the run before its time; None: it is complete
     failure: str | None = None  # an error during the run
+    slowed_by: str | None = None  # what made ticks late, in words; None: the host
     rejected_by_world: Mapping[str, int] = field(default_factory=dict)  # messages by cause
     delivery: "DeliveryRow | None" = None  # of frames that agents used
 
@@ -155,7 +158,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
     expectations = [_expectation_row(expectation) for expectation in judge.expectations()]
     invariants = judge.invariants()
     links = run.loop.radio_use.links()
-    outcome, reason = _outcome(run, expectations, invariants)
+    outcome, reason = _outcome(run, expectations)
     summary: Summary = {
         "schema": SCHEMA,
         "scenario": scenario.name,
@@ -191,24 +194,26 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
     return plain
 
 
-def _outcome(
-    run: FinishedRun, expectations: list[ExpectationRow], invariants: dict[str, InvariantTally]
-) -> tuple[Outcome, str | None]:
+def _outcome(run: FinishedRun, expectations: list[ExpectationRow]) -> tuple[Outcome, str | None]:
     """Return the outcome and its reason.
 
-    A violated invariant is a failure even on a slow host, and in a run that was cut off.
+    A violated invariant is a failure also in a run that was cut off. On a host that was too slow,
+    only those are that do not rest on news arriving in time: the others are named.
     """
     if run.failure is not None:
         return "fail", run.failure
-    violated = [name for name, tally in invariants.items() if tally.violations]
+    found = run.loop.judge.shortcomings()
+    late = _slowness(run)
+    excused = [name for name in found.violated if late is not None and name not in TIMELESS]
+    violated = [name for name in found.violated if name not in excused]
     if violated:
         return "fail", f"violated: {_with_words(violated)}"
-    doubt = _doubt(run)
+    doubt = _cut(run) or late
     if doubt is not None:
-        return "inconclusive", doubt
-    unseen = [name for name, tally in invariants.items() if not tally.ticks]
-    if unseen:
-        return "fail", f"never evaluated: {', '.join(unseen)}"
+        meanwhile = f"; violated meanwhile: {_with_words(excused)}" if excused else ""
+        return "inconclusive", f"{doubt}{meanwhile}"
+    if found.unseen:
+        return "fail", f"never evaluated: {', '.join(found.unseen)}"
     texts = expectation_texts(expectations, _circumstances(run))
     missed = [text for text, row in zip(texts, expectations, strict=True) if not row["held"]]
     return ("fail", "; ".join(missed)) if missed else ("pass", None)
@@ -224,14 +229,19 @@ def _circumstances(run: FinishedRun) -> Circumstances:
     return Circumstances(run.duration_s, starts_s, _recovery_rows(judge))
 
 
-def _doubt(run: FinishedRun) -> str | None:
-    """Return why a run proves nothing, or None."""
-    if run.cut_off_by is not None:
-        return f"{run.cut_off_by} after {run.duration_s:.1f} s"
+def _cut(run: FinishedRun) -> str | None:
+    """Return what ended a run before its time; None where nothing did."""
+    if run.cut_off_by is None:
+        return None
+    return f"{run.cut_off_by} after {run.duration_s:.1f} s"
+
+
+def _slowness(run: FinishedRun) -> str | None:
+    """Return who or what made too many ticks late; None where few were."""
     late = run.late_tick_fraction
     if late is None or not run.host_too_slow:
         return None
-    return f"the host was too slow: {100 * late:.1f} % of ticks were late"
+    return f"{run.slowed_by or 'the host was too slow'}: {100 * late:.1f} % of ticks were late"
 
 
 def _rejected(run: FinishedRun) -> dict[str, dict[str, int]]:

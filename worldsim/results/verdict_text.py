@@ -67,6 +67,8 @@ def verified(verification: "Verification") -> str:
         f"  DIFFERS  {each.key}: {each.summary} in summary.json, {each.recording} in the recording"
         for each in verification.differences
     ] or [f"  {SUMMARY_FILE} agrees" if verification.summary else none]
+    if not verification.exact:
+        agreement.insert(0, "  positions in single precision: recorded by an older version")
     head = (
         f"{verification.scenario}, judged from the recording alone:"
         f" {verification.ticks} ticks, {verification.until_s:g} s{cut}"

@@ -1,0 +1,186 @@
+"""Every figure of a summary that its recording shows: a changed one is named, and proves nothing.
+
+A bad recording, of any kind, never ends the process that reads it.
+"""
+
+import json
+import random
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from netem.wire.shutdown import StopRequest
+from worldsim.campaign.pool import Job, simulate
+from worldsim.recording.verify import Verification, compared, judged_again, verify
+from worldsim.scenario.file import parse
+
+SCENARIO = """
+name = "edited"
+duration_s = 6.0
+[fleet]
+agents = 3
+[formation]
+name = "line"
+vertices = { V1 = [0, 0, 0] }
+[[formation.queue]]
+name = "Q1"
+vertices = ["V1"]
+shape = { kind = "ray", direction = [-1, 0, 0] }
+orientation = { yaw_deg = "0" }
+[[obstacle]]
+shape = "sphere"
+centre_m = [9, 9, 9]
+radius_m = 0.5
+[[event]]
+at_s = 2.0
+kill = [2]
+[expect]
+converge = false
+"""
+UNRECORDED = {
+    "schema", "reason", "rejected_by_cause", "direct_links", "bytes_per_s", "delivery",
+    "delivery_late_ms", "late_tick_fraction", "real_time_factor", "trace_sha256", "version",
+    "commit", "commit_dirty", "python", "packages", "host",
+}  # fmt: skip
+"""Keys of summary.json of which a recording shows nothing."""
+BITS = (1, 1, 1, 1, 3, 3, 20, 20, 300, 300)
+"""Flipped bits in each damaged recording."""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a flown run."""
+    folder = tmp_path_factory.mktemp("edited") / "run"
+    simulate(Job(parse(SCENARIO), folder, recording=True), StopRequest())
+    return folder
+
+
+@pytest.fixture(scope="module")
+def judged(run: Path) -> Verification:
+    return judged_again(run, run / "run.rrd")
+
+
+def paths_in(value: Any, *above: str | int) -> Iterator[tuple[str | int, ...]]:
+    """Yield the path of every plain value, and of every table and list."""
+    if above:
+        yield above
+    items = value.items() if isinstance(value, dict) else ()
+    items = enumerate(value) if isinstance(value, list) else items
+    for key, inner in items:
+        yield from paths_in(inner, *above, key)
+
+
+def another(value: Any) -> Any:
+    """Return a value that differs as little as its type allows."""
+    match value:
+        case bool():
+            return not value
+        case int() | float():
+            return value + 1e-12 if abs(value) < 1.0 else value * (1.0 + 1e-15)
+        case str():
+            return f"{value}x"
+        case None:
+            return 0.5
+        case list():
+            return value[:-1] if value else [1]
+    return dict(list(value.items())[1:]) if value else {"more": 1}
+
+
+def without_figures(summary: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in summary.items() if key not in UNRECORDED}
+
+
+def test_the_summary_as_it_was_written_agrees(run: Path, judged: Verification) -> None:
+    verification = compared(judged, run / "summary.json")
+    assert verification.differences == ()
+    assert verification.inconclusive is None
+    known = without_figures(json.loads((run / "summary.json").read_text()))
+    assert set(known) == {*judged.figures, "outcome"}
+
+
+def test_any_changed_figure_is_named_and_proves_nothing(
+    run: Path, judged: Verification, tmp_path: Path
+) -> None:
+    summary = json.loads((run / "summary.json").read_text())
+    edited = tmp_path / "summary.json"
+    unfound = []
+    for *above, key in paths_in(without_figures(summary)):
+        if above[:1] == ["packets"] and key not in judged.figures["packets"]:
+            continue
+        changed = deepcopy(summary)
+        table = changed
+        for each in above:
+            table = table[each]
+        table[key] = another(table[key])
+        edited.write_text(json.dumps(changed))
+        verification = compared(judged, edited)
+        named = any(each.key.startswith(str([*above, key][0])) for each in verification.differences)
+        if not named or verification.exit_status != 3:
+            unfound.append([*above, key])
+    assert unfound == []
+
+
+def test_a_key_that_a_summary_lacks_is_named(
+    run: Path, judged: Verification, tmp_path: Path
+) -> None:
+    summary = json.loads((run / "summary.json").read_text())
+    for key in without_figures(summary):
+        rest = {other: value for other, value in summary.items() if other != key}
+        (tmp_path / "summary.json").write_text(json.dumps(rest))
+        assert compared(judged, tmp_path / "summary.json").exit_status == 3, key
+
+
+@pytest.mark.parametrize("text", ["", "{", "[" * 100_000, "nan", "\udcff"])
+def test_a_summary_that_cannot_be_read_proves_nothing(
+    judged: Verification, tmp_path: Path, text: str
+) -> None:
+    (tmp_path / "summary.json").write_bytes(text.encode(errors="surrogateescape"))
+    assert compared(judged, tmp_path / "summary.json").exit_status == 3
+
+
+@pytest.mark.parametrize("seed", range(len(BITS)))
+def test_a_recording_with_flipped_bits_never_ends_its_reader(
+    run: Path, tmp_path: Path, seed: int
+) -> None:
+    """It is inconclusive, or all that is judged is as it was: the flip hit something else."""
+    draws, whole = random.Random(seed), (run / "run.rrd").read_bytes()
+    damaged = bytearray(whole[: draws.choice((len(whole), len(whole) // 2))])
+    for _ in range(BITS[seed]):
+        damaged[draws.randrange(len(damaged))] ^= 1 << draws.randrange(8)
+    (tmp_path / "run.rrd").write_bytes(damaged)
+    (tmp_path / "summary.json").write_bytes((run / "summary.json").read_bytes())
+    verification = verify(tmp_path)
+    if verification.held:
+        assert verification.figures == judged_again(run, run / "run.rrd").figures
+    else:
+        assert verification.exit_status == 3
+    assert verification.problem is None or len(verification.problem.splitlines()) == 1
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.1, 0.3, 0.9, 0.999])
+def test_a_cut_recording_is_inconclusive(run: Path, tmp_path: Path, share: float) -> None:
+    whole = (run / "run.rrd").read_bytes()
+    (tmp_path / "run.rrd").write_bytes(whole[: int(share * len(whole))])
+    (tmp_path / "summary.json").write_bytes((run / "summary.json").read_bytes())
+    assert verify(tmp_path).exit_status == 3
+
+
+def test_a_pass_of_a_recording_that_fails_is_named(run: Path, judged: Verification) -> None:
+    failed = replace(judged, passes=False)
+    verification = compared(failed, run / "summary.json")
+    assert [each.key for each in verification.differences] == ["outcome"]
+    assert verification.exit_status == 3
+    assert judged.passes
+
+
+def test_a_failure_that_the_recording_does_not_show_is_no_pass(
+    run: Path, judged: Verification, tmp_path: Path
+) -> None:
+    """As of a controller that crashed."""
+    summary = json.loads((run / "summary.json").read_text()) | {"outcome": "fail"}
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    assert compared(judged, tmp_path / "summary.json").exit_status == 3
