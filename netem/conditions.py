@@ -53,6 +53,15 @@ class LinkModels:
         """Return the model of one directed link on one channel."""
         return self._links.get((channel, source, destination), self._channels[channel])
 
+    def of_any_link(self, channel: int) -> list[LinkModel]:
+        """Return the models of all links of a channel, each once or more."""
+        own = [model for (at, _, _), model in self._links.items() if at == channel]
+        return [self._channels[channel], *own]
+
+    def alike(self, channel: int) -> bool:
+        """Return whether no link of a channel has a model of its own."""
+        return all(at != channel for at, _, _ in self._links)
+
     def reach_m(self, channel: int, source: int) -> float:
         """Return the distance [m] beyond which no agent receives a source on a channel."""
         return self._reach_m.get((channel, source), self._channels[channel].reach_m)

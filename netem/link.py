@@ -113,6 +113,19 @@ def mean_loss(link: LinkModel) -> float:
     return 1.0 - kept
 
 
+def unusable_share(link: LinkModel, distance_m: float) -> float:
+    """Return the share of frames of which a receiver has no use, in the long run.
+
+    They are lost over this distance [m], or arrive corrupted.
+    """
+    if not distance_m <= link.reach_m:
+        return 1.0
+    usable = (1.0 - mean_loss(link)) * (1.0 - link.corrupt_percent / 100.0)
+    if link.path_loss is not None:
+        usable *= reception_probability(link.path_loss, distance_m)
+    return 1.0 - usable
+
+
 def burst_variance_factor(link: LinkModel) -> float:
     """Return by how much bursts raise the variance of the mean loss over independent losses.
 

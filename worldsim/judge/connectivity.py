@@ -1,7 +1,7 @@
 """Radio connectivity of the team: components, hops, and the time that news takes to spread.
 
-Computed from the truth: positions, link conditions and radio faults in force. Two agents are linked
-where each can receive the other. A round is one period of the multihop channel.
+Computed from the truth: positions, link conditions and radio faults in force, link by link. A round
+is one period of the multihop channel, on which agents pass on what they hear.
 """
 
 from functools import cache
@@ -12,24 +12,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from netem.conditions import NetworkConditions
-from netem.link import burst_variance_factor, mean_loss
+from netem.link import LinkModel, burst_variance_factor, unusable_share
 from netem.random_draws import MAX_QUANTILE
-from netem.wire.channels import MULTIHOP
+from netem.wire.channels import LOCAL, MULTIHOP
 from worldsim.judge.radio_events import RadioRunEvent, order_of
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
+from worldsim.truth.vehicle import Floats
 
 MAX_ROUNDS = 2000
 """More rounds count as infinitely many."""
 
 
 class Components(NamedTuple):
-    """The connected components of the running agents."""
+    """The connected components of the running agents.
+
+    Two agents are in one component where news of each reaches the other, over any number of links.
+    """
 
     label: NDArray[np.int64]
     """(N,): the component of each running agent; -1 for the others."""
     hops: int
     """The diameter D: the most hops between two agents of a component."""
+    loss: float
+    """The share of frames that is lost on the worst link that holds a component together."""
+    lossy: bool
+    """Whether some frames are lost on a link within a component, and some are not."""
+    closed: NDArray[np.bool_]
+    """(C,): of each component, whether its agents hear none of another."""
+    hears: NDArray[np.bool_]
+    """(N, N): whether the agent of the row hears beacons of the agent of the column."""
 
     def members(self) -> list[list[int]]:
         """Return the rows of each component."""
@@ -38,6 +50,11 @@ class Components(NamedTuple):
             if label >= 0:
                 found[label].append(row)
         return found
+
+    def same_as(self, other: "Components") -> bool:
+        """Return whether the same agents hear of each other."""
+        alike = np.array_equal(self.label, other.label)
+        return alike and np.array_equal(self.closed, other.closed)
 
 
 class Connectivity:
@@ -56,56 +73,76 @@ class Connectivity:
 
     def components(self, tick: Tick) -> Components:
         """Return the connected components at a tick."""
-        linked = self._linked(tick)
-        label = np.full(len(tick.alive), -1)
-        hops = count = 0
-        for row in np.flatnonzero(tick.alive).tolist():
-            distance = _hops_from(row, linked)
-            hops = max(hops, int(distance.max()))
-            if label[row] < 0:
-                label[distance >= 0] = count
-                count += 1
-        return Components(label, hops)
+        lost = self._lost(MULTIHOP, tick)
+        label = _components(lost < 1.0, tick.alive)
+        within = lost[(lost < 1.0) & (label[:, None] == label)]
+        loss = _weakest(lost, label, np.unique(within))
+        linked = (lost <= loss) & (label[:, None] == label)
+        rows = np.flatnonzero(tick.alive).tolist()
+        hops = max((int(_hops_from(row, linked).max()) for row in rows), default=0)
+        heard = self._lost(LOCAL, tick) < 1.0
+        foreign = (heard | (lost < 1.0)) & (label[:, None] != label)
+        open_ = np.unique(label[foreign.any(axis=0)])
+        closed = ~np.isin(np.arange(label.max(initial=-1) + 1), open_)
+        return Components(label, hops, loss, bool(within.any()), closed, heard.T)
 
-    def dissemination_s(self, agents: int, hops: int) -> float:
+    def dissemination_s(self, agents: int, hops: int, loss: float | None = None) -> float:
         """Return B [s]: a record reaches every agent in this time, with probability 1 - 1e-6.
 
-        Infinite while links flap: there is no bound.
+        loss: of the worst link; None: of a link without values of its own, within range. Infinite
+        while links flap: there is no bound.
         """
         if self._network.flapping:
             return inf
-        rounds = rounds_to_all(agents, hops, self.loss) * self._burst_factor
+        lost = self.loss if loss is None else loss
+        rounds = rounds_to_all(agents, hops, lost) * self._burst_factor
         return rounds * self._round_s + hops * self._delay_s
 
-    def detection_s(self, hops: int) -> float:
+    def detection_s(self, hops: int, loss: float | None = None) -> float:
         """Return T_d [s]: the team knows within this time that an agent is gone."""
-        rounds = (2 * hops + 10) / (1.0 - self.loss) if self.loss < 1.0 else inf
+        lost = self.loss if loss is None else loss
+        rounds = (2 * hops + 10) / (1.0 - lost) if lost < 1.0 else inf
         return rounds * self._round_s + hops * self._delay_s
 
     def _refresh(self) -> None:
-        """Derive loss, delay, range and cuts from the conditions and partitions in force."""
-        model = self._network.models.of_channel(MULTIHOP)
-        self.loss = mean_loss(model)
-        """Share of multihop frames that a link loses."""
-        self._burst_factor = max(1.0, burst_variance_factor(model))
-        self._range_m = model.range_m
-        widest = 1.0 if model.distribution == "uniform" else MAX_QUANTILE
-        self._delay_s = (model.delay_ms + widest * model.jitter_ms) / 1000.0
+        """Derive loss, delay and cuts from the conditions and partitions in force."""
+        models = self._network.models
+        self.loss = unusable_share(models.of_channel(MULTIHOP), 0.0)
+        """Share of multihop frames that a link loses within range."""
+        multihop = models.of_any_link(MULTIHOP)
+        self._burst_factor = max(1.0, *map(burst_variance_factor, multihop))
+        self._delay_s = max(map(_longest_delay_s, multihop))
         rows = self._rows
-        hears = np.array([[not self._network.partitions(a, b) for a in rows] for b in rows])
-        self._uncut = hears & hears.T
+        cut = [[self._network.partitions(a, b) for b in rows] for a in rows]
+        self._cut = np.array(cut, dtype=np.bool_)
 
-    def _linked(self, tick: Tick) -> NDArray[np.bool_]:
-        """Return which pairs of running agents are linked (N, N)."""
-        position = tick.position
-        away = position[:, None] - position[None]
-        near = np.sqrt(np.sum(away * away, axis=2)) <= self._range_m
-        near &= self._uncut
+    def _lost(self, channel: int, tick: Tick) -> Floats:
+        """Return the share of a channel's frames that each link loses, from row to column (N, N).
+
+        It is 1 where no frame gets through, and to the agent itself.
+        """
+        away = tick.position[:, None] - tick.position[None]
+        distance = np.sqrt(np.sum(away * away, axis=2))
+        lost = self._lost_over(channel, distance)
+        usable = ~self._cut & tick.alive[:, None] & tick.alive
         if self._network.obstructed:
-            free = [not self._network.jammed((x, y, z)) for x, y, z in position.tolist()]
-            near &= np.outer(free, free)
-        linked: NDArray[np.bool_] = near & tick.alive[:, None] & tick.alive[None]
-        return linked
+            free = [not self._network.jammed((x, y, z)) for x, y, z in tick.position.tolist()]
+            usable &= np.outer(free, free)
+        np.fill_diagonal(usable, val=False)
+        return np.where(usable, lost, 1.0)
+
+    def _lost_over(self, channel: int, distance: Floats) -> Floats:
+        """Return the share of a channel's frames that links lose over distances (N, N) [m]."""
+        models, common = self._network.models, self._network.models.of_channel(channel)
+        if models.alike(channel) and common.path_loss is None:
+            return np.where(distance <= common.reach_m, unusable_share(common, 0.0), 1.0)
+        rows = distance.tolist()
+        return np.array(
+            [
+                [unusable_share(models.of_link(channel, a, b), rows[a][b]) for b in self._rows]
+                for a in self._rows
+            ]
+        )
 
 
 @cache
@@ -120,6 +157,44 @@ def rounds_to_all(agents: int, hops: int, loss: float) -> float:
         if agents * agents * late <= 1e-6:
             return rounds
     return inf
+
+
+def _longest_delay_s(model: LinkModel) -> float:
+    """Return the longest delay on a link [s]."""
+    widest = 1.0 if model.distribution == "uniform" else MAX_QUANTILE
+    return (model.delay_ms + widest * model.jitter_ms) / 1000.0
+
+
+def _components(linked: NDArray[np.bool_], alive: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the strongly connected component of each running agent (N,), -1 for the others.
+
+    linked: whether frames get through, from row to column (N, N).
+    """
+    reaches = linked | np.eye(len(linked), dtype=np.bool_)
+    for _ in range(len(linked).bit_length()):
+        # Counts of paths: exact in single precision, and far faster than booleans.
+        paths = reaches.astype(np.float32)
+        reaches = paths @ paths > 0.0
+    mutual = reaches & reaches.T
+    first = np.where(alive, np.argmax(mutual, axis=1), -1)
+    label = np.searchsorted(np.unique(first[alive]), first)
+    return np.where(alive, label, -1)
+
+
+def _weakest(lost: Floats, label: NDArray[np.int64], losses: Floats) -> float:
+    """Return the loss of the worst link that holds a component together; 0 without any.
+
+    It is the least of ``losses`` at which links that lose no more hold all components together.
+    lost: share of frames lost on each link, from row to column (N, N).
+    """
+    low, high = 0, len(losses) - 1
+    while low < high:
+        middle = (low + high) // 2
+        if np.array_equal(_components(lost <= losses[middle], label >= 0), label):
+            high = middle
+        else:
+            low = middle + 1
+    return float(losses[high]) if len(losses) else 0.0
 
 
 def _hops_from(row: int, linked: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -6,17 +6,19 @@ does not.
 """
 
 from collections import deque
+from math import dist
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agent.comms.unidentified_vehicles import SAME_VEHICLE_M, UNIDENTIFIED_AFTER_S
+from agent.comms.unidentified_vehicles import SAME_VEHICLE_M, SURE_RANGE_M, UNIDENTIFIED_AFTER_S
 from agent.controller import Flown
 from agent.guidance.target_on_queue import TargetOnQueue
 from agent.messages import Place
-from agent.qstructure.formation import Layout
+from agent.qstructure.formation import NO_PLACES, Layout
 from worldsim.judge.phase import Phase
 from worldsim.judge.tick import Tick
+from worldsim.scenario.tables import CONVERGED_M
 from worldsim.truth.vehicle import Floats
 
 NO_AGENT = -1
@@ -56,10 +58,48 @@ class HoveringVehicles:
         """Return how a team (rows) fills the phase's formation around hovering vehicles."""
         return phase.formation.layout(len(team), self.occupied_places(tick, phase, team))
 
-    def occupied_places(self, tick: Tick, phase: Phase, team: list[int]) -> frozenset[Place]:
-        """Return the places that a team (rows) cannot have: other vehicles hover there."""
+    def occupied_places(
+        self, tick: Tick, phase: Phase, team: list[int], seen: NDArray[np.bool_] | None = None
+    ) -> frozenset[Place]:
+        """Return the places that a team (rows) cannot have: other vehicles hover there.
+
+        seen: which vehicles count (N,); None: all.
+        """
         others = self.hovering(tick)
         others[team] = False
+        if seen is not None:
+            others &= seen
+        if not others.any():
+            return NO_PLACES
         positions = [(x, y, z) for x, y, z in tick.position[others].tolist()]
-        mission = Flown(phase.mission, phase.formation, phase.frame(tick.time_s))
-        return frozenset(self._targets.taken_by(mission, len(team), positions))
+        return frozenset(self._targets.taken_by(_flown(tick, phase), len(team), positions))
+
+    def held_places(self, tick: Tick, phase: Phase, team: list[int]) -> frozenset[Place]:
+        """Return the places in which agents of a team (rows) stand that claim them."""
+        mission, claims = _flown(tick, phase), phase.claims(tick)
+        held = set()
+        for row in team:
+            place = Place(*claims[row])
+            point = self._targets.point(mission, len(team), place)
+            if point is not None and dist(point, tick.position[row].tolist()) <= CONVERGED_M:
+                held.add(place)
+        return frozenset(held)
+
+
+def _flown(tick: Tick, phase: Phase) -> Flown:
+    return Flown(phase.mission, phase.formation, phase.frame(tick.time_s))
+
+
+def seen_by(position: Floats, watchers: list[int], hears: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which vehicles (N,) some agents (rows) surely take for occupants of a place.
+
+    As in the agents' own rule, a watcher is near enough to sense the vehicle, and hears an agent
+    that is no nearer. position: (N, 3) [m; world frame]. hears: (N, N), row hears column.
+    """
+    away = position[watchers, None] - position[None]
+    distance = np.sqrt(np.sum(away * away, axis=2))
+    reach = np.max(np.where(hears[watchers], distance, -np.inf), axis=1, initial=-np.inf)
+    seen: NDArray[np.bool_] = np.any(
+        (distance <= SURE_RANGE_M) & (distance <= reach[:, None]), axis=0
+    )
+    return seen

@@ -2,15 +2,19 @@
 
 I2: in each connected component, each vertex of the formation has exactly one agent.
 I3: in each component, the number of agents of a queue is within 1 of the queue's share.
-Premise of both: T_d + 2B have passed since the last fault.
+Premise of both: T_d + 2B have passed since the last fault, and it is clear of whom and of which
+hovering vehicles the component's agents can know.
 I4: no two agents of a component claim one place for longer than 2B.
-I6: no agent changes its role more than 3 times after a fault.
+I6: no agent that news reaches within a bound changes its role more than 3 times after a fault.
 I7: no agent changes its place in a settled team in which every agent is in its place; where frames
 are lost, each agent may once.
-A fault is an event of the timeline, an exit, or a change of the connected components.
+A fault is an event of the timeline, an exit, a change of the connected components, or a vehicle
+that comes to hover in a component's place or leaves it.
 """
 
 from collections import Counter
+from collections.abc import Sequence
+from math import inf
 from typing import NamedTuple, assert_never
 
 import msgspec
@@ -18,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agent.messages import Place
+from agent.qstructure.formation import NO_PLACES
 from worldsim.judge.connectivity import Components, Connectivity
-from worldsim.judge.hovering_vehicles import HoveringVehicles
+from worldsim.judge.hovering_vehicles import HoveringVehicles, seen_by
 from worldsim.judge.phase import Phase
 from worldsim.judge.radio_events import RadioRunEvent
 from worldsim.judge.run_events import (
@@ -86,9 +91,14 @@ class Invariants:
         self._components: Components | None = None
         self._members: list[list[int]] = []
         """The rows of each component."""
-        self._seen: tuple[bytes, ...] = ()
+        self._seen: tuple[object, ...] = ()
         self._claims: Claims = []
-        self._breaches = Breaches(0, 0)
+        self._senses = ["proximity" in vehicle.sensors for vehicle in scenario.vehicles]
+        """For each agent, whether it senses every vehicle near by."""
+        self._blocked_last: list[frozenset[Place] | None] = []
+        """For each component, the places in which others hover."""
+        self._breaches: Breaches | None = None
+        """None where it is clear of no component whom its agents know."""
         self._shared: list[bool] = []
         """For each agent, whether another agent of its component claims its place."""
         self._shared_since: dict[int, tuple[tuple[int, int], float]] = {}
@@ -101,8 +111,8 @@ class Invariants:
         """Changes of place of each agent since the last fault, in a quiet team."""
         self._quiet_since_s: float | None = None
         """Since when every agent is in its place in a settled team [s; simulated time]."""
-        self._settled_s = 0.0
-        """When the team must have settled [s; simulated time]: T_d + 2B after the last fault."""
+        self._settling_s = 0.0
+        """The time in which a team settles [s]: T_d + 2B."""
         self._twice_s = 0.0
         """2B [s]."""
 
@@ -133,15 +143,27 @@ class Invariants:
         self.tallies["I6"].count(self._excess_role_changes)
         self._excess_role_changes = 0
         self.tallies["I4"].count(self._count_lasting(tick.time_s))
-        if tick.time_s >= self._settled_s:
+        if tick.time_s >= self._settled_s and self._breaches is not None:
             self.tallies["I2"].count(self._breaches.vertices)
             self.tallies["I3"].count(self._breaches.shares)
         self._evaluate_quiet(tick, last_claims, in_place)
 
+    @property
+    def _settled_s(self) -> float:
+        """When the team must have settled after the last fault [s; simulated time]."""
+        return self._fault_s + self._settling_s
+
     def _count_role_change(self, event: RoleChanged) -> None:
-        if event.agent is not None:
+        if event.agent is not None and self._is_informed(event.agent):
             self._role_changes[event.agent] += 1
             self._excess_role_changes += self._role_changes[event.agent] > MAX_ROLE_CHANGES
+
+    def _is_informed(self, agent: int) -> bool:
+        """Return whether news reaches an agent within a bound, and both ways."""
+        if self._components is None:
+            return True
+        label = int(self._components.label[agent])
+        return self._twice_s < inf and label >= 0 and bool(self._components.closed[label])
 
     def _fault(self, begins_s: float, over_s: float) -> None:
         """Start anew after a fault that begins and is over at these times [s]."""
@@ -159,44 +181,76 @@ class Invariants:
         self._components_due_s = tick.time_s + COMPONENTS_EVERY_S
         found = self._connectivity.components(tick)
         last, self._components, self._members = self._components, found, found.members()
-        if last is not None and not np.array_equal(last.label, found.label):
+        if last is not None and not last.same_as(found):
             self._restart_premises(tick.time_s)
-        team = int(np.count_nonzero(tick.alive))
-        self._twice_s = 2.0 * self._connectivity.dissemination_s(team, found.hops)
-        self._settled_s = self._fault_s + self._connectivity.detection_s(found.hops) + self._twice_s
+        team, (hops, loss) = int(np.count_nonzero(tick.alive)), (found.hops, found.loss)
+        self._twice_s = 2.0 * self._connectivity.dissemination_s(team, hops, loss)
+        self._settling_s = self._connectivity.detection_s(hops, loss) + self._twice_s
 
     def _find_breaches(self, tick: Tick, phase: Phase) -> None:
-        """Find the breaches of a tick.
-
-        With one component, they hold until a claim changes or a vehicle comes to hover. With more,
-        a vehicle of one component may enter a place of another at any time.
-        """
+        """Find the breaches of a tick; they hold until a claim or a blocked place changes."""
         members = self._members
+        blocked = [self._blocked(tick, phase, rows) for rows in members]
         seen = (
             *(rows.tobytes() for rows in (tick.place, tick.alive, tick.mission)),
             self._components.label.tobytes() if self._components is not None else b"",
-            b"" if tick.alive.all() else self._hovering.hovering(tick).tobytes(),
+            phase.mission,
+            *blocked,
         )
-        if seen == self._seen and len(members) == 1:
+        if seen == self._seen:
             return
         self._seen, claims = seen, phase.claims(tick)
+        if blocked != self._blocked_last:
+            # A vehicle that comes to hover in a place, or goes, is news that has to spread.
+            self._blocked_last = blocked
+            self._fault_s = max(self._fault_s, tick.time_s)
         self._claims = self._claims if claims == self._claims else claims
-        found = [self._in_component(tick, phase, rows) for rows in members]
-        vertices, shares = sum(each.vertices for each in found), sum(each.shares for each in found)
-        self._breaches = Breaches(vertices, shares)
+        self._breaches = self._judged(phase, blocked)
         self._shared = self._find_shared(members)
 
-    def _in_component(self, tick: Tick, phase: Phase, rows: list[int]) -> Breaches:
+    def _blocked(self, tick: Tick, phase: Phase, rows: list[int]) -> frozenset[Place] | None:
+        """Return the places in which others hover, for a component.
+
+        None where it cannot know them, or where its own agent stands in such a place.
+        """
+        if len(rows) == len(tick.alive) or self._components is None:
+            return NO_PLACES
+        occupied = self._hovering.occupied_places(tick, phase, rows)
+        if occupied:
+            watchers = [row for row in rows if self._senses[row]]
+            seen = seen_by(tick.position, watchers, self._components.hears)
+            if occupied != self._hovering.occupied_places(tick, phase, rows, seen):
+                return None
+            if occupied & self._hovering.held_places(tick, phase, rows):
+                return None
+        return occupied
+
+    def _judged(self, phase: Phase, blocked: Sequence[frozenset[Place] | None]) -> Breaches | None:
+        """Return the breaches in all components of which it is clear whom their agents know.
+
+        Those are the components that hear of no other agent and can know every blocked place. None
+        where there is no such component.
+        """
+        closed = self._components.closed.tolist() if self._components is not None else []
+        found = [
+            self._in_component(phase, rows, places)
+            for rows, places, alone in zip(self._members, blocked, closed, strict=True)
+            if alone and places is not None
+        ]
+        if not found:
+            return None
+        return Breaches(sum(each.vertices for each in found), sum(each.shares for each in found))
+
+    def _in_component(self, phase: Phase, rows: list[int], blocked: frozenset[Place]) -> Breaches:
         """Return the breaches in the component of these rows."""
         held = Counter(Place(*self._claims[row]) for row in rows)
-        layout = self._hovering.layout(tick, phase, rows)
+        layout = phase.formation.layout(len(rows), blocked)
         vertices = sum(held[place] != 1 for place in layout.heads)
         common = set(phase.formation.common)
         own = Counter[int]()
         for place, count in held.items():
             if place not in common:
                 own[place.queue] += count
-        blocked = self._hovering.occupied_places(tick, phase, rows)
         shares = phase.formation.divide(len(rows), blocked)
         wrong = sum(abs(own[queue] - share) > 1 for queue, share in enumerate(shares))
         return Breaches(vertices, wrong)
@@ -238,7 +292,7 @@ class Invariants:
         """Return the number of agents that changed their place more often than allowed."""
         if last_claims is self._claims:
             return 0
-        allowed = 1 if self._connectivity.loss > 0.0 else 0
+        allowed = 1 if self._components is not None and self._components.lossy else 0
         excess = 0
         for row, (last, now) in enumerate(zip(last_claims, self._claims, strict=True)):
             if alive[row] and last != now:

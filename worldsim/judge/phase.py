@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from agent.messages import AT_HOME, FramePath, Place
-from agent.qstructure.formation import Formation, Slot
+from agent.qstructure.formation import NO_PLACES, Formation, Slot
 from agent.qstructure.frame_path import Track
 from agent.qstructure.target_frame import Frame
 from worldsim.judge.tick import Tick
@@ -69,7 +69,8 @@ class Phase:
         self._timer = ConvergenceTimer()
         self._known_slots: dict[tuple[int, int, int], Slot | None] = {}
         self._own: SlotsByRow = {}
-        self._own_key: tuple[bytes, ...] | None = None
+        self._own_key: tuple[object, ...] | None = None
+        self._blocked = NO_PLACES
         self._positions = _SlotPositions(slots={}, frame=None, position=np.empty(0))
 
     @property
@@ -82,11 +83,14 @@ class Phase:
         """Return the target's frame at a time [s]."""
         return self._track.at(time_s)
 
-    def slot_error(self, tick: Tick) -> Floats:
+    def slot_error(self, tick: Tick, blocked: frozenset[Place] = NO_PLACES) -> Floats:
         """Return the distances (N,) [m] of agents to the slots they claim; infinite if not valid.
 
-        A slot that two agents claim is valid for neither: none of them counts as arrived.
+        A slot that two agents claim is valid for neither: none of them counts as arrived. blocked:
+        places in which other vehicles hover; a team that has to leave them out stands elsewhere on
+        a closed queue.
         """
+        self._blocked = blocked
         away = tick.position - self._slot_positions(tick)
         square = away * away
         error: Floats = np.sqrt(square[:, 0] + square[:, 1] + square[:, 2])
@@ -141,7 +145,8 @@ class Phase:
 
         The result is kept until a claim changes, or an agent goes.
         """
-        key = tick.place.tobytes(), tick.alive.tobytes(), tick.mission.tobytes()
+        rows = (tick.place, tick.alive, tick.mission)
+        key = (*(each.tobytes() for each in rows), self._blocked)
         if key != self._own_key:
             self._own_key, self._own = key, self._find_slots(tick)
         return self._own
@@ -150,11 +155,13 @@ class Phase:
         claims = self.claims(tick)
         holders = Counter(claim for claim, alive in zip(claims, tick.alive, strict=True) if alive)
         team = int(np.sum(tick.alive))
-        return {
-            row: slot
+        filled = self.formation.layout(team, self._blocked).slots if self._blocked else {}
+        found = {
+            row: filled.get(Place(*claim)) or self._slot(*claim, team)
             for row, claim in enumerate(claims)
-            if holders[claim] <= 1 and (slot := self._slot(*claim, team)) is not None
+            if holders[claim] <= 1
         }
+        return {row: slot for row, slot in found.items() if slot is not None}
 
     def _slot(self, queue: int, rank: int, team: int) -> Slot | None:
         key = (queue, rank, team)

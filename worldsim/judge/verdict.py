@@ -149,7 +149,8 @@ class Judge:
         self._check_packets(tick.packets)
         self._count_turns(tick)
         phase = self.phases[-1]
-        error = phase.slot_error(tick)
+        team = np.flatnonzero(tick.alive).tolist()
+        error = phase.slot_error(tick, self._hovering.occupied_places(tick, phase, team))
         in_place = phase.see(tick.time_s, np.where(tick.alive, error, np.nan))
         self._recoveries.see(tick, phase, in_place)
         if self._allocation is not None:
