@@ -128,7 +128,9 @@ def test_a_key_that_a_summary_lacks_is_named(
     run: Path, judged: Verification, tmp_path: Path
 ) -> None:
     summary = json.loads((run / "summary.json").read_text())
-    for key in without_figures(summary):
+    for key, value in without_figures(summary).items():
+        if value == []:
+            continue  # as in a summary from before there was such a list
         rest = {other: value for other, value in summary.items() if other != key}
         (tmp_path / "summary.json").write_text(json.dumps(rest))
         assert compared(judged, tmp_path / "summary.json").exit_status == 3, key

@@ -44,6 +44,7 @@ def summary_of(judge: Judge, scenario: Scenario | None = None) -> dict[str, Any]
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "invariants": msgspec.to_builtins(judge.invariants()),
         "recoveries": [],
+        "encounters": [],
         "packets": list(straight_flight(flown))[-1].packets,
         "phases": [
             {

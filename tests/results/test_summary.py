@@ -147,7 +147,7 @@ def test_news_that_comes_late_on_a_slow_host_is_no_failure_of_the_team(
     assert made["reason"] == (
         f"the host was too slow: 2.0 % of ticks were late; violated meanwhile: {words}"
     )
-    blamed = summary(run, late_tick_fraction=0.02, slowed_by="netem was stopped")
+    blamed = summary(run, late_tick_fraction=0.02, late_because="netem was stopped")
     assert blamed["reason"] is not None
     assert blamed["reason"].startswith("netem was stopped: 2.0 % of ticks were late; ")
 

@@ -228,9 +228,13 @@ class Judge:
         return Expectation(name="min_separation_m", wanted=wanted_m, got=least_m, held=held)
 
     def _cleared(self) -> Expectation:
-        wanted_m, least_m = self.clearance.bound_m, self.min_obstacle_distance_m
-        held = least_m is not None and keeps(least_m, wanted_m)
-        return Expectation(name="min_obstacle_distance_m", wanted=wanted_m, got=least_m, held=held)
+        clearance = self.clearance
+        return Expectation(
+            name="min_obstacle_distance_m",
+            wanted=clearance.bound_m,
+            got=clearance.answerable_m,
+            held=clearance.held,
+        )
 
     def _converged(self, phase: Phase) -> Expectation:
         within_s, got_s = self._scenario.expect.converge_within_s, phase.converge_s

@@ -188,6 +188,7 @@ def _figures(readback: Readback, judge: Judge) -> dict[str, Any]:
         "min_obstacle_distance_m": judge.min_obstacle_distance_m,
         "phases": [asdict(phase) for phase in _phases(judge)],
         "recoveries": [msgspec.structs.asdict(recovery) for recovery in judge.recoveries],
+        "encounters": [msgspec.to_builtins(each) for each in judge.clearance.encounters],
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "packets": packets,
@@ -257,6 +258,8 @@ def _differences(summary: Any, judged: Verification) -> Iterator[Difference]:
     """Yield the figures that differ; a figure that the summary lacks differs too."""
     for key, recorded in judged.figures.items():
         summarised = _value_at(summary, key)
+        if summarised == ABSENT and recorded == []:
+            continue  # an older summary has no such list
         if key == "packets" and isinstance(summarised, dict):
             summarised = {name: summarised[name] for name in recorded if name in summarised}
         yield from _unequal(key, summarised, recorded)

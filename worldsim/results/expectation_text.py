@@ -8,7 +8,12 @@ CONVERGE = "converge "
 STARTS = ("join at ", "restart at ")
 """An expectation's name begins so where agents were to start and found no room."""
 MAX_NAMED = 4
-"""A change of more agents is described by their number."""
+"""A change of more agents is described by their number; so are more encounters."""
+HINDRANCE_WORDS = {
+    "not running": "a vehicle whose agent is not running cannot give way",
+    "outrun": "the obstacle is faster than the vehicle, which came no nearer by itself",
+}
+"""Why a vehicle could not give way, in words."""
 
 
 class ExpectationRow(TypedDict):
@@ -27,6 +32,16 @@ class RecoveryRow(TypedDict):
     kind: str
     agents: list[int]
     reformed_s: float | None  # from the change until the formation is whole again
+
+
+class EncounterRow(TypedDict):
+    """A moving obstacle came too near to a vehicle that could not give way."""
+
+    t_s: float
+    agent: int
+    obstacle: int  # its index in the scenario
+    distance_m: float  # the least, centre to surface
+    hindrance: str  # why the vehicle could not give way
 
 
 class Circumstances(NamedTuple):
@@ -51,6 +66,16 @@ def expectation_texts(rows: Sequence[ExpectationRow], run: Circumstances) -> lis
         _convergence(row, next(spans)) if row["name"].startswith(CONVERGE) else _other(row, run)
         for row in rows
     ]
+
+
+def encounter_texts(rows: Sequence[EncounterRow]) -> list[str]:
+    """Return what a run showed of vehicles that could not give way, in a few lines."""
+    texts = [
+        f"obstacle[{row['obstacle']}] came within {row['distance_m']:.3f} m of a{row['agent']}"
+        f" at {row['t_s']:.4g} s: not counted, {HINDRANCE_WORDS[row['hindrance']]}"
+        for row in rows[:MAX_NAMED]
+    ]
+    return texts + [f"and {len(rows) - MAX_NAMED} more times"] * (len(rows) > MAX_NAMED)
 
 
 def was_tested(row: ExpectationRow) -> bool:

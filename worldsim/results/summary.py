@@ -15,6 +15,7 @@ from worldsim.engine.step import SlotLoop
 from worldsim.judge.verdict import Expectation, Judge
 from worldsim.results.expectation_text import (
     Circumstances,
+    EncounterRow,
     ExpectationRow,
     RecoveryRow,
     expectation_texts,
@@ -65,7 +66,7 @@ class FinishedRun:
     real_time_factor: float | None  # simulated seconds in a second of wall time
     cut_off_by: str | None = None  # what ended the run before its time; None: it is complete
     failure: str | None = None  # an error during the run
-    slowed_by: str | None = None  # what made ticks late, in words; None: the host
+    late_because: str | None = None  # who but the host made ticks late
     rejected_by_world: Mapping[str, int] = field(default_factory=dict)  # messages by cause
     delivery: "DeliveryRow | None" = None  # of frames that agents used
 
@@ -137,6 +138,7 @@ class Summary(Provenance):
     min_obstacle_distance_m: float | None  # vehicle centre to surface
     phases: list[PhaseRow]  # one for each formation, in order
     recoveries: list[RecoveryRow]
+    encounters: list[EncounterRow]
     attitude_error_deg: float | None  # largest at the last tick
     turns_over_limit_fraction: float | None  # of moving steps
     packets: dict[str, int | None]  # by fate
@@ -173,6 +175,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "min_obstacle_distance_m": judge.min_obstacle_distance_m,
         "phases": _phase_rows(judge),
         "recoveries": _recovery_rows(judge),
+        "encounters": _encounter_rows(judge),
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "packets": _packets(counters, rejected),
@@ -241,7 +244,7 @@ def _slowness(run: FinishedRun) -> str | None:
     late = run.late_tick_fraction
     if late is None or not run.host_too_slow:
         return None
-    return f"{run.slowed_by or 'the host was too slow'}: {100 * late:.1f} % of ticks were late"
+    return f"{run.late_because or 'the host was too slow'}: {100 * late:.1f} % of ticks were late"
 
 
 def _rejected(run: FinishedRun) -> dict[str, dict[str, int]]:
@@ -297,6 +300,19 @@ def _recovery_rows(judge: Judge) -> list[RecoveryRow]:
             "reformed_s": recovery.reformed_s,
         }
         for recovery in judge.recoveries
+    ]
+
+
+def _encounter_rows(judge: Judge) -> list[EncounterRow]:
+    return [
+        {
+            "t_s": encounter.t_s,
+            "agent": encounter.agent,
+            "obstacle": encounter.obstacle,
+            "distance_m": encounter.distance_m,
+            "hindrance": encounter.hindrance.value,
+        }
+        for encounter in judge.clearance.encounters
     ]
 
 

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any
 from worldsim.recording.layout import SUMMARY_FILE
 from worldsim.results.expectation_text import (
     Circumstances,
+    EncounterRow,
     ExpectationRow,
     RecoveryRow,
+    encounter_texts,
     expectation_texts,
     figure,
     was_tested,
@@ -35,6 +37,7 @@ def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
     lines = [
         _head(summary),
         *_expectations(summary["expectations"], _circumstances(summary)),
+        *_encounters(summary["encounters"]),
         f"  {_accuracy(summary)}",
         *_delivery(summary["delivery"]),
         *_rejected(summary["rejected_by_cause"]),
@@ -69,6 +72,7 @@ def verified(verification: "Verification") -> str:
     ] or [f"  {SUMMARY_FILE} agrees" if verification.summary else none]
     if not verification.exact:
         agreement.insert(0, "  positions in single precision: recorded by an older version")
+    expectations += _encounters(verification.figures["encounters"])
     head = (
         f"{verification.scenario}, judged from the recording alone:"
         f" {verification.ticks} ticks, {verification.until_s:g} s{cut}"
@@ -118,6 +122,11 @@ def _expectations(rows: list[ExpectationRow], run: Circumstances) -> list[str]:
         f"  {_mark(row):9}{text}"
         for row, text in zip(rows, expectation_texts(rows, run), strict=True)
     ]
+
+
+def _encounters(rows: list[EncounterRow]) -> list[str]:
+    """Return lines on moving obstacles that came too near without anybody's fault."""
+    return [f"  {'-':9}{text}" for text in encounter_texts(rows)]
 
 
 def _mark(row: ExpectationRow) -> str:
