@@ -52,8 +52,7 @@ def simulate(
     finally:
         sinks.close()
     summary = summarise(scenario, finished(flight, scenario))
-    directory.write_summary(summary)
-    return Result(directory.path, summary)
+    return Result(directory.path, directory.write_summary(summary))
 
 
 def finished(flight: Flight, scenario: Scenario) -> FinishedRun:

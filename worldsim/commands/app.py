@@ -17,7 +17,14 @@ from typer.main import get_command
 from worldsim.commands import bench, inspect, netem, operate, run, scenario
 from worldsim.commands.options import complain, examples
 from worldsim.commands.usage_errors import usage_text
-from worldsim.results.exit_status import BAD_INPUT, FAIL, INTERRUPTED, OUTPUT_CLOSED, PASS
+from worldsim.results.exit_status import (
+    BAD_INPUT,
+    FAIL,
+    INCONCLUSIVE,
+    INTERRUPTED,
+    OUTPUT_CLOSED,
+    PASS,
+)
 
 app = typer.Typer(
     name="qswarm",
@@ -96,7 +103,7 @@ def command(arguments: list[str]) -> int:
         status = typed(arguments, prog_name="qswarm", standalone_mode=False)
     except (ScenarioError, RunDirectoryError, ViewerError, OperatorError) as error:
         complain(str(error))
-        return FAIL if isinstance(error, RunWriteError) else BAD_INPUT
+        return INCONCLUSIVE if isinstance(error, RunWriteError) else BAD_INPUT
     except typer.TyperException as error:
         complain(usage_text(error, arguments, names))
         return BAD_INPUT

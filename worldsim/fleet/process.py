@@ -18,7 +18,7 @@ from worldsim.fleet.free_running import FreeRunningFleet
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.lockstep import LockstepFleet
 from worldsim.fleet.startup import Startup, StartupError, assemble
-from worldsim.results.exit_status import EXIT_STATUS
+from worldsim.results.exit_status import BAD_INPUT, EXIT_STATUS, INCONCLUSIVE
 from worldsim.results.run_folder import RunDirectory, RunDirectoryError, RunWriteError
 from worldsim.results.sinks import Sinks, open_sinks
 from worldsim.results.summary import FinishedRun, Mode, summarise
@@ -58,7 +58,7 @@ def run(
             return conduct(session, scenario, directory(), options, link_of)
     except (AccessError, SessionError, StartupError, RunDirectoryError) as error:
         print(f"world: {error}", file=sys.stderr)
-        return 1 if isinstance(error, RunWriteError) else 2
+        return INCONCLUSIVE if isinstance(error, RunWriteError) else BAD_INPUT
 
 
 def conduct(
@@ -96,7 +96,7 @@ def conduct(
         ended_by = None if complete else launcher.stop_reason or "interrupted"
         summary = summarise(scenario, _finished(fleet, options.mode, ended_by))
         if fleet.begun:
-            directory.write_summary(summary)
+            summary = directory.write_summary(summary)
         else:
             directory.remove_results()
     outcome = summary["outcome"] if fleet.begun else f"{ended_by} before take-off"

@@ -3,11 +3,11 @@
 PASS = 0
 """Every expectation is met."""
 FAIL = 1
-"""An expectation is not met, an invariant is violated, or the result cannot be written."""
+"""An expectation is not met, or an invariant is violated."""
 BAD_INPUT = 2
 """The input is wrong; nothing was started and nothing overwritten."""
 INCONCLUSIVE = 3
-"""The host was too slow, or the run ended early: neither a pass nor a failure."""
+"""The host was too slow, the run ended early, or results were lost: no pass, and no failure."""
 INTERRUPTED = 130
 """Ctrl-C or SIGTERM."""
 OUTPUT_CLOSED = 141

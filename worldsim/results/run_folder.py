@@ -1,18 +1,25 @@
 """The folder of one run: created once, never overwritten, readable at any moment of the run."""
 
 import json
+import os
 import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from shutil import rmtree
+from typing import Any, TypeVar, cast
 
 from worldsim.recording.layout import RECORDING_FILE, SUMMARY_FILE
 from worldsim.scenario.file import dump
 from worldsim.scenario.tables import Scenario
 
 RUNS = Path("runs")
+RESERVE = ".reserve"
+"""A file that keeps room on the disk, while the run lasts."""
+RESERVED_B = 128 * 1024
+"""Room for a summary [bytes]."""
+Content = TypeVar("Content", bound=Mapping[str, Any])
 USERS = "users"
 """The file of the processes' passwords, there while the run lasts."""
 
@@ -41,19 +48,25 @@ class RunDirectory:
         self.summary = path / SUMMARY_FILE
         self._events = path / "events.jsonl"
         self._events_lost = False
+        self._reserve = path / RESERVE
+        self.lost: str | None = None
+        """What of the results was lost first, and why; None: nothing."""
 
     @classmethod
     def create(cls, path: Path | None, scenario: Scenario) -> "RunDirectory":
         """Create the folder with the resolved scenario in it; None: one named after the time.
 
-        Raises RunDirectoryError when ``path`` exists or cannot be written.
+        It keeps room for the summary on the disk. Raises RunDirectoryError when ``path`` exists or
+        cannot be written; then nothing is left of it.
         """
         directory = cls(make_folder(path, scenario.name))
         try:
             directory.logs.mkdir()
             (directory.path / "scenario.toml").write_text(dump(scenario), encoding="utf-8")
             directory._events.touch()
+            directory._keep_room()
         except OSError as error:
+            rmtree(directory.path, ignore_errors=True)
             raise unwritable(directory.path, error) from error
         return directory
 
@@ -67,8 +80,12 @@ class RunDirectory:
                 file.write(json.dumps(event, allow_nan=False) + "\n")
         except OSError as error:
             if not self._events_lost:
-                print(f"{self._events}: {_reason(error)}; events are lost", file=sys.stderr)
+                self._lose(f"{self._events}: {_reason(error)}; events are lost")
             self._events_lost = True
+
+    def lose_recording(self, text: str) -> None:
+        """Report on stderr that the recording ends, and why, in one line."""
+        self._lose(f"recording: {text}")
 
     @property
     def users(self) -> Path:
@@ -81,14 +98,34 @@ class RunDirectory:
         Scenario and logs stay, for the reason. Raises RunWriteError.
         """
         try:
-            for file in (self.recording, self.summary, self._events):
+            for file in (self.recording, self.summary, self._events, self._reserve):
                 file.unlink(missing_ok=True)
         except OSError as error:
             raise RunWriteError(self.path, _reason(error)) from error
 
-    def write_summary(self, summary: Mapping[str, Any]) -> None:
-        """Write summary.json completely or not at all. Raises RunWriteError."""
-        write_json(self.summary, summary)
+    def write_summary(self, summary: Content) -> Content:
+        """Write summary.json completely or not at all, and return it. Raises RunWriteError.
+
+        A run of which results were lost is no pass: its summary says so.
+        """
+        written: Any = summary
+        if self.lost is not None and summary["outcome"] == "pass":
+            reason = f"results were lost: {self.lost}"
+            written = {**summary, "outcome": "inconclusive", "reason": reason}
+        with suppress(OSError):
+            self._reserve.unlink(missing_ok=True)
+        write_json(self.summary, written)
+        return cast("Content", written)
+
+    def _lose(self, text: str) -> None:
+        self.lost = self.lost or text
+        # Stderr may be a file on the same full disk: then nothing can be printed.
+        with suppress(OSError):
+            print(text, file=sys.stderr, flush=True)
+
+    def _keep_room(self) -> None:
+        with self._reserve.open("xb") as file:
+            os.posix_fallocate(file.fileno(), 0, RESERVED_B)
 
 
 def make_folder(path: Path | None, name: str) -> Path:

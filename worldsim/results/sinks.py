@@ -51,4 +51,7 @@ def open_sinks(
     # Importing rerun takes a second and 90 MB: only the process that records does it.
     from worldsim.recording.recorder import RunRecorder  # noqa: PLC0415
 
-    return Sinks(directory, RunRecorder(directory.recording, scenario, run, mode=mode))
+    recorder = RunRecorder(
+        directory.recording, scenario, run, mode=mode, report=directory.lose_recording
+    )
+    return Sinks(directory, recorder)
