@@ -4,6 +4,7 @@ Labels and roles have a row where they changed. Figures have a row four times a 
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import rerun as rr
@@ -25,14 +26,36 @@ from worldsim.truth.vehicle import Floats
 SAMPLES_HZ = 4.0
 LINES_PER_S = 500
 """More parent lines in a second are drawn at fewer ticks."""
+UNPLACED = -2
+"""The role shown of an agent without a place, before any agent of the run has claimed one."""
 LABEL_SUFFIXES = {
     NO_ROLE: "",
+    UNPLACED: "",
     MEMBER: "",
     SUB_VERTEX: " sub-vertex {tier}",
     VERTEX: " vertex",
     DISTRESS: " distress",
 }
 """What follows an agent's name in its vehicle's label, by role."""
+
+
+class ShownRoles:
+    """Tells agents in distress from those of a controller that forms nothing.
+
+    Both report distress: they have no parent in a queue. But where no agent claims a place there is
+    no queue.
+    """
+
+    def __init__(self) -> None:
+        self._claimed = False
+
+    def of(self, tick: Tick) -> Tick:
+        """Return a tick with the roles to show; ticks come in order."""
+        self._claimed = self._claimed or bool(np.any(tick.place >= 0))
+        if self._claimed or tick.hierarchy is None:
+            return tick
+        role = np.where(tick.hierarchy.role == DISTRESS, UNPLACED, tick.hierarchy.role)
+        return replace(tick, hierarchy=replace(tick.hierarchy, role=role.astype(np.int8)))
 
 
 class HierarchyColumns:
@@ -104,7 +127,7 @@ class HierarchyColumns:
         if not rows:
             return
         for entity, series in (
-            (layout.TIER, [hierarchies[row].tier for row in rows]),
+            (layout.TIER, [_tiers(hierarchies[row]) for row in rows]),
             (layout.RECORD_AGE, [hierarchies[row].record_age_s for row in rows]),
             (layout.NEIGHBOURS, [_neighbour_counts(ticks[row]) for row in rows]),
         ):
@@ -139,8 +162,9 @@ class HierarchyColumns:
 
 
 def role_name(role: int) -> str:
-    """Return a role's name; an agent that is not running is "absent"."""
-    return palette.ABSENT if role == NO_ROLE else ROLES[role]
+    """Return the name of a role that is shown; an agent that is not running is "absent"."""
+    unranked = {NO_ROLE: palette.ABSENT, UNPLACED: palette.NO_PLACE}
+    return unranked[role] if role in unranked else ROLES[role]
 
 
 def parent_lines(position: Floats, hierarchy: HierarchyRows) -> tuple[Floats, NDArray[np.int16]]:
@@ -160,6 +184,11 @@ def _label_keys(tick: Tick) -> NDArray[np.int16]:
     if tick.hierarchy is None:
         return np.full((len(tick.alive), 2), -1, dtype=np.int16)
     return np.stack((tick.hierarchy.role.astype(np.int16), tick.hierarchy.tier), axis=1)
+
+
+def _tiers(hierarchy: HierarchyRows) -> NDArray[np.float64]:
+    """Return the tiers (N,); NaN where there is no queue that could have tiers."""
+    return np.where(hierarchy.role == UNPLACED, np.nan, hierarchy.tier)
 
 
 def _neighbour_counts(tick: Tick) -> NDArray[np.float64]:

@@ -36,12 +36,15 @@ OBSTACLE = np.uint32(0x6F6256FF)
 
 ABSENT = "absent"
 """The role shown of an agent that is not running (dead, paused or booting)."""
+NO_PLACE = "no place"
+"""The role shown of an agent in a team that forms nothing."""
 ROLE_COLOURS = {
     ROLES[VERTEX]: _GOLD,
     ROLES[SUB_VERTEX]: _BLUE,
     ROLES[MEMBER]: 0x3A5A78FF,
     ROLES[DISTRESS]: _RED,
     ABSENT: 0x2A2F38FF,
+    NO_PLACE: int(UNPLACED),
 }
 
 

@@ -6,6 +6,7 @@ costs a tenth of sending them one by one, and loses at most that second when the
 
 import json
 import sys
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -23,8 +24,8 @@ from worldsim.judge.verdict import Figures
 from worldsim.recording import layout
 from worldsim.recording.blueprint import blueprint_of, view_region
 from worldsim.recording.columns import ColumnBlock, Entity
-from worldsim.recording.formation_entities import FormationEntities
-from worldsim.recording.hierarchy_columns import HierarchyColumns
+from worldsim.recording.formation_entities import FormationEntities, slot_positions
+from worldsim.recording.hierarchy_columns import HierarchyColumns, ShownRoles
 from worldsim.recording.obstacle_shapes import ObstacleEntities
 from worldsim.recording.static_entities import max_queues, metric_limits, static_entities
 from worldsim.recording.tick_columns import TickColumns
@@ -36,6 +37,8 @@ from worldsim.truth.obstacles import Obstacles
 APPLICATION = "qswarm"
 BLOCK_S = 1.0
 FLUSH_TIMEOUT_S = 5.0
+EVENT_TIME_SLACK_S = 1e-6
+"""Event times are rounded to the microsecond."""
 
 
 def print_to_stderr(text: str) -> None:
@@ -73,8 +76,8 @@ class RunRecorder:
         shared = np.array(formation.common, dtype=np.int16).reshape(-1, 2)
         self._tick_columns = TickColumns(shared, tick_hz, metric_limits(scenario))
         self._hierarchy_columns = HierarchyColumns(tick_hz, scenario.rows, max_queues(scenario))
+        self._shown_roles = ShownRoles()
         self._obstacles = ObstacleEntities(Obstacles(scenario.obstacle))
-        self._team = scenario.fleet.agents
         self._ticks_per_block = max(1, round(tick_hz * BLOCK_S))
         self._ticks: list[Tick] = []
         self._figures: list[Figures] = []
@@ -84,7 +87,7 @@ class RunRecorder:
 
     def tick(self, tick: Tick, figures: Figures) -> None:
         """Record one tick."""
-        self._ticks.append(tick)
+        self._ticks.append(self._shown_roles.of(tick))
         self._figures.append(figures)
         if len(self._ticks) >= self._ticks_per_block:
             self._attempt(self._send_block)
@@ -114,13 +117,15 @@ class RunRecorder:
     def _open(self, path: Path, formation: Formation, run_id: str, mode: str) -> None:
         rr.set_strict_mode(True)
         self._sink = TolerantSink(path, self._report)
-        self._track = Track(path_of(self._scenario.frame))
-        self._formation = FormationEntities(formation, self._team, self._track.at(0.0))
+        frame = path_of(self._scenario.frame)
+        self._formation = FormationEntities(formation, frame)
         # No recording id is given: a viewer takes recordings with the same id for one.
         self._stream = rr.RecordingStream(
             APPLICATION, batcher_config=rr.ChunkBatcherConfig(flush_tick=1.0)
         )
-        region = view_region(self._scenario, self._formation.slots)
+        agents = self._scenario.fleet.agents
+        slots = slot_positions(formation, agents, Track(frame).at(0.0))
+        region = view_region(self._scenario, slots)
         blueprint = blueprint_of(region, obstacles=bool(self._scenario.obstacle))
         self._stream.set_sinks(rr.FileSink(self._sink.path), default_blueprint=blueprint)
         self._sink.release()
@@ -130,7 +135,6 @@ class RunRecorder:
         self._send_properties(run_id, mode)
         for entity in (*static_entities(self._scenario), *self._obstacles.static()):
             self._stream.log(entity.path, entity.archetype, static=True)
-        self._log_at(0.0, 0, self._formation.entities())
         self._flush()
 
     def _send_properties(self, run_id: str, mode: str) -> None:
@@ -143,19 +147,14 @@ class RunRecorder:
 
     def _send_block(self) -> None:
         if self._ticks:
-            self._team = int(np.count_nonzero(self._ticks[-1].alive))
             times = _BlockTimes(self._ticks)
             # All blocks are made before any is sent, so that a failure leaves no partial second.
             for block in tuple(self._blocks()):
                 at = times.columns(block.rows)
                 rr.send_columns(block.entity, at, block.columns, recording=self._stream)
-        if not self._track.rests:
-            self._log_moving_slots()
+        self._log_formation()
         if self._events:
             self._send_events()
-        for event in self._events:
-            if isinstance(event, FormationGiven | FrameGiven):
-                self._log_new_phase(event)
         self._flush()
 
     def _blocks(self) -> Iterator[ColumnBlock]:
@@ -163,20 +162,23 @@ class RunRecorder:
         yield from self._hierarchy_columns.blocks(self._ticks, self._figures)
         yield from self._obstacles.blocks(self._ticks)
 
-    def _log_moving_slots(self) -> None:
-        """Log the slots at every tick of the block, where the frame moves."""
+    def _log_formation(self) -> None:
+        """Log the formation's changes and the frame's motion, in the order of time."""
+        given = deque(e for e in self._events if isinstance(e, FormationGiven | FrameGiven))
         for tick in self._ticks:
-            slots = self._formation.slots_in(self._track.at(tick.time_s))
-            self._log_at(tick.time_s, tick.index, [Entity(layout.SLOTS, slots)])
+            while given and given[0].t_s <= tick.time_s + EVENT_TIME_SLACK_S:
+                self._log_new_phase(given.popleft())
+            self._log_at(tick.time_s, tick.index, self._formation.see(tick))
+        for event in given:
+            self._log_new_phase(event)
 
     def _log_new_phase(self, event: MissionRunEvent) -> None:
         """Log the formation and frame of a new mission, at the time of its event."""
         formation = self._formation_of(event.tables)
-        self._track = Track(event.path)
-        self._formation = FormationEntities(formation, self._team, self._track.at(event.t_s))
-        self._log_at(event.t_s, self._tick_at(event.t_s), self._formation.entities())
+        changed = self._formation.begin_phase(formation, event.path, event.mission, event.t_s)
+        self._log_at(event.t_s, self._tick_at(event.t_s), changed)
 
-    def _log_at(self, time_s: float, tick: int, entities: Iterator[Entity] | list[Entity]) -> None:
+    def _log_at(self, time_s: float, tick: int, entities: Iterator[Entity]) -> None:
         self._stream.set_time(layout.SIM_TIME, duration=time_s)
         self._stream.set_time(layout.TICK, sequence=tick)
         for entity in entities:
