@@ -1,5 +1,6 @@
 """Missions for the team: each is given to one agent, which spreads it by radio."""
 
+from collections.abc import Sequence
 from typing import Literal, assert_never
 
 from agent.codec import encode_formation
@@ -13,18 +14,19 @@ from worldsim.scenario.target_frame import FrameChange, changed_frame, path_of
 
 
 class Missions:
-    """The newest formation and frame, and the mission that no agent has confirmed yet.
+    """The newest formation and frame, and the newest mission while no running agent flies it.
 
-    A mission is pending until an agent reports that it flies it. So it is not lost with the agent
-    that got it, nor with an observation.
+    A mission is given again until a running agent reports that it flies it. So it is not lost with
+    the agent that got it, nor with an observation, nor when all agents restart.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         self.formation = scenario.formation
         self.frame = scenario.frame
-        self.pending: Mission | None = None
         self.to: int | None = None
-        """The agent that gets the pending mission; None: the running agent with the lowest id."""
+        """The agent that gets the newest mission; None: the running agent with the lowest id."""
+        self._order: Mission | None = None
+        """The newest mission issued here."""
         self._issued = 0
         """The version of the newest mission issued here."""
         self._flown = [0] * scenario.rows
@@ -47,12 +49,12 @@ class Missions:
         assert_never(change)
 
     def issue(self, mission: GiveMission) -> int:
-        """Make a mission pending; return its key, which is above all keys reported so far."""
+        """Give a mission to the team; return its key, which is above all keys reported so far."""
         self._issued = mission.version or self.newest + 1
         self.to = mission.to
         key = self._issued * KEYS_PER_VERSION
         formation = encode_formation(mission.formation)
-        self.pending = Mission(key=key, frame=mission.path, formation=formation)
+        self._order = Mission(key=key, frame=mission.path, formation=formation)
         return key
 
     def report(self, agent: int, key: int, time_s: float) -> None:
@@ -63,8 +65,19 @@ class Missions:
         if not is_plausible(key, time_s):
             return
         self._flown[agent] = key
-        if self.pending is not None and key >= self.pending.key:
-            self.pending = None
+
+    def unknown(self, running: Sequence[bool]) -> Mission | None:
+        """Return the newest mission while no running agent flies it or a newer one, else None.
+
+        running: for each agent, whether it takes part.
+        """
+        order = self._order
+        if order is None:
+            return None
+        known = any(
+            runs and key >= order.key for runs, key in zip(running, self._flown, strict=True)
+        )
+        return None if known else order
 
     def _given(self, kind: Literal["formation", "frame"]) -> GiveMission:
         return GiveMission(kind=kind, formation=self.formation, path=path_of(self.frame))

@@ -12,7 +12,7 @@ from typing import Protocol
 import msgspec
 import numpy as np
 
-from agent.messages import Command, Observation, Vector
+from agent.messages import Command, Mission, Observation, Vector
 from worldsim.engine.counters import RadioUse, RejectionCounters
 from worldsim.engine.operations import Operation, StartProcesses
 from worldsim.engine.telemetry import FleetTelemetry
@@ -132,8 +132,9 @@ class SlotLoop:
         observations = list(zip(group, world.observe(group), strict=True)) if group else []
         for agent, observation in observations:
             self._headings[agent] = observation.yaw
-        if self.effects.missions.pending is not None:
-            observations = [self._with_mission(*each) for each in observations]
+        mission = self.effects.missions.unknown(running)
+        if mission is not None:
+            observations = [self._with_mission(mission, *each) for each in observations]
         return OpenSlot(
             slot=world.slot,
             time_s=world.time_s,
@@ -170,10 +171,11 @@ class SlotLoop:
         if self._recorder is not None:
             self._recorder.event(event)
 
-    def _with_mission(self, agent: int, observation: Observation) -> tuple[int, Observation]:
-        """Add the pending mission to its addressee's observation."""
-        mission = self.effects.missions.pending
-        if mission is None or agent != self.effects.addressee:
+    def _with_mission(
+        self, mission: Mission, agent: int, observation: Observation
+    ) -> tuple[int, Observation]:
+        """Add a mission to its addressee's observation."""
+        if agent != self.effects.addressee:
             return agent, observation
         return agent, msgspec.structs.replace(observation, orders=(mission,))
 

@@ -73,7 +73,7 @@ class TimelineEffects:
 
     @property
     def addressee(self) -> int | None:
-        """The agent that gets the pending mission.
+        """The agent that gets the newest mission.
 
         If the mission's own agent is not running, the running agent with the lowest id.
         """
