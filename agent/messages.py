@@ -51,7 +51,8 @@ FlightPosition = tuple[FlightMetres, FlightMetres, FlightMetres]
 """Where a vehicle may be."""
 Velocity = tuple[Speed, Speed, Speed]
 Cost = Annotated[int, Meta(ge=0, le=MAX_COST_MM)]
-MAX_PLACES = 8
+MAX_PLACES = 12
+"""Most occupied places in one report: with more, a whole table would not fit a transmission."""
 Places = Annotated[tuple[tuple[Index, Index], ...], Meta(max_length=MAX_PLACES)]
 """Some places, each (queue, rank)."""
 

@@ -17,8 +17,8 @@ from netem.wire.channels import LOCAL, MULTIHOP, Channel
 
 REMEMBERED_BEACONS = 200
 """How many own sending times are kept, for echoes that may come."""
-MAX_ECHOES = 67
-"""Most echoes that fit a frame: a Beacon takes up to 317 B with its checksum, an echo 13 B."""
+MAX_ECHOES = 65
+"""Most echoes that fit a frame: a Beacon takes up to 345 B with its checksum, an echo 13 B."""
 
 
 class OwnState(msgspec.Struct, frozen=True, gc=False):

@@ -120,8 +120,8 @@ class RecordTable:
     def members(self, now_s: float) -> list[MemberPosition]:
         """Return the last reported position of each member."""
         return [
-            MemberPosition(position=newest.position, age_s=now_s - newest.stamp_s)
-            for newest in self._newest.values()
+            MemberPosition(id=subject, position=newest.position, age_s=now_s - newest.stamp_s)
+            for subject, newest in self._newest.items()
         ]
 
     def newest(self) -> Collection[Beacon | Record]:

@@ -1,9 +1,13 @@
 """Unidentified vehicles: sensed and stationary, but no member of the team (E18).
 
 The vehicle of a dead agent may hover in a slot. An agent that senses a vehicle for long enough, and
-knows of no member there, takes it for unidentified, and remembers it while it is out of the
-sensor's range. A sensor may reach farther than the radio: a vehicle counts as unidentified only if
-members at its distance are heard.
+knows of no member there, takes it for unidentified. It remembers the vehicle out of the sensor's
+range until the vehicle is seen to have left, or may be a new member: a place that agents forget and
+find occupied again makes them move to and fro for ever.
+
+A sensor may reach farther than the radio: a vehicle counts as unidentified only within the distance
+from which a member has ever been heard. Present neighbours do not decide this, for the last
+survivor of a team has none.
 """
 
 from __future__ import annotations
@@ -21,8 +25,10 @@ SAME_VEHICLE_M = 0.2
 SAME_MEMBER_M = 0.4
 """A vehicle sensed nearer than this to where a member is reported is that member."""
 UNIDENTIFIED_AFTER_S = 1.5
-MEMORY_S = 10.0
-"""How long a vehicle out of the sensor's range is remembered."""
+RECENT_S = 10.0
+"""How long the last report or sight of a vehicle tells what a vehicle sensed near by may be."""
+MAX_REMEMBERED = 64
+"""Most vehicles remembered out of the sensor's range; those seen last are kept."""
 SURE_RANGE_M = 1.8
 """A vehicle nearer than this would be sensed if it were still there."""
 WITNESS_M = 1.3
@@ -42,15 +48,17 @@ class _Track(NamedTuple):
     position: Vector  # [m; world frame]
     since_s: float  # at this position since [s]
     seen_s: float  # last sensed [s]
+    others: frozenset[int]  # ids of members that were elsewhere while it was sensed
 
-    def seen_again(self, now_s: float, sensed: Sequence[Vector]) -> _Track:
+    def seen_again(self, now_s: float, sensed: Sequence[Vector], members: frozenset[int]) -> _Track:
         near = any(dist(self.position, each) < SAME_VEHICLE_M for each in sensed)
-        return self._replace(seen_s=now_s) if near else self
+        return self._replace(seen_s=now_s, others=self.others | members) if near else self
 
 
 class MemberPosition(msgspec.Struct, frozen=True, gc=False):
     """A team member's last reported position."""
 
+    id: int
     position: Vector  # [m; world frame]
     age_s: float  # age of the report [s]
 
@@ -84,27 +92,28 @@ class UnidentifiedVehicles:
         self._max_speed = max_speed
         self._tracks: list[_Track] = []
         self._departed: list[DepartedMember] = []
+        self._heard_from_m = 0.0
+        """The farthest distance from which a member has been heard [m]."""
 
     def update(self, around: Surroundings) -> tuple[Vector, ...]:
         """Return the positions of unidentified vehicles [m; world frame]."""
         self._note_departed(around)
+        self._note_hearing_range(around)
         unknown = self._unknown(around)
         if not unknown and not self._tracks:
             return ()
-        tracks = [each.seen_again(around.now_s, unknown) for each in self._tracks]
+        members = frozenset([member.id for member in around.team])
+        tracks = [each.seen_again(around.now_s, unknown, members) for each in self._tracks]
         new = [
             seen
             for seen in unknown
             if all(dist(track.position, seen) >= SAME_VEHICLE_M for track in tracks)
         ]
+        sensed = [track for track in tracks if track.seen_s == around.now_s]
         lost = [track for track in tracks if track.seen_s < around.now_s]
-        kept = [
-            track
-            for track in tracks
-            if track.seen_s == around.now_s
-            or (self._may_remain(track, around) and not _contradicted(track, around))
-        ]
-        self._tracks = kept + [self._new_track(seen, around.now_s, lost) for seen in new]
+        remembered = [track for track in lost if self._may_remain(track, around)]
+        found = [self._new_track(seen, around.now_s, lost, members) for seen in new]
+        self._tracks = remembered[-MAX_REMEMBERED:] + sensed + found
         return tuple(
             track.position
             for track in self._tracks
@@ -116,25 +125,27 @@ class UnidentifiedVehicles:
             self._departed = [
                 gone
                 for gone in (*self._departed, *around.departed)
-                if around.now_s - gone.stamp_s <= MEMORY_S
+                if around.now_s - gone.stamp_s <= RECENT_S
             ]
+
+    def _note_hearing_range(self, around: Surroundings) -> None:
+        for beacon in around.beacons:
+            away_m = dist(around.position, beacon.position)
+            self._heard_from_m = max(self._heard_from_m, away_m)
 
     def _unknown(self, around: Surroundings) -> list[Vector]:
         """Return the sensed vehicles that are no member and within hearing range [m; world]."""
-        unknown = [
+        reach_m = self._heard_from_m + SAME_VEHICLE_M
+        return [
             vehicle
             for vehicle in _in_world(around.position, around.sensed)
-            if not self._is_member(vehicle, around.team)
+            if dist(around.position, vehicle) <= reach_m
+            and not self._is_member(vehicle, around.team)
         ]
-        if unknown:
-            reach = max(
-                (dist(around.position, each.position) for each in around.beacons), default=0.0
-            )
-            reach += SAME_VEHICLE_M
-            unknown = [vehicle for vehicle in unknown if dist(around.position, vehicle) <= reach]
-        return unknown
 
-    def _new_track(self, vehicle: Vector, now_s: float, lost: Sequence[_Track]) -> _Track:
+    def _new_track(
+        self, vehicle: Vector, now_s: float, lost: Sequence[_Track], members: frozenset[int]
+    ) -> _Track:
         """Return the track of a vehicle first sensed now.
 
         Where a member fell silent, the vehicle counts as silent since then. lost: the tracks no
@@ -151,17 +162,28 @@ class UnidentifiedVehicles:
         moved = any(
             dist(each.position, vehicle) < SAME_VEHICLE_M + self._max_speed * (now_s - each.seen_s)
             for each in lost
+            if now_s - each.seen_s <= RECENT_S
         )
-        return _Track(vehicle, now_s if moved else since_s, now_s)
+        return _Track(vehicle, now_s if moved else since_s, now_s, members)
 
     def _may_remain(self, track: _Track, around: Surroundings) -> bool:
-        """Whether a stationary vehicle that is not sensed now may still be there."""
-        out_of_sight = dist(track.position, around.position) > SURE_RANGE_M
-        recent = (
-            around.now_s - track.seen_s <= MEMORY_S
-            and track.seen_s - track.since_s >= UNIDENTIFIED_AFTER_S
+        """Whether a vehicle that is not sensed now is still taken to be where it hovered."""
+        return (
+            track.seen_s - track.since_s >= UNIDENTIFIED_AFTER_S
+            and dist(track.position, around.position) > SURE_RANGE_M
+            and not _contradicted(track, around)
+            and not self._is_member(track.position, around.team)
+            and not self._may_have_joined(track, around)
         )
-        return out_of_sight and recent and not self._is_member(track.position, around.team)
+
+    def _may_have_joined(self, track: _Track, around: Surroundings) -> bool:
+        """Whether a member first heard since the vehicle was sensed may be that vehicle."""
+        return any(
+            member.id not in track.others
+            and dist(track.position, member.position)
+            < SAME_MEMBER_M + self._max_speed * (around.now_s - track.seen_s)
+            for member in around.team
+        )
 
     def _is_member(self, vehicle: Vector, team: Sequence[MemberPosition]) -> bool:
         """Whether a member may be there by now, having moved on since its last report."""

@@ -42,23 +42,27 @@ class OccupiedSlots:
         if len(team) > self._agents:
             self._grown_s = senses.now_s
         self._agents = len(team)
-        self.seen = self._targets.taken_by(senses.mission, len(team), senses.silent)
-        if not (self.seen or senses.blocked or self._recent):
+        seen = self._targets.taken_by(senses.mission, len(team), senses.silent, senses.blocked)
+        if not (seen or senses.blocked or self._recent):
+            self.seen = ()
             return NO_PLACES
-        return self._with_recent(senses.now_s, self._occupied(senses, team))
+        return self._with_recent(senses.now_s, self._occupied(senses, team, seen))
 
-    def _occupied(self, senses: Senses, team: Sequence[Peer]) -> frozenset[Place]:
+    def _occupied(
+        self, senses: Senses, team: Sequence[Peer], silent: frozenset[Place]
+    ) -> frozenset[Place]:
+        """Return the places that are occupied now; silent: by unidentified vehicles."""
         mission, agents, reported = senses.mission, len(team), senses.blocked
         held = self._held(senses, team)
-        seen = {*self.seen}
+        seen = {*silent}
         if self._senses_vehicles:
             recent = [place for place in self._recent if place not in seen]
             strangers = _vehicles_without_neighbour(senses)
             seen.update(self._targets.near_vehicles(mission, agents, recent, strangers))
             here, near = senses.position, senses.vehicles
             reported = self._targets.plausible(mission, agents, reported, here, near)
-        self.seen = tuple(sorted(seen - held))[:MAX_PLACES]
-        return (reported - held).union(self.seen)
+        self.seen = _first_to_fill(seen - held)
+        return (reported - held).union(seen - held)
 
     def _held(self, senses: Senses, team: Sequence[Peer]) -> set[Place]:
         """Return the places in which the agents that claim them stand."""
@@ -83,6 +87,16 @@ class OccupiedSlots:
         self._recent = {place: at_s for place, at_s in before if now_s - at_s < FREED_S}
         self._recent.update(dict.fromkeys(blocked, now_s))
         return frozenset(self._recent)
+
+
+def _first_to_fill(seen: set[Place]) -> tuple[Place, ...]:
+    """Return the places that a beacon has room for: those that a team fills first, sorted.
+
+    A choice that depended on the agent's own position would change as it flies; each place that it
+    no longer reports would be free for the others.
+    """
+    first = sorted(seen, key=lambda place: (place.rank, place.queue))[:MAX_PLACES]
+    return tuple(sorted(first))
 
 
 def _vehicles_without_neighbour(senses: Senses) -> list[Vector]:

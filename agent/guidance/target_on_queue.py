@@ -12,8 +12,8 @@ from typing import NamedTuple
 from agent.comms.allocation import own_place
 from agent.comms.unidentified_vehicles import SURE_RANGE_M
 from agent.controller import Flown, Peer
-from agent.messages import MAX_PLACES, Place, Vector
-from agent.qstructure.formation import Layout, Slot
+from agent.messages import Place, Vector
+from agent.qstructure.formation import NO_PLACES, Layout, Slot
 from agent.qstructure.target_frame import Frame
 
 
@@ -49,15 +49,22 @@ class TargetOnQueue:
         return OwnTarget(place=place, slot=layout.slots[place], vertex=place in layout.heads)
 
     def taken_by(
-        self, mission: Flown, agents: int, vehicles: Sequence[Vector]
-    ) -> tuple[Place, ...]:
+        self,
+        mission: Flown,
+        agents: int,
+        vehicles: Sequence[Vector],
+        reported: frozenset[Place] = NO_PLACES,
+    ) -> frozenset[Place]:
         """Return the places of a team that are within d_ir / 2 of an unidentified vehicle (E18).
 
-        vehicles [m; world frame]; at most MAX_PLACES places.
+        vehicles [m; world frame]. reported: places that others see taken; the team fills the places
+        beyond them, so these are examined too.
         """
-        found: set[Place] = set()
-        while vehicles and len(found) < MAX_PLACES:
-            layout = mission.formation.layout(agents, frozenset(found))
+        if not vehicles:
+            return NO_PLACES
+        found = {*self.near_vehicles(mission, agents, reported, vehicles)}
+        while True:
+            layout = mission.formation.layout(agents, reported.union(found))
             points = self._points(layout, mission.frame)
             new = {
                 place
@@ -65,9 +72,8 @@ class TargetOnQueue:
                 if any(dist(point, vehicle) <= self._blocks_within_m for vehicle in vehicles)
             }
             if not new:
-                break
+                return frozenset(found)
             found |= new
-        return tuple(sorted(found))[:MAX_PLACES]
 
     def near_vehicles(
         self, mission: Flown, agents: int, places: Iterable[Place], vehicles: Sequence[Vector]

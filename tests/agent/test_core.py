@@ -198,8 +198,8 @@ def test_the_output_is_valid_with_any_number_of_neighbours(neighbours):
 
 def test_the_output_is_valid_with_any_number_of_records():
     core = agent()
-    for first in range(1, 3000, 8):
-        records = (greatest_record(subject) for subject in range(first, first + 8))
+    for first in range(1, 3000, 7):
+        records = (greatest_record(subject) for subject in range(first, first + 7))
         fresh = tuple(msgspec.structs.replace(each, stamp_s=0.0) for each in records)
         deliver(core, gossip(1, 0.0, fresh), 0.0, 1)
     outbox = core.step(observation(0, at=(FAR, FAR, FAR)))

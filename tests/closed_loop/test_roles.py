@@ -117,3 +117,39 @@ def test_the_team_skips_the_slot_of_a_dead_member(place):
     assert len(set(places)) == 8
     assert fleet.loop.judge.min_separation_m >= 0.25
     assert np.max(fleet.loop.figures.slot_error[living]) < 0.01
+
+
+def with_losses(seed, agents, killed, spacing_m=1.0):
+    """Fly a wedge of which some agents die at 15 s, for 50 s."""
+    event = f"[{{ at_s = 15.0, kill = ['{killed}'] }}]"
+    given = {"fleet.agents": str(agents), "event": event, "duration_s": "50"}
+    given |= {"control.spacing_m": str(spacing_m), "netem.range_m": "12"}
+    fleet = VirtualFleet(load(WEDGE, {"seed": str(seed), **given}))
+    fly(fleet, 50.0)
+    return fleet
+
+
+def check_at_rest(fleet, since_s):
+    """Check that no agent has changed its place for long, and that all stand in their slots."""
+    assert max(event.t_s for event in fleet.loop.events if event.kind == "slot") < since_s
+    assert np.nanmax(fleet.loop.figures.slot_error[fleet.loop.members.alive]) < 0.01
+    tallies = fleet.loop.judge.invariants()
+    assert [name for name, tally in tallies.items() if tally.violations] == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_last_survivor_takes_the_slot_behind_the_dead_vertex_agent(seed):
+    fleet = with_losses(seed, 2, "vertex:V1")
+    (survivor,) = np.flatnonzero(fleet.loop.members.alive)
+    assert telemetry_of(fleet)[survivor].place[1] == 1
+    check_at_rest(fleet, since_s=20.0)
+
+
+@pytest.mark.parametrize("seed", [3, 4, 7, 9])
+def test_three_survivors_come_to_rest_among_nine_dead(seed):
+    """Their slots are out of sight of some dead vehicles, which must not be forgotten."""
+    check_at_rest(with_losses(seed, 12, "random:9"), since_s=26.0)
+
+
+def test_a_dead_vertex_agent_that_no_slot_is_in_sight_of_is_not_forgotten():
+    check_at_rest(with_losses(1, 5, "vertex:V1", spacing_m=2.5), since_s=30.0)

@@ -72,7 +72,7 @@ class HoveringVehicles:
         if not others.any():
             return NO_PLACES
         positions = [(x, y, z) for x, y, z in tick.position[others].tolist()]
-        return frozenset(self._targets.taken_by(_flown(tick, phase), len(team), positions))
+        return self._targets.taken_by(_flown(tick, phase), len(team), positions)
 
     def held_places(self, tick: Tick, phase: Phase, team: list[int]) -> frozenset[Place]:
         """Return the places in which agents of a team (rows) stand that claim them."""

@@ -1,7 +1,7 @@
 """Builders of messages and members for tests: a test names only the fields that matter to it."""
 
 from agent.controller import Peer
-from agent.messages import HOME, Beacon, Gossip, Place, Record
+from agent.messages import HOME, MAX_PLACES, Beacon, Gossip, Place, Record
 
 ORIGIN = (0.0, 0.0, 0.0)
 AT_REST = (0.0, 0.0, 0.0)
@@ -67,7 +67,7 @@ def greatest_record(subject):
         rank=2**15 - 1,
         cost_mm=2**31 - 1,
         mission=GREATEST,
-        blocked=(Place(2**15 - 1, 2**15 - 1),) * 8,
+        blocked=(Place(2**15 - 1, 2**15 - 1),) * MAX_PLACES,
     )
 
 

@@ -10,7 +10,7 @@ from agent.codec import add_checksum, decode_beacon, decode_gossip, encode
 from agent.comms.broadcast import MAX_ECHOES, Broadcast, OwnState
 from agent.comms.gossip import RecordTable
 from agent.comms.hierarchy import HierarchyState
-from agent.messages import FRAME_M, Drift, Place, Pose
+from agent.messages import FRAME_M, MAX_PLACES, Drift, Place, Pose
 from netem.wire.channels import LOCAL, MAX_PAYLOAD_B, MULTIHOP
 from tests.agent.comms.builders import (
     FAR,
@@ -35,7 +35,7 @@ EXTREME = OwnState(
     frame=Pose(x=FRAME_M, y=FRAME_M, z=FRAME_M, yaw=99.9),
     drift=Drift(stamp_s=LATE_S, x=99.9, y=99.9, z=99.9, yaw_rate=99.9),
     hierarchy=HierarchyState(tier=2**15 - 1, parent=2**16 - 1, root=GREATEST, role=3),
-    blocked=(FARTHEST,) * 8,
+    blocked=(FARTHEST,) * MAX_PLACES,
     cost_mm=2**31 - 1,
 )
 

@@ -5,7 +5,7 @@ import pytest
 from agent.controller import Flown, Peer, Senses
 from agent.guidance.occupied_slots import FREED_S, GROWN_S, OccupiedSlots
 from agent.guidance.target_on_queue import TargetOnQueue
-from agent.messages import Place
+from agent.messages import MAX_PLACES, Place
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
 from agent.qstructure.target_frame import Frame
@@ -50,6 +50,25 @@ def occupied():
 def test_a_vehicle_near_a_place_takes_it(occupied):
     assert occupied.update(senses(START_S, unidentified=[(-1.1, 0.3, 0.0)]), (ME, FAR)) == {SECOND}
     assert occupied.seen == (SECOND,)
+
+
+def test_places_beyond_those_that_others_report_are_examined_too(occupied):
+    """The team of two fills the first and the third place, once the second is reported."""
+    vehicles = [(-1.0, 0.0, 0.0), (-2.0, 0.0, 0.0)]
+    near = senses(START_S, [vehicles[1]], vehicles, reported={SECOND})
+    assert occupied.update(near, (ME, FAR)) == {SECOND, THIRD}
+    assert occupied.seen == (THIRD,)
+
+
+def test_all_seen_places_count_and_the_first_to_fill_are_reported():
+    made = OccupiedSlots(TargetOnQueue(0, 1.0), senses_vehicles=True)
+    team = (Peer(0, (9.0, 0.0, 0.0), None),)
+    made.update(senses(START_S - GROWN_S), team)
+    line = [(-float(rank), 0.0, 0.0) for rank in range(MAX_PLACES + 3)]
+    for at in ((9.0, 0.0, 0.0), (-30.0, 0.0, 0.0)):
+        found = made.update(senses(START_S, unidentified=line, at=at), team)
+        assert found == {Place(0, rank) for rank in range(MAX_PLACES + 3)}
+        assert made.seen == tuple(Place(0, rank) for rank in range(MAX_PLACES))
 
 
 def test_an_agent_that_stands_in_its_place_keeps_it(occupied):
