@@ -1,5 +1,7 @@
 """A controller whose intents are checked and whose failures name the controller and the agent."""
 
+import signal
+import traceback
 from collections.abc import Iterable
 from math import isfinite
 
@@ -14,8 +16,8 @@ NUMBERS = 13
 SMALL = min(MAX_SPEED_MPS, MAX_ANGLE_RAD)
 """Numbers whose absolute values add up to no more than this are within every bound."""
 
-FAILURES = (Exception, SystemExit, GeneratorExit)
-"""Failures of a controller: one that calls sys.exit must not end a run as if all were well."""
+MAX_ERROR_TEXT = 2000
+"""Characters of an error's text that are kept."""
 
 
 class FaultyControllerError(RuntimeError):
@@ -25,7 +27,8 @@ class FaultyControllerError(RuntimeError):
 class CheckedController:
     """One agent's controller. Raises ControllerError if it cannot be loaded.
 
-    Any error of the controller's constructor or ``decide`` is raised as FaultyControllerError.
+    Any error of the controller's constructor or ``decide`` is raised as FaultyControllerError,
+    SystemExit and KeyboardInterrupt included; Ctrl-C passes.
     """
 
     def __init__(self, setup: AgentSetup) -> None:
@@ -33,20 +36,37 @@ class CheckedController:
         controller_class = load(setup.control.controller)
         try:
             self._controller: Controller = controller_class(setup)
-        except FAILURES as error:
+        except BaseException as error:
             raise self._fault("in its constructor", error) from error
 
     def decide(self, senses: Senses) -> Intent:
         """Return the controller's intent, in plain floats within the bounds of a command."""
         try:
             return plain(self._controller.decide(senses))
-        except FAILURES as error:
+        except BaseException as error:
             raise self._fault(f"at {senses.now_s:g} s", error) from error
 
     def _fault(self, when: str, error: BaseException) -> FaultyControllerError:
-        return FaultyControllerError(
-            f"{self._label} failed {when}: {type(error).__name__}: {error}"
-        )
+        """Return the error that names the controller; raise ``error`` itself if it is Ctrl-C."""
+        if isinstance(error, KeyboardInterrupt) and _ctrl_c_raises():
+            raise error
+        if isinstance(error, MemoryError):
+            traceback.clear_frames(error.__traceback__)
+        return FaultyControllerError(f"{self._label} failed {when}: {described(error)}")
+
+
+def _ctrl_c_raises() -> bool:
+    """Return whether a KeyboardInterrupt can come from the keyboard."""
+    return signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def described(error: BaseException) -> str:
+    """Return the type and text of any error, also where its own ``__str__`` fails."""
+    try:
+        text = str(error)[:MAX_ERROR_TEXT]
+    except Exception as own:
+        text = f"its text cannot be shown: {type(own).__name__} in its __str__"
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 def plain(intent: Intent) -> Intent:

@@ -14,20 +14,21 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from netem.wire.bus import Subscriber
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class StopRequest:
     """Whether a signal has asked this process to end.
 
-    SIGTERM does, and SIGINT too unless it is ignored: then a launcher controls the end.
+    SIGTERM does. SIGINT and SIGHUP do unless they are ignored: then a launcher controls the end, or
+    nohup keeps the process.
     """
 
     def __init__(self) -> None:
         self.requested = False
-        signal.signal(signal.SIGTERM, self._request)
-        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-            signal.signal(signal.SIGINT, self._request)
+        for number in SIGNALS:
+            if number == signal.SIGTERM or signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, self._request)
 
     def _request(self, _number: int, _frame: FrameType | None) -> None:
         self.requested = True
@@ -59,7 +60,7 @@ def interrupt_on_signals() -> None:
 
 def ignore_signals() -> None:
     """Ignore every signal that ends a run: a second Ctrl-C would leave the end half done."""
-    for number in (*SIGNALS, signal.SIGHUP):
+    for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
 

@@ -1,165 +1,131 @@
-"""Runs in virtual time, one or many: each into its own folder, and a summary over many.
+"""Runs in virtual time, one or many: each in a process of its own, in its own folder.
 
 A stop request ends the active runs between two slots. Each of them writes a summary of what it
-has simulated so far; runs that have not begun leave nothing.
+has simulated so far; runs that have not begun leave nothing. What a run's controllers start ends
+with the run.
 """
 
-import multiprocessing
-import os
-import signal
-import threading
+import selectors
+from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 from agent.checked_controller import FaultyControllerError
 from netem.wire.shutdown import StopRequest
-from worldsim.engine.step import SlotLoop
-from worldsim.engine.virtual import Flight, fly
+from worldsim.campaign.watched_flight import Job, WatchedFlight
+from worldsim.fleet.fork import adopt_orphans, children, end_orphans
 from worldsim.results.overall import FailedRun, Made, Result
-from worldsim.results.run_folder import RunDirectory
-from worldsim.results.sinks import open_sinks
-from worldsim.results.summary import FinishedRun, summarise
-from worldsim.scenario.tables import Scenario
+
+__all__ = ["FailedFlightError", "Job", "simulate", "sweep"]
 
 POLL_EVERY_S = 0.2
 
 
-class Job(NamedTuple):
-    """One run to make."""
+class FailedFlightError(FaultyControllerError):
+    """A run failed; ``details`` holds the traceback, where there is one."""
 
-    scenario: Scenario
-    folder: Path | None  # a new folder; None: one named after the scenario and the time
-    recording: bool
+    def __init__(self, run: FailedRun) -> None:
+        super().__init__(run.error)
+        self.details = run.details
 
 
 def simulate(
-    job: Job, stop: StopRequest, on_progress: Callable[[SlotLoop], None] | None = None
+    job: Job, stop: StopRequest, on_progress: Callable[[float], None] = lambda _: None
 ) -> Result:
     """Make one run, and write its folder. A stop request ends it early, and inconclusive.
 
-    Raises RunDirectoryError when the folder exists or cannot be written.
+    on_progress: called now and then with the simulated time [s]. Raises RunDirectoryError when the
+    folder exists or cannot be written, FailedFlightError when the run fails before its end.
     """
-    scenario = job.scenario
-    directory = RunDirectory.create(job.folder, scenario)
-    sinks = open_sinks(directory, scenario, directory.path.name, "virtual", job.recording)
-    try:
-        flight = fly(scenario, sinks, on_progress=on_progress, should_stop=lambda: stop.requested)
-    finally:
-        sinks.close()
-    summary = summarise(scenario, finished(flight, scenario))
-    return Result(directory.path, directory.write_summary(summary))
-
-
-def finished(flight: Flight, scenario: Scenario) -> FinishedRun:
-    """Return a flight in virtual time for its summary; no tick can be late there."""
-    world = flight.loop.world
-    return FinishedRun(
-        mode="virtual",
-        loop=flight.loop,
-        medium_counters=flight.medium_counters,
-        late_tick_fraction=0.0,
-        real_time_factor=world.time_s / flight.wall_s,
-        cut_off_by="interrupted" if world.slot < scenario.slots else None,
-    )
+    (made,) = _Pool([job], 1, stop, on_progress).results()
+    if isinstance(made, FailedRun):
+        raise FailedFlightError(made)
+    return made
 
 
 def sweep(jobs: list[Job], workers: int, stop: StopRequest) -> Iterator[Made]:
-    """Make many runs in up to ``workers`` processes; yield each result as soon as it is there.
+    """Make many runs, up to ``workers`` at once; yield each result as soon as it is there.
 
-    A controller's error fails its run alone. After a stop request no further run begins.
+    An error fails its run alone. After a stop request no further run begins.
     """
-    if workers == 1 or len(jobs) == 1:
-        for job in jobs:
-            if not stop.requested:
-                yield _simulate_or_fail(job, stop)
-        return
-    with _pool(min(workers, len(jobs))) as pool:
-        yield from _results([pool.submit(_in_worker, job) for job in jobs], stop)
+    return _Pool(jobs, workers, stop, lambda _: None).results()
 
 
-def _simulate_or_fail(job: Job, stop: StopRequest) -> Made:
-    """Make one run of many; return its result, or the controller's error that ended it."""
-    try:
-        return simulate(job, stop)
-    except FaultyControllerError as error:
-        assert job.folder is not None  # each of many runs has a folder of its own
-        return FailedRun(job.folder, job.scenario.name, job.scenario.seed, str(error))
+class _Ready(NamedTuple):
+    flight: WatchedFlight
+    printed: bool  # output to read; otherwise an exit
 
 
-def _results(pending: list[Future[Made | None]], stop: StopRequest) -> Iterator[Made]:
-    interrupted = False
-    while pending:
-        done, _ = wait(pending, POLL_EVERY_S, FIRST_COMPLETED)
-        completed = [future for future in pending if future in done]
-        pending = [future for future in pending if future not in done]
-        for future in completed:
-            result = _result(future, stop)
-            if result is not None:
-                yield result
-        if stop.requested and not interrupted:
-            interrupted = True
-            _interrupt(pending)
+class _Pool:
+    """The flights that are active, and the jobs that wait."""
 
+    def __init__(
+        self,
+        jobs: list[Job],
+        workers: int,
+        stop: StopRequest,
+        on_progress: Callable[[float], None],
+    ) -> None:
+        self._waiting = deque(jobs)
+        self._workers = workers
+        self._stop = stop
+        self._on_progress = on_progress
+        self._flights: list[WatchedFlight] = []
+        self._selector = selectors.DefaultSelector()
+        self._others = children()
 
-def _interrupt(pending: list[Future[Made | None]]) -> None:
-    for future in pending:
-        future.cancel()
-    for worker in multiprocessing.active_children():
-        worker.terminate()
+    def results(self) -> Iterator[Made]:
+        """Yield each run's result as soon as it is there."""
+        with self._all_ended():
+            while self._flights or (self._waiting and not self._stop.requested):
+                while self._may_begin():
+                    self._begin(self._waiting.popleft())
+                yield from self._poll()
 
+    def _may_begin(self) -> bool:
+        room = len(self._flights) < self._workers
+        return room and bool(self._waiting) and not self._stop.requested
 
-def _result(future: Future[Made | None], stop: StopRequest) -> Made | None:
-    """Return a worker's result; None for a run that did not begin before a stop request."""
-    if future.cancelled():
-        return None
-    try:
-        return future.result()
-    except BrokenProcessPool:
-        # SIGTERM ends a worker that has not installed its handler yet.
-        if stop.requested:
-            return None
-        raise
+    def _begin(self, job: Job) -> None:
+        flight = WatchedFlight(job)
+        self._flights.append(flight)
+        self._selector.register(flight.output, selectors.EVENT_READ, _Ready(flight, True))
+        self._selector.register(flight.exit_descriptor, selectors.EVENT_READ, _Ready(flight, False))
 
+    def _poll(self) -> Iterator[Made]:
+        for key, _ in self._selector.select(POLL_EVERY_S):
+            ready: _Ready = key.data
+            if ready.printed and not ready.flight.output.pass_on():
+                self._selector.unregister(ready.flight.output)
+        for flight in list(self._flights):
+            if self._stop.requested:
+                flight.request_stop()
+            self._on_progress(flight.time_s)
+            if flight.check():
+                yield self._ended(flight)
 
-@contextmanager
-def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Give worker processes that end when this process ends, however it ends."""
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
-    try:
-        yield pool
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for worker in multiprocessing.active_children():
-            worker.terminate()
-        raise
-    pool.shutdown()
+    def _ended(self, flight: WatchedFlight) -> Made:
+        self._flights.remove(flight)
+        self._selector.unregister(flight.exit_descriptor)
+        if flight.output.fileno() in self._selector.get_map():
+            self._selector.unregister(flight.output)
+        self._end_orphans()
+        return flight.result()
 
+    def _end_orphans(self) -> None:
+        end_orphans(self._others.union(flight.pid for flight in self._flights))
 
-@cache
-def _stop_of_worker() -> StopRequest:
-    return StopRequest()
-
-
-def _in_worker(job: Job) -> Made | None:
-    stop = _stop_of_worker()
-    return None if stop.requested else _simulate_or_fail(job, stop)
-
-
-def _begin_worker() -> None:
-    """Ignore Ctrl-C, which the parent passes on as SIGTERM, and end when the parent is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _stop_of_worker()
-    threading.Thread(target=_leave_with_parent, daemon=True).start()
-
-
-def _leave_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+    @contextmanager
+    def _all_ended(self) -> Iterator[None]:
+        """Leave no process behind, however this block is left."""
+        adopt_orphans()
+        try:
+            yield
+        finally:
+            for flight in self._flights:
+                flight.kill()
+            self._flights.clear()
+            self._end_orphans()
+            adopt_orphans(False)
+            self._selector.close()

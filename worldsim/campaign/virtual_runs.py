@@ -23,9 +23,7 @@ def simulate_one(scenario: Scenario, out: Path | None, recording: bool) -> int:
         folder, summary = simulate(
             Job(scenario, out, recording),
             stop,
-            lambda loop: line.update(
-                f"{loop.world.time_s:.1f} of {scenario.duration_s:g} s simulated"
-            ),
+            lambda time_s: line.update(f"{time_s:.1f} of {scenario.duration_s:g} s simulated"),
         )
     line.clear()
     print(verdict(summary, folder, recording))

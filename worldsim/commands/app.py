@@ -7,7 +7,6 @@ exit status 2. A command imports what it needs when it is called, so that --help
 import gc
 import os
 import sys
-import traceback
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -91,7 +90,7 @@ def main() -> None:
 
 def command(arguments: list[str]) -> int:
     """Run one command line and return its exit status; bad input is reported in one line."""
-    from agent.checked_controller import FaultyControllerError
+    from worldsim.campaign.pool import FailedFlightError
     from worldsim.fleet.process_table import OperatorError
     from worldsim.recording.viewer import ViewerError
     from worldsim.results.run_folder import RunDirectoryError, RunWriteError
@@ -107,9 +106,8 @@ def command(arguments: list[str]) -> int:
     except typer.TyperException as error:
         complain(usage_text(error, arguments, names))
         return BAD_INPUT
-    except FaultyControllerError as error:
-        traceback.print_exception(error.__cause__)
-        complain(f"qswarm: {error}")
+    except FailedFlightError as error:
+        complain(f"{error.details}qswarm: {error}")
         return FAIL
     except (typer.Abort, KeyboardInterrupt):
         return _interrupted()

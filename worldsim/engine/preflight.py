@@ -6,6 +6,7 @@ the vehicles apart under the run's clock.
 
 from pathlib import Path
 
+from agent.checked_controller import described
 from agent.controller import ControllerError
 from agent.controller import load as load_controller
 from worldsim.scenario.faults import Join, ProcessFault
@@ -57,9 +58,10 @@ def _controller(scenario: Scenario) -> Problem | None:
         load_controller(name)
     except ControllerError as error:
         return Problem("control.controller", str(error))
-    except Exception as error:  # importing the user's module may raise anything
+    except (Exception, SystemExit, GeneratorExit) as error:  # a user's module may raise anything
         return Problem(
-            "control.controller", f"{name!r} cannot be imported: {type(error).__name__}: {error}"
+            "control.controller",
+            f"{name!r} cannot be imported: {described(error)}",
         )
     return None
 

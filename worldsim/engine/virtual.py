@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from time import perf_counter, process_time
-from typing import assert_never
+from typing import Protocol, assert_never
 
 from agent.codec import decode_beacon, decode_command, decode_gossip, decode_observation, encode
 from agent.core import Agent, Decoders
@@ -58,10 +58,27 @@ class Flight:
     """CPU time of this process [s]."""
 
 
+class StepWatch(Protocol):
+    """Learns when an agent's code, its controller included, is entered and left."""
+
+    def enter(self, agent: int, slot: int) -> None:
+        """Note that an agent is made, or steps."""
+
+    def leave(self) -> None:
+        """Note that it has returned."""
+
+
 class VirtualFleet:
     """A fleet, its radio and its world, stepped slot by slot."""
 
-    def __init__(self, scenario: Scenario, recorder: Recorder | None = None) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        recorder: Recorder | None = None,
+        watch: StepWatch | None = None,
+    ) -> None:
+        self._watch = watch
+        self._slot = 0
         decoders = Decoders(lru_cache(4096)(decode_beacon), lru_cache(4096)(decode_gossip))
         self._scenario = scenario
         self._medium = Medium(scenario.medium_setup())
@@ -88,6 +105,7 @@ class VirtualFleet:
             self.carry_out(operation)
             self.loop.apply(operation)
         open_slot = self.loop.open()
+        self._slot = open_slot.slot
         self._medium.place(open_slot.positions)
         for agent, observation in open_slot.observations:
             self._step(agent, encode(observation), open_slot)
@@ -116,7 +134,12 @@ class VirtualFleet:
 
     def _new_agent(self, agent: int, incarnation: int) -> Agent:
         setup = self._scenario.agent_setup(agent, incarnation, VIRTUAL_COMMAND_TICKS)
-        return Agent(setup, self._decoders)
+        if self._watch is None:
+            return Agent(setup, self._decoders)
+        self._watch.enter(agent, self._slot)
+        core = Agent(setup, self._decoders)
+        self._watch.leave()
+        return core
 
     def _step(self, agent: int, encoded: bytes, open_slot: OpenSlot) -> None:
         core = self._agents[agent]
@@ -125,7 +148,11 @@ class VirtualFleet:
         while inbox:
             for frame in unpack_batch(inbox.popleft()).frames:
                 core.receive(frame.source, frame.channel, frame.payload, observation.time_s)
+        if self._watch is not None:
+            self._watch.enter(agent, open_slot.slot)
         outbox = core.step(observation)
+        if self._watch is not None:
+            self._watch.leave()
         outgoing = tuple([Outgoing(channel, payload) for channel, payload in outbox.frames])
         transmission = pack(Transmission(open_slot.slot, outbox.command.incarnation, outgoing))
         self._medium.transmit(agent, open_slot.time_s, unpack_transmission(transmission))
@@ -148,9 +175,10 @@ def fly(
     on_event: Callable[[RunEvent], None] | None = None,
     on_progress: Callable[[SlotLoop], None] | None = None,
     should_stop: Callable[[], bool] = lambda: False,
+    watch: StepWatch | None = None,
 ) -> Flight:
     """Fly a scenario in virtual time to its end, or until ``should_stop`` returns True."""
-    fleet = VirtualFleet(scenario, recorder)
+    fleet = VirtualFleet(scenario, recorder, watch)
     wall, cpu = perf_counter(), process_time()
     reported, progress_at = 0, wall + PROGRESS_EVERY_S
     while fleet.loop.world.slot < scenario.slots and not should_stop():

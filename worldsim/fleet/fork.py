@@ -1,22 +1,22 @@
-"""Forked child processes: they die with their parent, and their output goes to their log.
+"""Forked child processes: they die with their parent, and so does what they fork.
 
-The forking process must not have opened a Zenoh session or a recording: after either, a child
-hangs.
+The forking process must not have opened a Zenoh session: after that, a child hangs.
 """
 
 import ctypes
-import io
 import os
 import signal
-import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+from worldsim.fleet.child_output import finish_output, flush_output, redirect_output
 
 END_SIGNALS = frozenset({signal.SIGINT, signal.SIGHUP, signal.SIGTERM})
 _PR_SET_PDEATHSIG = 1
+_PR_SET_CHILD_SUBREAPER = 36
 
 
 class ProcessExit(NamedTuple):
@@ -38,45 +38,21 @@ class ProcessExit(NamedTuple):
         return "ended" if self.status is None else f"ended with status {self.status}"
 
 
-class LogStream(io.RawIOBase):
-    """Writes to descriptor 1, the log, or to a fallback when the log cannot be written.
-
-    On a full disk the end of the recording must still be reported, and a failed report must not
-    end the process.
-    """
-
-    def __init__(self, fallback: int) -> None:
-        self._fallback = fallback
-
-    def writable(self) -> bool:
-        """Return True."""
-        return True
-
-    def write(self, data: Any, /) -> int:
-        """Write to the log, else to the fallback; data that neither accepts is lost."""
-        try:
-            return os.write(1, data)
-        except OSError:
-            # The fallback is the terminal; when it is gone as well, no reader is left.
-            with suppress(OSError):
-                os.write(self._fallback, data)
-            return len(data)
-
-
-def fork(log: Path | None, death_signal: signal.Signals, main: Callable[[], int]) -> int:
+def fork(output: Path | int | None, death_signal: signal.Signals, main: Callable[[], int]) -> int:
     """Run ``main`` in a child that gets ``death_signal`` when this process dies; return its pid.
 
-    The child's output goes to ``log``; with None it goes where this process's output goes.
+    The child's output goes to ``output``, a log file or an open descriptor; with None it goes where
+    this process's output goes. Its input is /dev/null, and this process's with a descriptor. What
+    the child forks in turn ends with the child.
     """
     parent = os.getpid()
-    sys.stdout.flush()
-    sys.stderr.flush()
+    flush_output()
     # A signal that arrives before the child has its own handlers would run the parent's.
     previous = signal.pthread_sigmask(signal.SIG_BLOCK, END_SIGNALS)
     try:
         pid = os.fork()
         if pid == 0:
-            _run_child(parent, log, death_signal, main)
+            _run_child(parent, output, death_signal, main)
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, previous)
     return pid
@@ -89,7 +65,7 @@ def reap(pid: int) -> ProcessExit | None:
 
 
 def _run_child(
-    parent: int, log: Path | None, death_signal: signal.Signals, main: Callable[[], int]
+    parent: int, output: Path | int | None, death_signal: signal.Signals, main: Callable[[], int]
 ) -> None:
     status = 1
     try:
@@ -98,42 +74,76 @@ def _run_child(
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, END_SIGNALS)
-        _request_death_signal(parent, death_signal)
-        _redirect_output(log)
+        request_death_signal(parent, death_signal)
+        os.register_at_fork(
+            before=_remember_own_pid,
+            after_in_child=lambda: request_death_signal(_own_pid[0], signal.SIGKILL),
+        )
+        redirect_output(output)
         status = main()
     except SystemExit as leaving:
         status = leaving.code if isinstance(leaving.code, int) else 1
     except BaseException:  # noqa: BLE001, RUF100 - a child must never return into its parent's code
-        traceback.print_exc()
+        # The descriptors may be closed by now.
+        with suppress(Exception):
+            traceback.print_exc()
     finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
+        finish_output()
         os._exit(status)
 
 
-def _request_death_signal(parent: int, death_signal: signal.Signals) -> None:
+_own_pid = [0]
+"""The process that forks, as its child sees it."""
+
+
+def _remember_own_pid() -> None:
+    _own_pid[0] = os.getpid()
+
+
+def request_death_signal(parent: int, death_signal: signal.Signals) -> None:
     """Request a signal at the parent's death; exit at once if the parent has already died."""
-    libc = ctypes.CDLL(None, use_errno=True)
-    if libc.prctl(_PR_SET_PDEATHSIG, int(death_signal), 0, 0, 0) != 0:
-        raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG)")
+    _prctl(_PR_SET_PDEATHSIG, int(death_signal), "PR_SET_PDEATHSIG")
     if os.getppid() != parent:
         os._exit(1)
 
 
-def _redirect_output(log: Path | None) -> None:
-    """Read from /dev/null and write to the log, whatever the parent's streams are."""
-    _replace(0, os.open(os.devnull, os.O_RDONLY))
-    if log is None:
-        sys.stdout = os.fdopen(1, "w", buffering=1, closefd=False)
-        sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
-        return
-    fallback = os.dup(2)
-    _replace(1, os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644))
-    os.dup2(1, 2)
-    buffered = io.BufferedWriter(LogStream(fallback))
-    sys.stdout = sys.stderr = io.TextIOWrapper(buffered, encoding="utf-8", line_buffering=True)
+def adopt_orphans(adopt: bool = True) -> None:
+    """Let this process become the parent of descendants whose own parent ends, or no longer."""
+    _prctl(_PR_SET_CHILD_SUBREAPER, int(adopt), "PR_SET_CHILD_SUBREAPER")
 
 
-def _replace(descriptor: int, replacement: int) -> None:
-    os.dup2(replacement, descriptor)
-    os.close(replacement)
+def children() -> set[int]:
+    """Return the pids of this process's children, adopted ones and zombies included."""
+    own = os.getpid()
+    found = set()
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdecimal() and _parent_of(int(entry.name)) == own:
+            found.add(int(entry.name))
+    return found
+
+
+def end_orphans(known: Collection[int]) -> int:
+    """Kill and reap every child that is not ``known``, and what it started; return how many."""
+    ended = 0
+    while orphans := children().difference(known):
+        for pid in orphans:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+            with suppress(ChildProcessError):
+                os.waitpid(pid, 0)
+        ended += len(orphans)
+    return ended
+
+
+def _parent_of(pid: int) -> int | None:
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return None
+    return int(stat.rpartition(")")[2].split()[1])
+
+
+def _prctl(option: int, value: int, name: str) -> None:
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.prctl(option, value, 0, 0, 0) != 0:
+        raise OSError(ctypes.get_errno(), f"prctl({name})")

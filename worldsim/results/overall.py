@@ -23,12 +23,13 @@ class Result(NamedTuple):
 
 
 class FailedRun(NamedTuple):
-    """One run that its controller's error ended; it has no summary."""
+    """One run that an error ended, a controller's as a rule; it has no summary."""
 
     folder: Path
     scenario: str
     seed: int
     error: str
+    details: str = ""  # the traceback, where there is one
 
     @property
     def outcome(self) -> Outcome:

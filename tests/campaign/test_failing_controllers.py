@@ -1,0 +1,138 @@
+"""A controller that fails fails its own run, named, whatever it does to the run's process."""
+
+import json
+import re
+import signal
+from pathlib import Path
+
+import pytest
+
+from tests.commands.conftest import Command, qswarm, small  # noqa: F401 - fixtures
+from tests.processes.harness import QSWARM, Started, eventually
+from worldsim.campaign import flight, printed, watched_flight
+
+MODULE = "tests.campaign.failing_controllers"
+FAILURES = {
+    "Exit0": "SystemExit: 0",
+    "Interrupts": "KeyboardInterrupt",
+    "ExitsGenerator": "GeneratorExit: x",
+    "OwnBaseError": "StrangeError: odd",
+    "OsExit0": "its process ended with status 0",
+    "KillsItself": "its process was killed by signal 9",
+    "Aborts": "its process was killed by signal 6",
+    "Recurses": "RecursionError: maximum recursion depth exceeded",
+    "EatsMemory": "MemoryError",
+    "ClosesFiles": "it closed the files of its process",
+    "NoText": "NoTextError: its text cannot be shown: RuntimeError in its __str__",
+    "Blocks": "did not return within 0.4 s",
+    "Spins": "did not return within 0.4 s",
+}
+WHEN_MADE = {
+    "Exit0WhenMade": "failed in its constructor: SystemExit: 0",
+    "OsExit0WhenMade": "failed at 0 s: its process ended with status 0",
+}
+
+
+HANGS = ("Blocks", "Spins")
+
+
+@pytest.fixture(autouse=True)
+def little_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(flight, "MEMORY_B", 1024**3)
+
+
+@pytest.fixture(autouse=True)
+def impatient(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    if any(name in request.node.name for name in HANGS):
+        monkeypatch.setattr(watched_flight, "STEP_WITHIN_S", 0.4)
+
+
+def flown(name: str, *more: str) -> list[str]:
+    controller = f'control.controller="{MODULE}:{name}"'
+    hovering = ["--set", "expect.converge=false", "--duration", "0.6"]
+    return ["sim", "small.toml", "--out", "out", "--set", controller, *hovering, *more]
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("name", FAILURES)
+def test_the_failure_is_the_agents(qswarm: Command, name: str) -> None:  # noqa: F811
+    ended = qswarm(*flown(name, "--no-recording"))
+    assert (ended.status, ended.out) == (1, "")
+    line = ended.err.splitlines()[-1]
+    blamed = rf"qswarm: controller '{MODULE}:{name}' of agent 1 failed at 0\.2\d* s: "
+    assert re.fullmatch(blamed + re.escape(FAILURES[name]), line), ended.err
+    assert not Path("out/summary.json").exists()
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("name", WHEN_MADE)
+def test_a_constructor_that_exits_is_named(qswarm: Command, name: str) -> None:  # noqa: F811
+    ended = qswarm(*flown(name, "--no-recording"))
+    assert ended.status == 1
+    assert ended.err.endswith(f"of agent 1 {WHEN_MADE[name]}\n")
+
+
+@pytest.mark.usefixtures("small")
+def test_no_later_seed_is_dropped(qswarm: Command) -> None:  # noqa: F811
+    ended = qswarm(*flown("OsExit0", "--no-recording", "--seeds", "0:3", "--jobs", "2"))
+    assert ended.status == 1
+    overall = json.loads(Path("out/summary.json").read_text())
+    assert (overall["runs"], overall["outcome"]) == (3, "fail")
+    assert {row["seed"] for row in overall["rows"]} == {0, 1, 2}
+    assert all("ended with status 0" in row["reason"] for row in overall["rows"])
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("name", HANGS)
+def test_the_place_of_a_hang_is_shown(qswarm: Command, name: str) -> None:  # noqa: F811
+    ended = qswarm(*flown(name, "--no-recording"))
+    assert re.search(r'failing_controllers\.py", line \d+ in fail\n', ended.err), ended.err
+
+
+@pytest.mark.usefixtures("small")
+def test_a_controller_that_keeps_all_memory_is_still_named(qswarm: Command) -> None:  # noqa: F811
+    ended = qswarm(*flown("HoardsMemory", "--no-recording"))
+    assert ended.status == 1
+    assert "of agent 1 failed at 0.2" in ended.err.splitlines()[-1]
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("name", ["Forks", "ForksTwice", "ForksACopy", "StartsAThread"])
+def test_what_a_controller_starts_ends_with_the_run(qswarm: Command, name: str) -> None:  # noqa: F811
+    ended = qswarm(*flown(name))
+    assert ended.status == 0, ended.err
+    assert "recording: " not in ended.err
+    lines = Path("out/events.jsonl").read_text().splitlines()
+    assert len(lines) == len(set(lines))
+    for pid in re.findall(r"forked (\d+)", ended.err):
+        assert not Path(f"/proc/{pid}").exists()
+    if name == "ForksACopy":
+        assert ended.err == "agent 1's controller forked at 0.2125 s; the copy ends here\n"
+
+
+@pytest.mark.usefixtures("small")
+def test_what_controllers_print_is_bounded(
+    qswarm: Command,  # noqa: F811
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(printed, "MAX_PRINTED_B", 300_000)
+    ended = qswarm(*flown("Prints", "--no-recording"))
+    assert ended.status == 0
+    *_, last = ended.err.splitlines()
+    assert re.fullmatch(
+        r"out: \d+ B more were printed and dropped; at most 300000 B of a run are shown", last
+    )
+    assert len(ended.err.encode()) < 301_000
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_run_whose_controller_ignores_signals_ends(number: signal.Signals) -> None:
+    arguments = flown("IgnoresSignals", "--no-recording", "--duration", "1000")
+    started = Started([*QSWARM, *arguments], Path("output"), Path.cwd())
+    events = Path("out/events.jsonl")
+    eventually(events.exists, 20.0)
+    started.wait_for_output("simulated")
+    started.process.send_signal(number)
+    assert started.status(within_s=20.0) == 130
+    assert json.loads(Path("out/summary.json").read_text())["outcome"] == "inconclusive"

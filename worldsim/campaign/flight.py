@@ -1,0 +1,134 @@
+"""One run in virtual time, as the child process that flies it sees it.
+
+It writes into the run's folder, and reports its end, or the error that ended it, by its pulse.
+"""
+
+import faulthandler
+import os
+import resource
+import signal
+import sys
+import traceback
+from contextlib import suppress
+from typing import Any
+
+from agent.checked_controller import FaultyControllerError, described
+from netem.wire.shutdown import StopRequest
+from worldsim.campaign.pulse import ClosedFilesError, Guard, Pulse, blame
+from worldsim.engine.virtual import Flight, fly
+from worldsim.fleet.fork import adopt_orphans, end_orphans
+from worldsim.results.run_folder import RunDirectory, RunWriteError
+from worldsim.results.sinks import Sinks, open_sinks
+from worldsim.results.summary import FinishedRun, summarise
+from worldsim.scenario.tables import Scenario
+
+MEMORY_B = 4 * 1024**3
+"""What a run in virtual time may allocate, beside what it shares with others."""
+MAX_TRACEBACK = 16_000
+"""[characters]"""
+FLOWN, FAILED, NOT_WRITTEN = 0, 1, 3
+"""Exit statuses of a flight: a summary is there; an error ended it; no summary can be written."""
+
+
+def fly_in_child(scenario: Scenario, directory: RunDirectory, recording: bool, pulse: Pulse) -> int:
+    """Fly, and write recording, events and summary; return the exit status."""
+    adopt_orphans()
+    _limit_memory()
+    _stop_when_debugged(pulse)
+    faulthandler.register(signal.SIGUSR1, all_threads=False)
+    try:
+        _fly(scenario, directory, recording, pulse)
+    except ClosedFilesError as error:
+        pulse.note_end(str(error))
+        os._exit(FAILED)
+    except RunWriteError as error:
+        pulse.note_end(str(error))
+        return NOT_WRITTEN
+    except BaseException as error:  # noqa: BLE001, RUF100 - whatever it is, the parent is told
+        _lift_memory_limit()
+        _report(error, scenario, pulse)
+        return FAILED
+    pulse.note_end()
+    return FLOWN
+
+
+def finished(flight: Flight, scenario: Scenario) -> FinishedRun:
+    """Return a flight in virtual time for its summary; no tick can be late there."""
+    world = flight.loop.world
+    return FinishedRun(
+        mode="virtual",
+        loop=flight.loop,
+        medium_counters=flight.medium_counters,
+        late_tick_fraction=0.0,
+        real_time_factor=world.time_s / flight.wall_s,
+        cut_off_by="interrupted" if world.slot < scenario.slots else None,
+    )
+
+
+def _fly(scenario: Scenario, directory: RunDirectory, recording: bool, pulse: Pulse) -> None:
+    stop = StopRequest()
+    sinks = open_sinks(directory, scenario, directory.path.name, "virtual", recording)
+    try:
+        flight = fly(
+            scenario,
+            sinks,
+            should_stop=lambda: stop.requested or pulse.stop_requested,
+            watch=Guard(pulse, scenario),
+        )
+    except ClosedFilesError:
+        raise
+    except BaseException:
+        _close(sinks)
+        raise
+    _close(sinks)
+    directory.write_summary(summarise(scenario, finished(flight, scenario)))
+
+
+def _close(sinks: Sinks) -> None:
+    """Finish the recording; first end what controllers started, which would hold its file open."""
+    end_orphans(())
+    sinks.close()
+
+
+def _report(error: BaseException, scenario: Scenario, pulse: Pulse) -> None:
+    """Leave an error's line and its traceback in the pulse."""
+    if isinstance(error, FaultyControllerError):
+        pulse.note_end(str(error), _traceback_of(error.__cause__ or error))
+        return
+    place = pulse.place
+    where = (
+        blame(scenario, place.agent, place.slot)
+        if place.agent is not None
+        else f"the run failed at {place.slot / scenario.slot_hz:g} s"
+    )
+    pulse.note_end(f"{where}: {described(error)}", _traceback_of(error))
+
+
+def _traceback_of(error: BaseException) -> str:
+    """Return a traceback; its end where it is very long."""
+    return "".join(traceback.format_exception(error))[-MAX_TRACEBACK:]
+
+
+def _limit_memory() -> None:
+    """Let an allocation beyond MEMORY_B raise MemoryError, where the limit is not lower."""
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    if hard == resource.RLIM_INFINITY or hard > MEMORY_B:
+        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_B, hard))
+
+
+def _lift_memory_limit() -> None:
+    """Give back some memory, so that an error can be reported."""
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    with suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))
+
+
+def _stop_when_debugged(pulse: Pulse) -> None:
+    """Tell the watching process when a breakpoint() is hit."""
+    hook = sys.breakpointhook
+
+    def breakpoint_hit(*arguments: Any, **keywords: Any) -> Any:
+        pulse.note_breakpoint()
+        return hook(*arguments, **keywords)
+
+    sys.breakpointhook = breakpoint_hit
