@@ -1,6 +1,7 @@
 """Command line of one agent: ``python -m agent --id 0 --run mine --connect tcp/127.0.0.1:7447``."""
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
@@ -43,4 +44,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    status = main()
+    sys.stdout.flush()
+    # A thread that a controller has started must not keep the process.
+    os._exit(status)

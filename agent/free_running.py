@@ -9,6 +9,7 @@ from collections import deque
 from agent.codec import RejectedError, decode_observation
 from agent.config import AgentSetup
 from agent.messages import Observation
+from agent.step_page import StepGuard
 from agent.stepping import AgentStepper
 from netem.wire.bus import Bus
 from netem.wire.frame import BATCH_RING, Delivery, WireError, pack, unpack_delivery
@@ -18,9 +19,9 @@ from netem.wire.latency import LatencyHistogram
 class FreeRunningAgent:
     """An agent on wall-clock pace; about once a second it reports how late frames were used."""
 
-    def __init__(self, bus: Bus, setup: AgentSetup) -> None:
+    def __init__(self, bus: Bus, setup: AgentSetup, guard: StepGuard) -> None:
         command, radio = bus.publisher("command", setup.id), bus.publisher("tx", setup.id)
-        self._stepper = AgentStepper(setup, command, radio)
+        self._stepper = AgentStepper(setup, command, radio, guard)
         self._batches = bus.subscriber("rx", setup.id, BATCH_RING)
         self._early: deque[Delivery] = deque(maxlen=BATCH_RING)
         self._incarnation = setup.incarnation

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from agent.codec import RejectedError, decode_observation
 from agent.config import AgentSetup
+from agent.step_page import StepGuard
 from agent.stepping import AgentStepper
 from netem.wire.barrier import LOCKSTEP_RING, LockstepError, await_message, check_slot
 from netem.wire.bus import Bus, Subscriber
@@ -16,10 +17,12 @@ from netem.wire.frame import Batch, Inbox, WireError, unpack_batch, unpack_inbox
 class LockstepAgent:
     """An agent in lockstep. run_is_over: asked while it waits for an inbox."""
 
-    def __init__(self, bus: Bus, setup: AgentSetup, run_is_over: Callable[[], bool]) -> None:
+    def __init__(
+        self, bus: Bus, setup: AgentSetup, guard: StepGuard, run_is_over: Callable[[], bool]
+    ) -> None:
         command = bus.publisher("command", setup.id, lockstep=True)
         radio = bus.publisher("tx", setup.id, lockstep=True)
-        self._stepper = AgentStepper(setup, command, radio)
+        self._stepper = AgentStepper(setup, command, radio, guard)
         self._inbox = bus.subscriber("rx", setup.id, LOCKSTEP_RING)
         self._run_is_over = run_is_over
 

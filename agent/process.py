@@ -14,6 +14,7 @@ from agent.config import AgentSetup
 from agent.controller import ControllerError
 from agent.free_running import FreeRunningAgent
 from agent.lockstep import LockstepAgent
+from agent.step_page import StepGuard
 from netem.wire.access import AccessError, login_of
 from netem.wire.barrier import LockstepError, RunOverError
 from netem.wire.bus import Bus, RefusedError, Subscriber
@@ -34,15 +35,23 @@ class WorldGoneError(RuntimeError):
 
 
 def run(
-    agent: int, run_name: str, connect: str, patient: bool = False, users: Path | None = None
+    agent: int,
+    run_name: str,
+    connect: str,
+    patient: bool = False,
+    users: Path | None = None,
+    row: "memoryview[int] | None" = None,
 ) -> int:
-    """Fly one agent; print an error in one line to stderr. Returns the exit status."""
+    """Fly one agent; print an error in one line to stderr. Returns the exit status.
+
+    row: where the agent notes its steps, of a StepPage.
+    """
     try:
         keys = Keys(run_name)
     except ValueError as error:
         return _failed(agent, error, 2)
     try:
-        return fly(agent, keys, connect, patient, users)
+        return fly(agent, keys, connect, patient, users, row)
     except (WorldGoneError, LockstepError) as error:
         return _failed(agent, error, 1)
     except (AccessError, SessionError, RefusedError, ControllerError) as error:
@@ -55,12 +64,18 @@ def _failed(agent: int, error: Exception, status: int) -> int:
 
 
 def fly(
-    agent: int, keys: Keys, connect: str, patient: bool = False, users: Path | None = None
+    agent: int,
+    keys: Keys,
+    connect: str,
+    patient: bool = False,
+    users: Path | None = None,
+    row: "memoryview[int] | None" = None,
 ) -> int:
     """Fly one agent of a run until the run is over; return 0.
 
     patient: whether the session survives a long pause of this process. users: the file of
-    passwords, if the router wants one. Raises SessionError without a router, AccessError without a
+    passwords, if the router wants one. row: of a StepPage, for this agent's
+    steps. Raises SessionError without a router, AccessError without a
     password, RefusedError if the world has no such agent, ControllerError if its controller cannot
     be loaded, WorldGoneError if the world is not there, LockstepError for a message out of turn.
     """
@@ -70,7 +85,8 @@ def fly(
         bus = Bus(session, keys)
         setup = _setup(bus, agent, keys.run, stop)
         if setup is not None:
-            _run_shell(bus, setup, keys.run, stop)
+            guard = StepGuard(row, 1.0 / setup.tick_hz)
+            _run_shell(bus, setup, guard, RunEnd(bus.subscriber("over"), stop), keys.run)
     return 0
 
 
@@ -102,12 +118,13 @@ def _checked_setup(answer: bytes) -> AgentSetup:
         raise WorldGoneError(f"the world sent a setup that cannot be decoded: {error}") from error
 
 
-def _run_shell(bus: Bus, setup: AgentSetup, run: str, stop: StopRequest) -> None:
-    observations, ending = (
-        bus.subscriber("observation", setup.id),
-        RunEnd(bus.subscriber("over"), stop),
+def _run_shell(bus: Bus, setup: AgentSetup, guard: StepGuard, ending: RunEnd, run: str) -> None:
+    observations = bus.subscriber("observation", setup.id)
+    shell = (
+        LockstepAgent(bus, setup, guard, ending)
+        if setup.lockstep
+        else FreeRunningAgent(bus, setup, guard)
     )
-    shell = LockstepAgent(bus, setup, ending) if setup.lockstep else FreeRunningAgent(bus, setup)
     _wait_for_listener(bus, ending)
     bus.declare_alive(f"agent-{setup.id}")
     print(f"agent-{setup.id} flies in run {run!r}", flush=True)

@@ -4,6 +4,7 @@ from agent.codec import encode
 from agent.config import AgentSetup
 from agent.core import Agent
 from agent.messages import Observation
+from agent.step_page import StepGuard
 from netem.wire.bus import Put
 from netem.wire.frame import Batch, Outgoing, Transmission, pack
 
@@ -11,8 +12,11 @@ from netem.wire.frame import Batch, Outgoing, Transmission, pack
 class AgentStepper:
     """Runs an agent's core and publishes its commands and transmissions."""
 
-    def __init__(self, setup: AgentSetup, command: Put, radio: Put) -> None:
+    def __init__(self, setup: AgentSetup, command: Put, radio: Put, guard: StepGuard) -> None:
+        self._guard = guard
+        guard.enter()
         self.core = Agent(setup)
+        guard.leave()
         self._incarnation = setup.incarnation
         self._put_command = command
         self._put_transmission = radio
@@ -24,7 +28,9 @@ class AgentStepper:
 
     def step(self, observation: Observation) -> None:
         """Step on an observation; publish one command and one transmission."""
+        self._guard.enter()
         outbox = self.core.step(observation)
+        self._guard.leave()
         self._put_command(encode(outbox.command))
         frames = tuple(
             Outgoing(channel=channel, payload=payload) for channel, payload in outbox.frames

@@ -21,6 +21,7 @@ from worldsim.fleet.ipc import (
     LauncherToWorld,
     LauncherToZygote,
     MessageError,
+    Notice,
     ProcessesMissing,
     Progress,
     RunFailed,
@@ -166,6 +167,8 @@ class FleetMonitor:
                 self._missing = names
             case Stalled(waiting_for=waiting_for):
                 self._report_stall(waiting_for)
+            case Notice(text=text):
+                self._terminal.print(text)
             case RunOver():
                 self.run_over = True
             case _:

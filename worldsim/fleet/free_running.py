@@ -30,6 +30,7 @@ from worldsim.engine.operations import (
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS
 from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
 from worldsim.fleet.control import Control, ControlServer
+from worldsim.fleet.culprits import Culprits
 from worldsim.fleet.delivery_latency import DeliveryLatency, LatencyCollector
 from worldsim.fleet.ipc import AgentProcess
 from worldsim.fleet.launcher_link import LauncherLink
@@ -68,7 +69,8 @@ class FreeRunningFleet:
         self.medium_counters: MediumCounters | None = None
         self.lateness = LatenessCounter(len(rows))
         self.real_time_factor: float | None = None
-        self.failure: str | None = None
+        self._culprits = Culprits(launcher.steps, launcher.report_notice, speed)
+        self._late_agents: list[int] = []
         self._scenario = scenario
         self._launcher = launcher
         self._startup = startup
@@ -93,6 +95,17 @@ class FreeRunningFleet:
     def late_fraction(self) -> float | None:
         """Share of late ticks."""
         return self.lateness.late_fraction
+
+    @property
+    def failure(self) -> str | None:
+        """Why the run has failed whatever it showed: an agent ended or hangs. None: it has not."""
+        return self._culprits.failure
+
+    @property
+    def late_because(self) -> str | None:
+        """Who but the host makes ticks late; None: nobody else is known."""
+        ticks = self.loop.world.time_s * self._scenario.fleet.tick_hz
+        return self._culprits.stop or self._culprits.slow(ticks)
 
     @property
     def delivery(self) -> DeliveryLatency | None:
@@ -152,6 +165,8 @@ class FreeRunningFleet:
         self._control_server.answer_waiting(self._carry_out)
         self._send(self.loop.open())
         self._handle_exits()
+        self._culprits.look(self._late_agents, self.loop.world.time_s)
+        self._late_agents.clear()
         while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not should_stop():
             self._launcher.wait(min(left_s, POLL_S))
             self._handle_exits()
@@ -191,7 +206,8 @@ class FreeRunningFleet:
         self._truth(pack(truth))
         for agent, observation in opened.observations:
             self._observers[agent](encode(observation))
-            self.lateness.observe(agent, opened.slot, self.loop.world.latest[agent])
+            if self.lateness.observe(agent, opened.slot, self.loop.world.latest[agent]):
+                self._late_agents.append(agent)
 
     def _accept_command(self, agent: int, data: bytes) -> None:
         """Take a command; one of an agent that is not running any more has no effect."""
@@ -222,9 +238,10 @@ class FreeRunningFleet:
                 self._rejected["arrivals"] += 1
 
     def _handle_exits(self) -> None:
-        for agent, incarnation, (number, status) in self._launcher.agent_exits():
+        for agent, incarnation, process_exit in self._launcher.agent_exits():
             if self.loop.members.has_process(agent, incarnation):
-                self.loop.effects.record_exit(agent, number, status)
+                self.loop.effects.record_exit(agent, *process_exit)
+                self._culprits.note_exit(agent, process_exit, self.loop.world.time_s)
 
     def _packets(self) -> Packets:
         return self.medium_counters.packets() if self.medium_counters is not None else {}

@@ -115,6 +115,12 @@ class Stalled(Message, frozen=True):
     waiting_for: str
 
 
+class Notice(Message, frozen=True):
+    """Something that a person should know at once."""
+
+    text: str
+
+
 class RunOver(Message, frozen=True):
     """The run has ended; every exit from now on is expected."""
 
@@ -122,7 +128,7 @@ class RunOver(Message, frozen=True):
 ToZygote = ActionRequest | EndRequest
 FromZygote = AgentStarted | AgentExited | ActionDone
 ToWorld = AgentExited | ActionDone | RunFailed
-FromWorld = ActionRequest | ProcessesMissing | Progress | Stalled | RunOver
+FromWorld = ActionRequest | ProcessesMissing | Progress | Stalled | Notice | RunOver
 
 Sent = TypeVar("Sent", bound=Message)
 Received = TypeVar("Received", bound=Message)

@@ -17,7 +17,9 @@ from netem.wire.access import OPERATOR, AccessControl, write_users
 from netem.wire.keys import agent_name, medium_name
 from netem.wire.shutdown import ignore_signals, interrupt_on_signals
 from worldsim.fleet import process as world_process
+from worldsim.fleet.culprits import SharedSteps
 from worldsim.fleet.fleet_monitor import FleetMonitor, ProcessSockets, StartError
+from worldsim.fleet.fork import adopt_orphans, end_orphans
 from worldsim.fleet.ipc import (
     ActionRequest,
     AgentProcess,
@@ -51,6 +53,7 @@ def run(scenario: Scenario, directory: RunDirectory, options: RunOptions) -> int
     No process is left behind, also after Ctrl-C, SIGTERM and SIGHUP.
     """
     interrupt_on_signals()
+    adopt_orphans()
     # One receiving thread is enough for a client, and saves a tenth of its CPU time.
     os.environ.setdefault("ZENOH_RUNTIME", "(rx: (worker_threads: 1))")
     launcher = Launcher(scenario, directory, options._replace(users=directory.users))
@@ -82,6 +85,7 @@ class Launcher:
         self._options = options
         self._endpoint = f"tcp/127.0.0.1:{_free_port()}"
         self._access = AccessControl(directory.users, options.run, scenario.rows)
+        self._steps = SharedSteps.of(scenario.rows, options.shards)
         self._table = ProcessTable(directory.path, options.run, self._endpoint)
         self._zygote, self._zygote_end = zygote_sockets()
         self._world, self._world_end = world_sockets()
@@ -139,6 +143,7 @@ class Launcher:
         self._supervisor.end(["world", *self._mediums()], END_WITHIN_S, signal.SIGTERM)
         self._supervisor.end(["zygote"], END_WITHIN_S, None)
         self._supervisor.end(list(self._supervisor.pids), END_WITHIN_S, signal.SIGKILL)
+        end_orphans(())
         self._directory.users.unlink(missing_ok=True)
 
     def _end_world(self) -> None:
@@ -157,6 +162,8 @@ class Launcher:
             name: start(name, signal.SIGKILL, partial(self._run_netem, shard))
             for shard, name in enumerate(self._mediums())
         }
+        for shard, pid in enumerate(mediums.values()):
+            self._steps.note_medium(shard, pid)
         # SIGTERM lets the world finish the recording even when the launcher has died.
         world = start("world", signal.SIGTERM, self._run_world)
         self._world_end.close()
@@ -184,6 +191,7 @@ class Launcher:
             self._directory.logs,
             long_lease=self._options.lockstep,
             users=self._directory.users,
+            steps=self._steps.page,
         )
         return Zygote(self._zygote_end, config).serve()
 
@@ -200,7 +208,7 @@ class Launcher:
             self._scenario,
             lambda: self._directory,
             self._options,
-            lambda _: LaunchedLink(self._world_end),
+            lambda _: LaunchedLink(self._world_end, self._steps),
         )
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from math import inf
 from typing import NamedTuple, Protocol, assert_never
 
+from worldsim.fleet.culprits import SharedSteps
 from worldsim.fleet.fork import ProcessExit
 from worldsim.fleet.ipc import (
     ActionDone,
@@ -17,6 +18,7 @@ from worldsim.fleet.ipc import (
     AgentExited,
     AgentProcess,
     MessageError,
+    Notice,
     ProcessAction,
     ProcessesMissing,
     Progress,
@@ -51,6 +53,9 @@ class LauncherLink(Protocol):
     failure: str | None
     """Why the run cannot go on (netem died, for instance), or None."""
 
+    steps: SharedSteps | None
+    """Where the agents note their steps, or None."""
+
     @property
     def stop_reason(self) -> str | None:
         """Why the run must end now, or None."""
@@ -84,6 +89,9 @@ class LauncherLink(Protocol):
     def report_stall(self, waiting_for: str) -> None:
         """Report that simulated time stands still, and what it waits for."""
 
+    def report_notice(self, text: str) -> None:
+        """Report something that a person should know at once."""
+
     def report_run_over(self) -> None:
         """Report that the run is over, before the other processes learn of it and exit."""
 
@@ -93,7 +101,8 @@ class LaunchedLink:
 
     controls_processes = True
 
-    def __init__(self, launcher: WorldToLauncher) -> None:
+    def __init__(self, launcher: WorldToLauncher, steps: SharedSteps | None = None) -> None:
+        self.steps = steps
         self._launcher = launcher
         self._exits: list[AgentExit] = []
         self._done: list[ActionDone] = []
@@ -147,6 +156,10 @@ class LaunchedLink:
         """Send what the run waits for, unless the launcher has fallen behind in reading."""
         self._launcher.offer(Stalled(waiting_for))
 
+    def report_notice(self, text: str) -> None:
+        """Send it, unless the launcher has fallen behind in reading."""
+        self._launcher.offer(Notice(text))
+
     def report_run_over(self) -> None:
         """Tell the launcher that exits are expected from now on."""
         self._launcher.send(RunOver())
@@ -177,6 +190,7 @@ class ManualLink:
     """
 
     controls_processes = False
+    steps: SharedSteps | None = None
 
     def __init__(self, vanished: Callable[[], list[str]]) -> None:
         self.stop_reason: str | None = None
@@ -234,6 +248,10 @@ class ManualLink:
     def report_stall(self, waiting_for: str) -> None:
         """Print what the run waits for."""
         print(f"stalled: waiting for {waiting_for}", flush=True)
+
+    def report_notice(self, text: str) -> None:
+        """Print it."""
+        print(text, flush=True)
 
     def report_run_over(self) -> None:
         """Print that the run is over."""

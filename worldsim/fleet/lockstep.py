@@ -45,6 +45,7 @@ from worldsim.engine.operations import (
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
 from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
 from worldsim.fleet.control import Control, ControlServer
+from worldsim.fleet.culprits import Culprits
 from worldsim.fleet.ipc import AgentProcess, ProcessAction, names_of
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.progress import ProgressReporter, StallReporter
@@ -60,6 +61,7 @@ class LockstepFleet:
     """A fleet whose processes wait for each other in every slot."""
 
     late_fraction: float | None = None
+    late_because: None = None
     delivery: None = None
     rejected: Mapping[str, int] = {}
     """Always empty: a message that the world rejects ends the run."""
@@ -80,7 +82,9 @@ class LockstepFleet:
         self.medium_counters: MediumCounters | None = None
         self.real_time_factor: float | None = None
         self.failure: str | None = None
+        self._culprits = Culprits(launcher.steps, launcher.report_notice)
         self.begun = self._landed = False
+        self._stepping: list[int] = []
         self._slots = scenario.slots
         self._launcher = launcher
         self._should_stop: Callable[[], bool] = lambda: False
@@ -112,7 +116,9 @@ class LockstepFleet:
             self.failure = self._launcher_failure()
             return False
         except LockstepError as error:
-            self.failure = f"{error}, {self.loop.world.time_s:.2f} s into the run"
+            blamed = self._culprits.stop or self._culprits.failure
+            at = f"{self.loop.world.time_s:.2f} s into the run"
+            self.failure = f"{error}, {at}{f' ({blamed})' if blamed else ''}"
             return False
         self.failure = self._launcher_failure()
         time_s = self.loop.world.time_s
@@ -135,6 +141,7 @@ class LockstepFleet:
         self._control_server.answer_waiting(self._carry_out)
         self._check_exits()
         opened = self.loop.open()
+        self._stepping = [agent for agent, _ in opened.observations]
         self._send(opened)
         for agent, _ in opened.observations:
             self._await_command(agent, opened.slot)
@@ -190,6 +197,7 @@ class LockstepFleet:
 
         def stopped() -> bool:
             stall.add_wait(POLL_S)
+            self._culprits.look(self._stepping, self.loop.world.time_s)
             self._check_exits()
             return self._stopped()
 

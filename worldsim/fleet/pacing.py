@@ -46,13 +46,19 @@ class LatenessCounter:
         self._ticks = 0
         self._late = 0
 
-    def observe(self, agent: int, slot: int, latest: Command | None) -> None:
-        """Note that an agent is sent an observation; ``latest`` is its newest command so far."""
+    def observe(self, agent: int, slot: int, latest: Command | None) -> bool:
+        """Note that an agent is sent an observation; return whether its last tick was late.
+
+        latest: its newest command so far.
+        """
         observed_slot = self._observed_slot[agent]
         self._observed_slot[agent] = slot
-        if observed_slot is not None:
-            self._ticks += 1
-            self._late += latest is None or latest.slot < observed_slot
+        if observed_slot is None:
+            return False
+        late = latest is None or latest.slot < observed_slot
+        self._ticks += 1
+        self._late += late
+        return late
 
     def drop_pending(self, agents: Iterable[int]) -> None:
         """Expect no more commands for earlier observations: the agents stopped, or start anew."""

@@ -135,6 +135,7 @@ def _finished(
         loop=fleet.loop,
         medium_counters=fleet.medium_counters,
         late_tick_fraction=fleet.late_fraction,
+        late_because=fleet.late_because,
         real_time_factor=fleet.real_time_factor,
         cut_off_by=cut_off_by,
         failure=fleet.failure,

@@ -7,16 +7,19 @@ relies on these reports alone.
 
 import gc
 import os
+import resource
 import selectors
 import signal
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, assert_never
 
 from agent import process as agent_process
-from worldsim.fleet.fork import fork, reap
+from agent.step_page import CLOSED_FILES, StepPage
+from worldsim.fleet.fork import ProcessExit, adopt_orphans, end_orphans, fork, reap
 from worldsim.fleet.ipc import (
     ActionDone,
     ActionRequest,
@@ -30,6 +33,11 @@ from worldsim.fleet.ipc import (
 )
 
 END_WITHIN_S = 2.0
+AGENT_MEMORY_B = 2 * 1024**3
+"""What an agent may allocate, beside what it shares with others."""
+AGENT_FILE_B = 64 * 1024**2
+"""The longest file that an agent may write; its log stays far below."""
+CLOSED_FILES_EXIT = ProcessExit(None, CLOSED_FILES)
 
 
 class AgentProcessConfig(NamedTuple):
@@ -40,6 +48,7 @@ class AgentProcessConfig(NamedTuple):
     logs: Path  # folder of the log files
     long_lease: bool = False  # a silent agent keeps its session for long (lockstep)
     users: Path | None = None  # file of passwords, where the router requires one
+    steps: StepPage | None = None  # where agents note their steps
 
 
 class Zygote:
@@ -62,12 +71,14 @@ class Zygote:
 
         Returns the exit status: 0, or 1 after a message that does not decode.
         """
+        adopt_orphans()
         gc.freeze()  # keeps the warm objects' memory pages shared with the children
         self._selector.register(self._launcher, selectors.EVENT_READ, self._receive)
         while not self._ending:
             self._poll(None)
         self._selector.unregister(self._launcher)
         self._end_agents()
+        end_orphans(())
         return self._status
 
     def _end_agents(self) -> None:
@@ -132,8 +143,9 @@ class Zygote:
                     os.waitid(os.P_PID, pid, awaited | os.WEXITED | os.WNOWAIT)
 
     def _start(self, process: AgentProcess, after_s: float) -> None:
-        log = self._config.logs / f"agent-{process.agent}.log"
-        pid = fork(log, signal.SIGKILL, lambda: self._run_agent(process.agent, after_s))
+        pid = fork(
+            self._log(process), signal.SIGKILL, lambda: self._run_agent(process.agent, after_s)
+        )
         exit_descriptor = os.pidfd_open(pid)
         self._agents[pid] = process
         self._selector.register(
@@ -144,9 +156,11 @@ class Zygote:
     def _run_agent(self, agent: int, after_s: float) -> int:
         self._launcher.close()
         time.sleep(after_s)
+        _limit_resources()
         config = self._config
+        row = config.steps.row(agent) if config.steps is not None else None
         return agent_process.run(
-            agent, config.run, config.endpoint, config.long_lease, config.users
+            agent, config.run, config.endpoint, config.long_lease, config.users, row
         )
 
     def _reap(self, exit_descriptor: int, pid: int) -> None:
@@ -155,8 +169,28 @@ class Zygote:
             return
         self._selector.unregister(exit_descriptor)
         os.close(exit_descriptor)
-        self._launcher.send(AgentExited(self._agents.pop(pid), pid, process_exit))
+        process = self._agents.pop(pid)
+        if process_exit == CLOSED_FILES_EXIT:
+            self._log_closed_files(process)
+        self._launcher.send(AgentExited(process, pid, process_exit))
+
+    def _log_closed_files(self, process: AgentProcess) -> None:
+        """Write what an agent without descriptors cannot write."""
+        with suppress(OSError), self._log(process).open("a", encoding="utf-8") as log:
+            log.write(f"{process}: its controller closed the files of its process\n")
+
+    def _log(self, process: AgentProcess) -> Path:
+        return self._config.logs / f"{process}.log"
 
     def _signal_all(self, number: signal.Signals) -> None:
         for pid in self._agents:
             os.kill(pid, number)
+
+
+def _limit_resources() -> None:
+    """Bound what one agent's process may allocate and write, where the limits are not lower."""
+    limits = {resource.RLIMIT_DATA: AGENT_MEMORY_B, resource.RLIMIT_FSIZE: AGENT_FILE_B}
+    for kind, most_b in limits.items():
+        _, hard = resource.getrlimit(kind)
+        if hard == resource.RLIM_INFINITY or hard > most_b:
+            resource.setrlimit(kind, (most_b, hard))

@@ -1,0 +1,157 @@
+"""Who is at fault: agents that end or hang by themselves, processes that are stopped, or the host.
+
+Agents note their steps in a shared page; /proc says what a process does. Where processes are
+started by hand there is no page, and nobody is named.
+"""
+
+import os
+import signal
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from agent.step_page import StepPage, StepTimes
+from netem.wire.keys import agent_name, medium_name
+from worldsim.fleet.fork import ProcessExit
+
+HANG_S = 1.0
+"""A step that lasts longer than this wall time hangs; the host's delays are shorter."""
+BUSY_FRACTION = 0.5
+"""From this share of a core on, a process that hangs computes; below it is blocked."""
+SLOW_FRACTION = 0.1
+"""From this share of slow steps on, a controller is too slow."""
+CRASH_SIGNALS = frozenset(
+    {signal.SIGABRT, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGTRAP}
+)
+"""Signals that a process gets for its own errors."""
+MAX_NAMED = 5
+LARGE_B = 1024**3
+
+_PAGE_B = os.sysconf("SC_PAGE_SIZE")
+_CLOCK_HZ = os.sysconf("SC_CLK_TCK")
+
+
+class SharedSteps(NamedTuple):
+    """The page of a launched fleet: a row for each agent, then one for each medium."""
+
+    page: StepPage
+    agents: int
+    mediums: int
+
+    @staticmethod
+    def of(agents: int, mediums: int) -> "SharedSteps":
+        """Return a new page. Make it before any process is forked."""
+        return SharedSteps(StepPage(agents + mediums), agents, mediums)
+
+    def note_medium(self, shard: int, pid: int) -> None:
+        """Note the process of a medium."""
+        self.page.note_pid(self.agents + shard, pid)
+
+    def medium_pid(self, shard: int) -> int:
+        """Return the process of a medium; 0 before it is noted."""
+        return self.page.read(self.agents + shard).pid
+
+
+class _Process(NamedTuple):
+    """What /proc says of a process."""
+
+    stopped: bool
+    cpu_s: float
+    resident_b: int
+
+
+class Culprits:
+    """Names who is at fault; ``report`` gets a line the first time.
+
+    speed: simulated seconds in a second of wall time. steps: None where nobody can be named.
+    """
+
+    def __init__(
+        self, steps: SharedSteps | None, report: Callable[[str], None], speed: float = 1.0
+    ) -> None:
+        self._steps = steps
+        self._report = report
+        self._speed = speed
+        self._hangs: dict[int, str] = {}
+        self._ends: list[str] = []
+        self._stops: dict[str, str] = {}
+
+    def look(self, late: Sequence[int], time_s: float) -> None:
+        """Look for the reason why agents have not answered at ``time_s`` [s; simulated time]."""
+        if self._steps is None or not late:
+            return
+        for shard in range(self._steps.mediums):
+            self._note_stop(medium_name(shard), _process(self._steps.medium_pid(shard)), time_s)
+        for agent in late:
+            times = self._steps.page.read(agent)
+            process = _process(times.pid)
+            self._note_stop(agent_name(agent), process, time_s)
+            if process is not None and not process.stopped:
+                self._note_hang(agent, times, process, time_s)
+
+    def note_exit(self, agent: int, process_exit: ProcessExit, time_s: float) -> None:
+        """Note that an agent's process ended unplanned at ``time_s`` [s; simulated time].
+
+        It is the agent's own failure unless another process may have killed it.
+        """
+        if process_exit.status is not None or process_exit.signal in CRASH_SIGNALS:
+            self._ends.append(f"{agent_name(agent)} {process_exit} at {time_s:.1f} s")
+
+    @property
+    def failure(self) -> str | None:
+        """Which agents have ended by themselves, or have not returned; None: none."""
+        return "; ".join([*self._ends, *self._hangs.values()][:MAX_NAMED]) or None
+
+    @property
+    def stop(self) -> str | None:
+        """Which processes were stopped from outside, or None."""
+        return "; ".join(self._stops.values()) or None
+
+    def slow(self, ticks: float) -> str | None:
+        """Return which controllers take too long, in a run of so many ticks; None: none does."""
+        if self._steps is None:
+            return None
+        times = {agent: self._steps.page.read(agent) for agent in range(self._steps.agents)}
+        slow = {a: t for a, t in times.items() if t.slow_steps > SLOW_FRACTION * ticks}
+        if not slow:
+            return None
+        steps = sum(each.slow_steps for each in slow.values())
+        mean_ms = 1e3 * sum(each.slow_s for each in slow.values()) / steps
+        names = ", ".join(map(agent_name, list(slow)[:MAX_NAMED]))
+        more = f" and {len(slow) - MAX_NAMED} more" if len(slow) > MAX_NAMED else ""
+        return f"the controllers of {names}{more} took {mean_ms:.0f} ms a step"
+
+    def _note_stop(self, name: str, process: _Process | None, time_s: float) -> None:
+        if process is not None and process.stopped and name not in self._stops:
+            self._stops[name] = f"{name} was stopped by a signal at {time_s:.1f} s"
+            self._report(self._stops[name])
+
+    def _note_hang(self, agent: int, times: StepTimes, process: _Process, time_s: float) -> None:
+        if times.entered_s is None or agent in self._hangs:
+            return
+        lasts_s = time.monotonic() - times.entered_s
+        if lasts_s <= HANG_S:
+            return
+        since_s = max(0.0, time_s - lasts_s * self._speed)
+        busy = process.cpu_s - times.cpu_s > BUSY_FRACTION * lasts_s
+        does = "it computes without end" if busy else "it is blocked"
+        holds = f", and holds {process.resident_b / 1e9:.1f} GB of memory"
+        self._hangs[agent] = (
+            f"the controller of {agent_name(agent)} has not returned since {since_s:.1f} s:"
+            f" {does}{holds if process.resident_b > LARGE_B else ''}"
+        )
+        self._report(self._hangs[agent])
+
+
+def _process(pid: int) -> _Process | None:
+    """Return what a process does; None for none."""
+    if not pid:
+        return None
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return None
+    state, *fields = stat.rpartition(")")[2].split()
+    cpu_s = (int(fields[10]) + int(fields[11])) / _CLOCK_HZ
+    return _Process(state in "Tt", cpu_s, int(fields[20]) * _PAGE_B)
