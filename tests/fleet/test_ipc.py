@@ -24,6 +24,7 @@ from worldsim.fleet.ipc import (
     Message,
     MessageError,
     MessageSocket,
+    Notice,
     ProcessesMissing,
     Progress,
     RunFailed,
@@ -52,6 +53,7 @@ EXAMPLES: tuple[Message, ...] = (
     PROGRESS,
     Progress(0.0, 20.0, 9, 0, None, None),
     Stalled("agent-2's command of slot 5"),
+    Notice("agent-1 is blocked"),
     RunOver(),
 )
 DIRECTIONS = {"ToZygote": ToZygote, "FromZygote": FromZygote, "ToWorld": ToWorld}

@@ -11,7 +11,14 @@ from typing import Any
 import pytest
 
 from worldsim.fleet.ipc import AgentProcess
-from worldsim.fleet.process_table import Fleet, ProcessRow, ProcessTable, processes, read_fleet
+from worldsim.fleet.process_table import (
+    Fleet,
+    ProcessRow,
+    ProcessTable,
+    processes,
+    read_fleet,
+    sweep_passwords,
+)
 from worldsim.results.run_folder import RunDirectoryError
 
 AGENT_2 = [AgentProcess(2, 0)]
@@ -130,3 +137,27 @@ def test_a_table_that_is_not_text_is_refused(tmp_path: Path, data: bytes) -> Non
     (tmp_path / "fleet.json").write_bytes(data)
     with pytest.raises(RunDirectoryError, match=r"not a valid fleet\.json"):
         processes(tmp_path)
+
+
+@pytest.mark.parametrize("deep", ["[" * 100_000, '{"a":' * 100_000])
+def test_a_deeply_nested_table_is_refused(tmp_path: Path, deep: str) -> None:
+    (tmp_path / "fleet.json").write_text('{"run": "r", "endpoint": "e", "processes": ' + deep)
+    with pytest.raises(RunDirectoryError, match=r"not a valid fleet\.json: "):
+        read_fleet(tmp_path)
+
+
+@pytest.mark.parametrize("alive", [True, False])
+def test_passwords_of_a_killed_launcher_are_swept(tmp_path: Path, alive: bool) -> None:
+    with subprocess.Popen(["cat"], stdin=subprocess.PIPE) as process:
+        for name in ("one", "two"):
+            (tmp_path / name).mkdir()
+            (tmp_path / name / "users").touch()
+        table = ProcessTable(tmp_path / "one", "one", "tcp/127.0.0.1:7447")
+        table.add("netem", process.pid)
+        table.write()
+        if not alive:
+            process.kill()
+            process.wait(5.0)
+        sweep_passwords(tmp_path)
+    assert (tmp_path / "one/users").exists() is alive
+    assert (tmp_path / "two/users").exists()  # of a run that nothing is known of

@@ -229,6 +229,20 @@ def test_kill_9_of_the_launcher_leaves_no_process_and_a_summary(
     fleet.process.kill()
     none_left(started)
     assert summary_of(run)["outcome"] == "inconclusive"
+    assert not (run / "users").exists()
+
+
+def test_a_stopped_netem_is_named_not_the_host(start: Start, scenario: Write, run: Path) -> None:
+    fleet = launched(start, scenario(5.0), run, "--no-recording")
+    fleet.wait_for_output("least separation")
+    os.kill(pids(run)["netem"], signal.SIGSTOP)
+    fleet.wait_for_output("netem was stopped by a signal at ", 5.0)
+    os.kill(pids(run)["netem"], signal.SIGCONT)
+    assert fleet.status(20.0) in (1, 3), fleet.text
+    assert "the host was too slow" not in fleet.text
+    summary = summary_of(run)
+    if summary["outcome"] == "inconclusive":
+        assert summary["reason"].startswith("netem was stopped by a signal at ")
 
 
 def test_the_death_of_netem_ends_the_run_with_a_message(

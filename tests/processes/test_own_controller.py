@@ -1,7 +1,7 @@
 """Controllers other than the Q-structure, in fleets of real processes."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -47,9 +47,84 @@ def test_a_failing_controller_is_named_and_its_vehicle_hovers(start: Start, tmp_
     (tmp_path / "weak.py").write_text(FAILS)
     run = tmp_path / "run"
     fleet = launched(start, run, "--duration", "3", "--set", "control.controller=weak:Fails")
-    assert fleet.status(40.0) == 0, fleet.text
+    assert fleet.status(40.0) == 1, fleet.text
+    assert "fail (agent-2 ended with status 1 at 1." in fleet.text
     assert "controller 'weak:Fails' of agent 2 failed at 1.0" in fleet.text
     assert "LookupError: no wind" in fleet.text
     assert "(not scheduled); its vehicle stops and hovers" in fleet.text
     kills = [json.loads(line) for line in (run / "events.jsonl").read_text().splitlines()]
     assert [(kill["kind"], kill["agent"], kill["status"]) for kill in kills] == [("kill", 2, 1)]
+
+
+MIXED = """
+import os, signal, time
+from agent.guidance.flocking import Flocking
+
+
+class Mixed(Flocking):
+    def __init__(self, setup):
+        super().__init__(setup)
+        self._id = setup.id
+        self._begun = False
+
+    def decide(self, senses):
+        if senses.now_s > 1.0 and not self._begun:
+            self._begun = True
+            self._misbehave()
+        return super().decide(senses)
+
+    def _misbehave(self):
+        match self._id:
+            case 0:
+                print("x" * 3_000_000)
+            case 1:
+                os._exit(0)
+            case 2:
+                time.sleep(1e6)
+            case 3:
+                os.closerange(0, 200)
+            case 4:
+                signal.signal(signal.SIGTERM, signal.SIG_IGN)
+                if os.fork() == 0:
+                    time.sleep(600)
+            case 5:
+                os.posix_spawn("/bin/sleep", ["sleep", "600"], {})
+            case 6:
+                os.fork()
+            case 7:
+                hoard = []
+                while True:
+                    hoard.append(bytes(100_000_000))
+"""
+"""Eight ways to misbehave, one for each agent but the last."""
+
+
+def test_controllers_that_misbehave_are_named_bounded_and_ended(
+    start: Start, tmp_path: Path
+) -> None:
+    (tmp_path / "mixed.py").write_text(MIXED)
+    run = tmp_path / "run"
+    fleet = launched(start, run, "--duration", "4", "--set", "control.controller=mixed:Mixed")
+    assert fleet.status(60.0) == 1, fleet.text
+    reason = json.loads((run / "summary.json").read_text())["reason"]
+    assert "agent-1 ended with status 0 at 1." in reason
+    assert "agent-3 ended with status 5 at 1." in reason
+    assert "agent-7 ended with status 1 at " in reason
+    assert "the controller of agent-2 has not returned since 1." in reason
+    assert "agent-3: its controller closed the files of its process" in fleet.text
+    assert "of agent 7 failed at 1." in fleet.text
+    for still_flies in ("agent-0", "agent-5", "agent-6", "agent-8", "the host"):
+        assert still_flies not in reason
+    assert (run / "logs/agent-0.log").stat().st_size < 1_200_000
+    assert not list(processes_of(fleet.process.pid))
+
+
+def processes_of(session: int) -> Iterator[str]:
+    """Yield the live processes of a session, those that were left behind too."""
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, _, number, *_ = stat.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(number) == session and state != "Z":
+            yield stat.parent.name

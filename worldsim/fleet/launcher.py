@@ -29,7 +29,7 @@ from worldsim.fleet.ipc import (
 )
 from worldsim.fleet.launcher_link import LaunchedLink
 from worldsim.fleet.process import RunOptions
-from worldsim.fleet.process_table import ProcessRow, ProcessTable, processes
+from worldsim.fleet.process_table import ProcessRow, ProcessTable, processes, sweep_passwords
 from worldsim.fleet.supervisor import Supervisor
 from worldsim.fleet.terminal import Terminal
 from worldsim.fleet.zygote import AgentProcessConfig, Zygote
@@ -175,6 +175,7 @@ class Launcher:
         self._zygote.send(ActionRequest("start", agents))
 
     def _write_passwords(self) -> None:
+        sweep_passwords(self._directory.path.parent)
         agents = [agent_name(agent) for agent in range(self._scenario.rows)]
         try:
             write_users(self._directory.users, ["world", OPERATOR, *self._mediums(), *agents])

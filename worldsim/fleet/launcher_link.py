@@ -57,6 +57,10 @@ class LauncherLink(Protocol):
     """Where the agents note their steps, or None."""
 
     @property
+    def orphaned(self) -> bool:
+        """Whether the launcher is gone, and cannot clean up."""
+
+    @property
     def stop_reason(self) -> str | None:
         """Why the run must end now, or None."""
 
@@ -107,6 +111,11 @@ class LaunchedLink:
         self._exits: list[AgentExit] = []
         self._done: list[ActionDone] = []
         self.failure: str | None = None
+
+    @property
+    def orphaned(self) -> bool:
+        """Whether the launcher is gone."""
+        return self._launcher.closed
 
     @property
     def stop_reason(self) -> str | None:
@@ -190,6 +199,7 @@ class ManualLink:
     """
 
     controls_processes = False
+    orphaned = False
     steps: SharedSteps | None = None
 
     def __init__(self, vanished: Callable[[], list[str]]) -> None:

@@ -99,6 +99,8 @@ def conduct(
             summary = directory.write_summary(summary)
         else:
             directory.remove_results()
+    if launcher.orphaned:
+        directory.users.unlink(missing_ok=True)
     outcome = summary["outcome"] if fleet.begun else f"{ended_by} before take-off"
     print(f"world: {outcome}{_lateness(fleet.medium_counters)}", flush=True)
     return EXIT_STATUS[summary["outcome"]]

@@ -1,6 +1,7 @@
 """fleet.json: the processes of a running fleet, and the endpoint of its router."""
 
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, NamedTuple, assert_never
 
@@ -9,7 +10,7 @@ from msgspec import Meta
 
 from netem.wire.keys import agent_name
 from worldsim.fleet.ipc import AgentProcess, Pid, ProcessAction
-from worldsim.results.run_folder import RunDirectoryError, write_json
+from worldsim.results.run_folder import USERS, RunDirectoryError, write_json
 
 FILE = "fleet.json"
 
@@ -103,7 +104,7 @@ def read_fleet(run: Path) -> Fleet:
     except OSError as error:
         detail = f"not a process run (no {FILE})" if run.is_dir() else "no such folder"
         raise RunDirectoryError(run, detail) from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise RunDirectoryError(path, f"not a valid {FILE}: {error}") from error
     rows = [ProcessRow(entry.name, entry.pid, _alive(entry)) for entry in content.processes]
     return Fleet(content.run, content.endpoint, rows)
@@ -112,6 +113,22 @@ def read_fleet(run: Path) -> Fleet:
 def processes(run: Path) -> list[ProcessRow]:
     """Return the processes of the run in a folder. Raises RunDirectoryError as read_fleet."""
     return read_fleet(run).processes
+
+
+def sweep_passwords(folder: Path) -> None:
+    """Delete the passwords that killed launchers have left in the runs of a folder.
+
+    A run whose processes are not all gone, or whose fleet.json cannot be read, is left alone.
+    """
+    for users in folder.glob(f"*/{USERS}"):
+        try:
+            alive = any(row.alive for row in processes(users.parent))
+        except RunDirectoryError:
+            continue
+        if not alive:
+            # Another start may sweep at the same time, or the folder may be read-only.
+            with suppress(OSError):
+                users.unlink()
 
 
 def _alive(entry: ProcessEntry) -> bool:
