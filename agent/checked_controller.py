@@ -61,9 +61,9 @@ def _ctrl_c_raises() -> bool:
 
 
 def described(error: BaseException) -> str:
-    """Return the type and text of any error, also where its own ``__str__`` fails."""
+    """Return the type and text of any error in one line, also where its own ``__str__`` fails."""
     try:
-        text = str(error)[:MAX_ERROR_TEXT]
+        text = " ".join(str(error)[:MAX_ERROR_TEXT].splitlines())
     except Exception as own:
         text = f"its text cannot be shown: {type(own).__name__} in its __str__"
     return f"{type(error).__name__}: {text}" if text else type(error).__name__

@@ -10,6 +10,7 @@ from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, admit
 from worldsim.fleet.launcher_link import ManualLink
 from worldsim.fleet.process import RunOptions, run
 from worldsim.fleet.process_table import ProcessTable
+from worldsim.results.environment import prepare_environment
 from worldsim.results.run_folder import RunDirectory
 from worldsim.scenario.file import load
 from worldsim.scenario.library import find_scenario
@@ -61,6 +62,7 @@ def _parser() -> argparse.ArgumentParser:
 def main(arguments: list[str] | None = None) -> int:
     """Run the world by the command line; return the exit status."""
     options = _parser().parse_args(arguments)
+    prepare_environment()
     try:
         file = find_scenario(options.scenario)
         scenario = load(file)

@@ -5,6 +5,7 @@ No peers are discovered, no endpoint is opened that was not named, and message s
 
 import ipaddress
 import json
+import os
 import re
 from typing import Any
 
@@ -36,7 +37,7 @@ def open_router(
     """
     _refuse_all_but_loopback(listen)
     try:
-        return zenoh.open(router_config(listen, long_lease, access))
+        return _open(router_config(listen, long_lease, access))
     except zenoh.ZError as error:
         raise SessionError(f"{listen}: {_cause(error)}") from error
 
@@ -54,9 +55,23 @@ def open_client(
     """
     _address(connect)
     try:
-        return zenoh.open(client_config(connect, timeout_s, long_lease, login))
+        return _open(client_config(connect, timeout_s, long_lease, login))
     except zenoh.ZError as error:
         raise SessionError(f"no router answers at {connect} within {timeout_s:g} s") from error
+
+
+def _open(config: zenoh.Config) -> zenoh.Session:
+    """Open a session. Raises ZError, and SessionError where Zenoh itself breaks down."""
+    # One receiving thread is enough, and saves a tenth of the CPU time. A value of the user's own
+    # that Zenoh does not understand would end the process.
+    os.environ["ZENOH_RUNTIME"] = "(rx: (worker_threads: 1))"
+    try:
+        return zenoh.open(config)
+    except BaseException as error:
+        # Rust's panics are a class of its own that cannot be imported.
+        if type(error).__name__ != "PanicException":
+            raise
+        raise SessionError(f"Zenoh cannot start: {' '.join(str(error).split())}") from error
 
 
 def router_config(

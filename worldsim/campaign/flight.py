@@ -35,6 +35,7 @@ def fly_in_child(scenario: Scenario, directory: RunDirectory, recording: bool, p
     adopt_orphans()
     _limit_memory()
     _stop_when_debugged(pulse)
+    faulthandler.enable(all_threads=False)
     faulthandler.register(signal.SIGUSR1, all_threads=False)
     try:
         _fly(scenario, directory, recording, pulse)
@@ -101,7 +102,9 @@ def _report(error: BaseException, scenario: Scenario, pulse: Pulse) -> None:
         if place.agent is not None
         else f"the run failed at {place.slot / scenario.slot_hz:g} s"
     )
-    pulse.note_end(f"{where}: {described(error)}", _traceback_of(error))
+    # What the host refuses is no error of this program's.
+    refused = isinstance(error, OSError | MemoryError) and place.agent is None
+    pulse.note_end(f"{where}: {described(error)}", "" if refused else _traceback_of(error))
 
 
 def _traceback_of(error: BaseException) -> str:

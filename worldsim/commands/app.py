@@ -5,8 +5,8 @@ exit status 2. A command imports what it needs when it is called, so that --help
 """
 
 import gc
-import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,6 +16,7 @@ from typer.main import get_command
 from worldsim.commands import bench, inspect, netem, operate, run, scenario
 from worldsim.commands.options import complain, examples
 from worldsim.commands.usage_errors import usage_text
+from worldsim.results.environment import folder_is_gone, prepare_environment
 from worldsim.results.exit_status import (
     BAD_INPUT,
     FAIL,
@@ -24,6 +25,7 @@ from worldsim.results.exit_status import (
     OUTPUT_CLOSED,
     PASS,
 )
+from worldsim.results.output_streams import abandon_output, lost_output, open_streams
 
 app = typer.Typer(
     name="qswarm",
@@ -74,17 +76,23 @@ def main() -> None:
     """Run the command line of this process, and exit with its status."""
     # A run makes few reference cycles, so the collector may look for them less often.
     gc.set_threshold(200_000)
+    open_streams()
+    prepare_environment()
     # A user's own controller is imported from the current folder, after everything installed.
-    sys.path.append(str(Path.cwd()))
+    with suppress(FileNotFoundError):  # a folder that was removed holds no controller
+        sys.path.append(str(Path.cwd()))
     try:
         status = command(sys.argv[1:])
-        sys.stdout.flush()
+        lost = lost_output()
     except KeyboardInterrupt:
-        status = _interrupted()
+        status, lost = _interrupted(), None
     except BrokenPipeError:
         # What read the output has ended, as in `qswarm check wedge-9 | head`.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        status = OUTPUT_CLOSED
+        abandon_output()
+        status, lost = OUTPUT_CLOSED, None
+    if lost is not None:
+        complain(f"qswarm: stdout cannot be written: {lost}")
+        status = status or FAIL
     sys.exit(status)
 
 
@@ -101,7 +109,7 @@ def command(arguments: list[str]) -> int:
     try:
         status = typed(arguments, prog_name="qswarm", standalone_mode=False)
     except (ScenarioError, RunDirectoryError, ViewerError, OperatorError) as error:
-        complain(str(error))
+        complain(" ".join(str(error).splitlines()))
         return INCONCLUSIVE if isinstance(error, RunWriteError) else BAD_INPUT
     except typer.TyperException as error:
         complain(usage_text(error, arguments, names))
@@ -111,6 +119,12 @@ def command(arguments: list[str]) -> int:
         return FAIL
     except (typer.Abort, KeyboardInterrupt):
         return _interrupted()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        gone = folder_is_gone()
+        complain(f"qswarm: {'the current folder was removed' if gone else error}")
+        return BAD_INPUT if gone else FAIL
     return int(status or PASS)
 
 

@@ -5,12 +5,9 @@ zygote forks the agents. An exit is what waitpid reports, to the launcher or to 
 """
 
 import json
-import os
 import signal
 import socket
 from functools import partial
-
-from rich.console import Console
 
 from netem import process as netem_process
 from netem.wire.access import OPERATOR, AccessControl, write_users
@@ -33,8 +30,9 @@ from worldsim.fleet.process_table import ProcessRow, ProcessTable, processes, sw
 from worldsim.fleet.supervisor import Supervisor
 from worldsim.fleet.terminal import Terminal
 from worldsim.fleet.zygote import AgentProcessConfig, Zygote
+from worldsim.results.environment import descriptors_problem
 from worldsim.results.exit_status import EXIT_STATUS
-from worldsim.results.run_folder import RunDirectory, unwritable
+from worldsim.results.run_folder import RunDirectory, RunDirectoryError, unwritable
 from worldsim.results.summary import Summary
 from worldsim.results.verdict_text import verdict
 from worldsim.scenario.tables import Scenario
@@ -42,6 +40,8 @@ from worldsim.scenario.tables import Scenario
 __all__ = ["ProcessRow", "processes", "run"]
 
 NOT_STARTED, UNKNOWN, INTERRUPTED = 2, 3, 130
+OTHER_DESCRIPTORS = 64
+"""File descriptors that netem needs beside one for each agent."""
 POLL_S = 1.0
 RUN_END_WITHIN_S = 15.0
 END_WITHIN_S = 3.0
@@ -50,12 +50,15 @@ END_WITHIN_S = 3.0
 def run(scenario: Scenario, directory: RunDirectory, options: RunOptions) -> int:
     """Run a scenario with real processes and print the verdict; return the exit status.
 
-    No process is left behind, also after Ctrl-C, SIGTERM and SIGHUP.
+    No process is left behind, also after Ctrl-C, SIGTERM and SIGHUP. Raises RunDirectoryError where
+    the host allows too few files.
     """
+    problem = descriptors_problem(scenario.rows + OTHER_DESCRIPTORS)
+    if problem is not None:
+        directory.remove_results()
+        raise RunDirectoryError(directory.path, problem)
     interrupt_on_signals()
     adopt_orphans()
-    # One receiving thread is enough for a client, and saves a tenth of its CPU time.
-    os.environ.setdefault("ZENOH_RUNTIME", "(rx: (worker_threads: 1))")
     launcher = Launcher(scenario, directory, options._replace(users=directory.users))
     try:
         launcher.fly()
@@ -79,7 +82,7 @@ class Launcher:
     """One launched fleet, from its first process to its last."""
 
     def __init__(self, scenario: Scenario, directory: RunDirectory, options: RunOptions) -> None:
-        self.terminal = Terminal(Console())
+        self.terminal = Terminal()
         self._scenario = scenario
         self._directory = directory
         self._options = options

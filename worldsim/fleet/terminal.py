@@ -1,7 +1,9 @@
 """The launcher's terminal output: a progress line that is updated in place, and lasting lines."""
 
+import sys
 import time
 from math import inf
+from typing import TextIO, cast
 
 from rich.console import Console
 from rich.live import Live
@@ -9,20 +11,22 @@ from rich.text import Text
 
 from worldsim.fleet.ipc import Progress
 from worldsim.fleet.launcher_link import PRINT_EVERY_S
+from worldsim.results.output_streams import Unescaped, escaped
 
 
 class Terminal:
     """Shows progress in place on a terminal; elsewhere prints it as a line now and then."""
 
-    def __init__(self, console: Console) -> None:
-        self._console = console
+    def __init__(self, console: Console | None = None) -> None:
+        own = console if console is not None else Console(file=cast(TextIO, Unescaped(sys.stdout)))
+        self._console = console = own
         # Without rich's refresh thread: this process forks children.
         self._live = Live(console=console, auto_refresh=False, transient=True)
         self._print_at_s = -inf
 
     def print(self, text: str) -> None:
         """Print a lasting line."""
-        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+        self._console.print(escaped(text), markup=False, highlight=False, soft_wrap=True)
 
     def show(self, progress: Progress) -> None:
         """Show the state of the running fleet."""

@@ -4,6 +4,8 @@ import sys
 from time import monotonic
 from typing import TextIO
 
+from worldsim.results.output_streams import Unescaped, escaped
+
 QUIET_S = 2.0
 """Shorter work shows no progress."""
 LINE_EVERY_S = 0.2
@@ -15,6 +17,7 @@ class ProgressLine:
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = stream if stream is not None else sys.stderr
+        self._controls = Unescaped(self._stream)
         self._next_s = monotonic() + QUIET_S
         self._shown = False
 
@@ -24,12 +27,12 @@ class ProgressLine:
             return
         terminal = self._stream.isatty()
         self._next_s = monotonic() + (LINE_EVERY_S if terminal else LOG_EVERY_S)
-        self._stream.write(f"\r\x1b[K{text}" if terminal else f"{text}\n")
+        self._controls.write(f"\r\x1b[K{escaped(text)}" if terminal else f"{escaped(text)}\n")
         self._stream.flush()
         self._shown = terminal
 
     def clear(self) -> None:
         """Remove the line from the terminal."""
         if self._shown:
-            self._stream.write("\r\x1b[K")
+            self._controls.write("\r\x1b[K")
             self._stream.flush()
