@@ -16,6 +16,7 @@ from netem.messages import MAX_CONDITIONS_B, MediumSetup
 from netem.wire.access import AccessControl, AccessError
 from netem.wire.barrier import LockstepError, RunOverError
 from netem.wire.bus import Bus, Handler, Subscriber, drain, receive
+from netem.wire.connections import ConnectionLimiter
 from netem.wire.keys import Keys, medium_name
 from netem.wire.session import SessionError, open_client, open_router
 from netem.wire.shutdown import RunEnd, StopRequest
@@ -25,6 +26,10 @@ SILENCE_S = 30.0
 """The world counts as gone after so long without a message [s]."""
 TRUTH_RING = 16
 MAX_QUERIES = 16
+OTHER_SOCKETS = 16
+"""Connections besides the agents' below which none is looked up."""
+USUAL_BY_HAND = 512
+"""The same for a router without passwords, to which one process may connect many agents."""
 
 
 class SilenceError(RuntimeError):
@@ -115,10 +120,13 @@ def serve(
         state = "is connected to" if shard else "listens at"
         print(f"{medium_name(shard)} {state} {endpoint}, for one run", flush=True)
         server = SetupServer(session, shard)
+        usual = access.agents + OTHER_SOCKETS if access is not None else USUAL_BY_HAND
+        limiter = ConnectionLimiter(usual)
         while server.run is None and not stop.requested:
+            limiter.enforce()
             server.wait(WAIT_S)
         if server.run is not None and server.setup is not None:
-            _serve_run(Bus(session, Keys(server.run)), server, server.setup, stop)
+            _serve_run(Bus(session, Keys(server.run)), server, limiter, stop)
     return 0
 
 
@@ -131,8 +139,11 @@ def _opened(
     return open_client(endpoint, long_lease=long_lease, login=login)
 
 
-def _serve_run(bus: Bus, server: SetupServer, setup: MediumSetup, stop: StopRequest) -> None:
-    name = medium_name(server.shard)
+def _serve_run(
+    bus: Bus, server: SetupServer, limiter: ConnectionLimiter, stop: StopRequest
+) -> None:
+    name, setup = medium_name(server.shard), server.setup
+    assert setup is not None  # as the server serves a run
     print(
         f"{name} serves run {server.run!r} of {setup.agents} agents, seed {setup.seed}", flush=True
     )
@@ -144,18 +155,21 @@ def _serve_run(bus: Bus, server: SetupServer, setup: MediumSetup, stop: StopRequ
     )
     bus.declare_alive(name)
     try:
-        _play(medium, truths, server, ending)
+        _play(medium, truths, server, limiter, ending)
     except RunOverError:
         print(f"{name}: the run is over, within a slot", flush=True)
     else:
         medium.report()
         print(f"{name}: the run is over", flush=True)
+    if limiter.closed:
+        print(f"{name}: closed {limiter.closed} connections of processes with too many", flush=True)
 
 
 def _play(
     medium: LockstepMedium | FreeRunningMedium,
     truths: Subscriber,
     server: SetupServer,
+    limiter: ConnectionLimiter,
     ending: RunEnd,
 ) -> None:
     """Play slots until the run is over, those that arrived before its end included."""
@@ -163,6 +177,7 @@ def _play(
     ended = False
     while not ended:
         server.answer_waiting()
+        limiter.enforce()
         ended = ending()
         first = truths.wait(WAIT_S) if not ended else None
         medium.play(([first] if first is not None else []) + truths.drain(TRUTH_RING))

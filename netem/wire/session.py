@@ -12,6 +12,7 @@ from typing import Any
 import zenoh
 
 from netem.wire.access import AccessControl, Login, size_limits
+from netem.wire.connections import HANDSHAKE_WITHIN_S, MAX_PENDING, MAX_SESSIONS
 
 OPEN_TIMEOUT_S = 8.0
 MAX_MESSAGE_B = 4 * 1024 * 1024
@@ -83,11 +84,17 @@ def router_config(
         "listen": {"endpoints": [listen]},
         "low_pass_filter": size_limits(),
     }
+    limits = {
+        "max_sessions": MAX_SESSIONS,
+        "accept_pending": MAX_PENDING,
+        "accept_timeout": round(1000 * HANDSHAKE_WITHIN_S),
+    }
     if access is None:
-        return _config(router, long_lease, {})
+        return _config(router, long_lease, {}, limits)
     # Zenoh wants a user name of a router, too, though the router connects to nothing.
     passwords = {"user": "router", "password": "", "dictionary_file": str(access.users)}
-    return _config(router | {"access_control": access.config()}, long_lease, passwords)
+    own = router | {"access_control": access.config()}
+    return _config(own, long_lease, passwords, limits)
 
 
 def client_config(
@@ -111,7 +118,12 @@ def client_config(
     )
 
 
-def _config(own: dict[str, Any], long_lease: bool, passwords: dict[str, str]) -> zenoh.Config:
+def _config(
+    own: dict[str, Any],
+    long_lease: bool,
+    passwords: dict[str, str],
+    limits: dict[str, int] | None = None,
+) -> zenoh.Config:
     lease = {"tx": {"lease": LONG_LEASE_S * 1000}} if long_lease else {}
     common = {
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
@@ -119,6 +131,7 @@ def _config(own: dict[str, Any], long_lease: bool, passwords: dict[str, str]) ->
         "transport": {
             "link": {"rx": {"max_message_size": MAX_MESSAGE_B}, **lease},
             "shared_memory": {"enabled": False},
+            **({"unicast": limits} if limits else {}),
             **({"auth": {"usrpwd": passwords}} if passwords else {}),
         },
     }

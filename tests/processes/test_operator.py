@@ -1,12 +1,15 @@
 """An operator's commands to a running fleet: missions, faults and changes of the radio."""
 
 import json
+import signal
+import socket
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.processes.harness import QSWARM, Started, events_of, eventually, pids
+from worldsim.fleet.process_table import read_fleet
 
 pytestmark = pytest.mark.processes
 
@@ -82,3 +85,22 @@ def test_in_a_fleet_started_by_hand_only_the_radio_can_be_changed(
 
 def state(pid: int) -> str:
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+
+
+def test_many_half_open_connections_do_not_lock_the_operator_out(
+    start: Start, scenario: Callable[[float], str], tmp_path: Path
+) -> None:
+    run = tmp_path / "run"
+    fleet = start(*QSWARM, "run", scenario(20.0), "--no-recording", "--out", str(run))
+    fleet.wait_for_output("least separation")
+    host, _, port = read_fleet(run).endpoint.removeprefix("tcp/").rpartition(":")
+    held = [socket.create_connection((host, int(port))) for _ in range(150)]
+    asked = start(*QSWARM, "netem", str(run), "show")
+    assert asked.status(10.0) == 0, asked.text
+    for each in held:
+        each.settimeout(5.0)
+    assert [each.recv(1) for each in held[20:]] == [b""] * 130  # the router has ended them
+    for each in held:
+        each.close()
+    fleet.kill_group(signal.SIGINT)
+    assert fleet.status(10.0) == 130, fleet.text
