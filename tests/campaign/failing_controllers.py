@@ -196,6 +196,7 @@ class IgnoresSignals(Once):
     def misbehave(self) -> None:
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             signal.signal(number, signal.SIG_IGN)
+        print("deaf", flush=True)
 
 
 class Prints(Hovers):

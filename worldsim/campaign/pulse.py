@@ -34,12 +34,21 @@ class Place(NamedTuple):
 
 
 class Pulse:
-    """The shared page of one flight."""
+    """The shared page of one flight.
 
-    def __init__(self) -> None:
-        self._page = mmap.mmap(-1, _NUMBERS_B + TEXT_B)
+    descriptor: of the memory of an existing pulse; None: a new one.
+    """
+
+    def __init__(self, descriptor: int | None = None) -> None:
+        self.descriptor = os.memfd_create("qswarm-pulse") if descriptor is None else descriptor
+        os.ftruncate(self.descriptor, _NUMBERS_B + TEXT_B)
+        self._page = mmap.mmap(self.descriptor, _NUMBERS_B + TEXT_B)
         self._numbers = memoryview(self._page)[:_NUMBERS_B].cast("q")
         self._numbers[_AGENT] = NOBODY
+
+    def close(self) -> None:
+        """Close the descriptor; what was written can still be read."""
+        os.close(self.descriptor)
 
     @property
     def place(self) -> Place:

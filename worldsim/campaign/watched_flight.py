@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
+from worldsim.campaign import fresh_flight
 from worldsim.campaign.flight import FLOWN, fly_in_child
 from worldsim.campaign.printed import PrintedOutput
 from worldsim.campaign.pulse import Place, Pulse, blame
@@ -102,6 +103,10 @@ class WatchedFlight:
         self._close()
 
     def _fly(self, recording: bool) -> int:
+        if recording and fresh_flight.is_needed():
+            fresh_flight.fly_in_fresh_child(
+                self._scenario, self._directory.path, recording, self._pulse
+            )
         return fly_in_child(self._scenario, self._directory, recording, self._pulse)
 
     def _allowed_s(self) -> float:
@@ -134,6 +139,7 @@ class WatchedFlight:
         if self.exit_descriptor >= 0:
             self.output.close()
             os.close(self.exit_descriptor)
+            self._pulse.close()
             self.exit_descriptor = -1
 
 

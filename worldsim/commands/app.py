@@ -25,7 +25,7 @@ from worldsim.results.exit_status import (
     OUTPUT_CLOSED,
     PASS,
 )
-from worldsim.results.output_streams import abandon_output, lost_output, open_streams
+from worldsim.results.output_streams import flushed_stdout, open_streams
 
 app = typer.Typer(
     name="qswarm",
@@ -83,16 +83,15 @@ def main() -> None:
         sys.path.append(str(Path.cwd()))
     try:
         status = command(sys.argv[1:])
-        lost = lost_output()
     except KeyboardInterrupt:
-        status, lost = _interrupted(), None
-    except BrokenPipeError:
-        # What read the output has ended, as in `qswarm check wedge-9 | head`.
-        abandon_output()
-        status, lost = OUTPUT_CLOSED, None
-    if lost is not None:
-        complain(f"qswarm: stdout cannot be written: {lost}")
+        status = _interrupted()
+    out = flushed_stdout()
+    if out.failure is not None:
+        complain(f"qswarm: stdout cannot be written: {out.failure}")
         status = status or FAIL
+    if out.reader_gone:
+        # What read the output has ended, as in `qswarm check wedge-9 | head`.
+        status = OUTPUT_CLOSED
     sys.exit(status)
 
 
@@ -119,8 +118,6 @@ def command(arguments: list[str]) -> int:
         return FAIL
     except (typer.Abort, KeyboardInterrupt):
         return _interrupted()
-    except BrokenPipeError:
-        raise
     except OSError as error:
         gone = folder_is_gone()
         complain(f"qswarm: {'the current folder was removed' if gone else error}")

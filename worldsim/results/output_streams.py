@@ -9,7 +9,6 @@ import io
 import os
 import re
 import sys
-from contextlib import suppress
 from typing import Any, TextIO
 
 _CONTROLS = re.compile(
@@ -35,8 +34,7 @@ def _escape(match: re.Match[str]) -> str:
 class SafeStream(io.TextIOWrapper):
     """A text stream that escapes control characters, and what its encoding lacks.
 
-    An output that cannot be written is lost: ``failure`` says why. Only a closed pipe raises, as
-    in `qswarm ... | head`.
+    An output that cannot be written is lost: ``failure`` and ``reader_gone`` say why.
     """
 
     def __init__(self, descriptor: int, encoding: str) -> None:
@@ -49,6 +47,11 @@ class SafeStream(io.TextIOWrapper):
     def failure(self) -> str | None:
         """Why output was lost, or None."""
         return self._output.failure
+
+    @property
+    def reader_gone(self) -> bool:
+        """Whether what read the output has ended, as in `qswarm ... | head`."""
+        return self._output.reader_gone
 
     def write(self, text: str, /) -> int:
         """Write a text, escaped."""
@@ -64,6 +67,7 @@ class _Output(io.RawIOBase):
 
     def __init__(self, descriptor: int) -> None:
         self.failure: str | None = None
+        self.reader_gone = False
         self._descriptor = descriptor
 
     def fileno(self) -> int:
@@ -79,7 +83,8 @@ class _Output(io.RawIOBase):
         try:
             return os.write(self._descriptor, data)
         except BrokenPipeError:
-            raise
+            self.reader_gone = True
+            return len(data)
         except OSError as error:
             self.failure = (error.strerror or str(error)).lower()
             return len(data)
@@ -119,19 +124,11 @@ def open_streams() -> None:
     sys.stderr = SafeStream(2, _encoding_of(sys.stderr))
 
 
-def lost_output() -> str | None:
-    """Flush stdout, and return why some of it was lost; None: nothing was.
-
-    Raises BrokenPipeError when nobody reads it.
-    """
+def flushed_stdout() -> SafeStream:
+    """Flush stdout, and return it with what was lost."""
+    assert isinstance(sys.stdout, SafeStream)  # as open_streams leaves it
     sys.stdout.flush()
-    return sys.stdout.failure if isinstance(sys.stdout, SafeStream) else None
-
-
-def abandon_output() -> None:
-    """Write nothing more to stdout: what read it has ended."""
-    with suppress(OSError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    return sys.stdout
 
 
 def _encoding_of(stream: TextIO | None) -> str:
