@@ -12,6 +12,7 @@ from tests.commands.conftest import Command, qswarm, small  # noqa: F401 - fixtu
 from tests.processes.harness import QSWARM, Started, eventually
 from worldsim.campaign import flight, printed, watched_flight
 from worldsim.campaign.pool import Job, simulate
+from worldsim.fleet import import_probe
 from worldsim.scenario.file import load
 
 MODULE = "tests.campaign.failing_controllers"
@@ -151,3 +152,33 @@ def test_a_run_is_recorded_from_a_program_that_has_recorded_before() -> None:
         made = simulate(Job(scenario, Path("out"), True), stop)
     assert made.outcome == "pass"
     assert Path("out/run.rrd").stat().st_size > 10_000
+
+
+IMPORTS = {
+    "import os; os._exit(0)": "the process that imports it ended with status 0",
+    "import os; os.kill(os.getpid(), 9)": "the process that imports it was killed by signal 9",
+    "import time; time.sleep(600)": "its import did not return within 0.3 s",
+    "import sys; sys.exit(0)": "cannot be imported: SystemExit: 0",
+    "raise GeneratorExit": "cannot be imported: GeneratorExit",
+    "1 / 0": "cannot be imported: ZeroDivisionError: division by zero",
+    "def (": "cannot be imported: SyntaxError: ",
+}
+
+
+@pytest.mark.parametrize("line", IMPORTS)
+def test_a_module_that_cannot_be_imported_is_bad_input(
+    small: Path,  # noqa: F811
+    qswarm: Command,  # noqa: F811
+    monkeypatch: pytest.MonkeyPatch,
+    line: str,
+) -> None:
+    monkeypatch.syspath_prepend(small.parent)
+    if "sleep" in line:
+        monkeypatch.setattr(import_probe, "IMPORT_WITHIN_S", 0.3)
+    name = f"own_{list(IMPORTS).index(line)}"
+    small.with_name(f"{name}.py").write_text(line)
+    ended = qswarm("check", small, "--set", f'control.controller="{name}:Own"')
+    assert (ended.status, ended.out) == (2, "")
+    (shown,) = ended.err.splitlines()
+    assert shown.startswith(f"{small}: control.controller: '{name}:Own'")
+    assert IMPORTS[line] in shown

@@ -119,11 +119,17 @@ def load_scenario(given: str, overrides: Mapping[str, str], command_ticks: int) 
     Raises ScenarioError.
     """
     from worldsim.engine.preflight import admit
+    from worldsim.fleet.import_probe import import_problem
     from worldsim.scenario.file import load
     from worldsim.scenario.library import find_scenario
+    from worldsim.scenario.toml import ScenarioError
 
     file = find_scenario(given)
     scenario = load(file, overrides)
+    problem = import_problem(scenario.control.controller)
+    if problem is not None:
+        name = scenario.control.controller
+        raise ScenarioError(file, "control.controller", f"{name!r}: {problem}")
     admit(scenario, file, command_ticks)
     return scenario
 
