@@ -199,6 +199,13 @@ class IgnoresSignals(Once):
         print("deaf", flush=True)
 
 
+class Breaks(Once):
+    def misbehave(self) -> None:
+        answer = 6 * 7
+        breakpoint()
+        print("agent", self.agent, answer)
+
+
 class Prints(Hovers):
     def decide(self, senses: Senses) -> Intent:
         print("x" * 100_000)

@@ -1,8 +1,11 @@
 """A controller that fails fails its own run, named, whatever it does to the run's process."""
 
 import json
+import os
 import re
 import signal
+import subprocess
+import threading
 from pathlib import Path
 
 import pytest
@@ -154,6 +157,30 @@ def test_a_run_is_recorded_from_a_program_that_has_recorded_before() -> None:
     assert Path("out/run.rrd").stat().st_size > 10_000
 
 
+@pytest.mark.usefixtures("small")
+def test_a_breakpoint_stops_in_the_controller_for_as_long_as_it_takes() -> None:
+    arguments = [QSWARM[0], "-c", PATIENCE + QSWARM[2], *flown("Breaks", "--no-recording")]
+    asked = subprocess.Popen(
+        arguments,
+        stdin=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+    )
+    assert asked.stdin is not None
+    assert asked.stderr is not None
+    shown = asked.stderr.readline()  # where it stops
+    threading.Event().wait(0.6)  # longer than a step may last: nothing is to happen
+    asked.stdin.write("p answer + 1\nc\n")
+    asked.stdin.flush()
+    _, err = asked.communicate(timeout=20.0)
+    assert "failing_controllers.py" in shown
+    assert "43" in err
+    assert "agent 1 42" in err
+    assert asked.returncode == 0
+
+
+PATIENCE = "from worldsim.campaign import watched_flight; watched_flight.STEP_WITHIN_S = 0.3; "
 IMPORTS = {
     "import os; os._exit(0)": "the process that imports it ended with status 0",
     "import os; os.kill(os.getpid(), 9)": "the process that imports it was killed by signal 9",

@@ -68,6 +68,14 @@ def test_a_recording_is_made_whatever_rerun_is_told() -> None:
     assert Path("out/run.rrd").stat().st_size > 10_000
 
 
+@pytest.mark.parametrize("backend", ["nonsense", "module://none.there", "TkAgg"])
+def test_pictures_are_drawn_whatever_a_notebook_has_set(backend: str) -> None:
+    prepare = "from worldsim.results.environment import prepare_environment as p; p()"
+    program = f"{prepare}; from worldsim.link_check import plot; print('drawn')"
+    ended = ran(f"'{sys.executable}' -c \"{program}\"", {"MPLBACKEND": backend})
+    assert (ended.returncode, ended.stdout) == (0, "drawn\n"), ended.stderr
+
+
 @pytest.mark.usefixtures("small")
 def test_own_modules_with_our_names_do_no_harm() -> None:
     Path("agent.py").write_text("raise ValueError('not this one')")

@@ -5,6 +5,7 @@ It writes into the run's folder, and reports its end, or the error that ended it
 
 import faulthandler
 import os
+import pdb
 import resource
 import signal
 import sys
@@ -132,6 +133,9 @@ def _stop_when_debugged(pulse: Pulse) -> None:
 
     def breakpoint_hit(*arguments: Any, **keywords: Any) -> Any:
         pulse.note_breakpoint()
-        return hook(*arguments, **keywords)
+        if hook is not sys.__breakpointhook__ or os.environ.get("PYTHONBREAKPOINT"):
+            return hook(*arguments, **keywords)
+        # Python's own hook would stop in this function.
+        return pdb.Pdb().set_trace(sys._getframe(1))
 
     sys.breakpointhook = breakpoint_hit
