@@ -97,6 +97,17 @@ class Recurses(Hovers):
         return self.fail()
 
 
+class OverflowsTheStack(Hovers):
+    def fail(self) -> Any:
+        sys.setrecursionlimit(10**9)
+        return eval("(" * 50 + "self.fail()" + ")" * 50, {"self": self})
+
+
+class NulText(Hovers):
+    def fail(self) -> NoReturn:
+        raise ValueError("a\0b\nc")
+
+
 class EatsMemory(Hovers):
     def fail(self) -> NoReturn:
         hoard = []
@@ -185,6 +196,11 @@ class ForksACopy(Once):
 
     def misbehave(self) -> None:
         os.fork()
+
+
+class ChangesFolder(Once):
+    def misbehave(self) -> None:
+        os.chdir("/")
 
 
 class StartsAThread(Once):

@@ -28,6 +28,8 @@ FAILURES = {
     "KillsItself": "its process was killed by signal 9",
     "Aborts": "its process was killed by signal 6",
     "Recurses": "(RecursionError: maximum recursion depth exceeded|SystemError: .*)",
+    "OverflowsTheStack": "its process was killed by signal 11",
+    "NulText": r"ValueError: a\\0b c",
     "EatsMemory": "MemoryError",
     "ClosesFiles": "it closed the files of its process",
     "NoText": "NoTextError: its text cannot be shown: RuntimeError in its __str__",
@@ -104,7 +106,9 @@ def test_a_controller_that_keeps_all_memory_is_still_named(qswarm: Command) -> N
 
 
 @pytest.mark.usefixtures("small")
-@pytest.mark.parametrize("name", ["Forks", "ForksTwice", "ForksACopy", "StartsAThread"])
+@pytest.mark.parametrize(
+    "name", ["Forks", "ForksTwice", "ForksACopy", "StartsAThread", "ChangesFolder"]
+)
 def test_what_a_controller_starts_ends_with_the_run(qswarm: Command, name: str) -> None:  # noqa: F811
     ended = qswarm(*flown(name))
     assert ended.status == 0, ended.err

@@ -1,6 +1,7 @@
 """An operator's commands to a running fleet: missions, faults and changes of the radio."""
 
 import json
+import re
 import signal
 import socket
 from collections.abc import Callable
@@ -8,8 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from netem.wire.access import login_of
+from netem.wire.session import open_client
 from tests.processes.harness import QSWARM, Started, events_of, eventually, pids
 from worldsim.fleet.process_table import read_fleet
+from worldsim.results.run_folder import USERS
 
 pytestmark = pytest.mark.processes
 
@@ -87,7 +91,7 @@ def state(pid: int) -> str:
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
 
 
-def test_many_half_open_connections_do_not_lock_the_operator_out(
+def test_many_connections_and_sessions_do_not_lock_the_operator_out(
     start: Start, scenario: Callable[[float], str], tmp_path: Path
 ) -> None:
     run = tmp_path / "run"
@@ -95,8 +99,12 @@ def test_many_half_open_connections_do_not_lock_the_operator_out(
     fleet.wait_for_output("least separation")
     host, _, port = read_fleet(run).endpoint.removeprefix("tcp/").rpartition(":")
     held = [socket.create_connection((host, int(port))) for _ in range(150)]
+    login = login_of(run / USERS, "agent-1")
+    sessions = [open_client(f"tcp/{host}:{port}", login=login) for _ in range(20)]
     asked = start(*QSWARM, "netem", str(run), "show")
     assert asked.status(10.0) == 0, asked.text
+    for session in sessions:
+        session.close()
     for each in held:
         each.settimeout(5.0)
     assert [each.recv(1) for each in held[20:]] == [b""] * 130  # the router has ended them
@@ -104,3 +112,7 @@ def test_many_half_open_connections_do_not_lock_the_operator_out(
         each.close()
     fleet.kill_group(signal.SIGINT)
     assert fleet.status(10.0) == 130, fleet.text
+    log = (run / "logs/netem.log").read_text()
+    closed = re.search(r"closed (\d+) connections of processes with too many", log)
+    assert closed is not None
+    assert int(closed[1]) >= 130 + 20

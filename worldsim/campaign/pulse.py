@@ -83,7 +83,8 @@ class Pulse:
 
     def note_end(self, error: str = "", details: str = "") -> None:
         """Note that the flight has ended by itself, with an error and its traceback if any."""
-        data = f"{error}\0{details}".encode("utf-8", "backslashreplace")[:TEXT_B]
+        line = error.replace("\0", "\\0")
+        data = f"{line}\0{details}".encode("utf-8", "backslashreplace")[:TEXT_B]
         self._page[_NUMBERS_B : _NUMBERS_B + len(data)] = data
         self._numbers[_TEXT] = len(data)
         self._numbers[_ENDED] = 1

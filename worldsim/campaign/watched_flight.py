@@ -103,11 +103,10 @@ class WatchedFlight:
         self._close()
 
     def _fly(self, recording: bool) -> int:
+        folder = self._directory.path.absolute()  # a controller may change the current folder
         if recording and fresh_flight.is_needed():
-            fresh_flight.fly_in_fresh_child(
-                self._scenario, self._directory.path, recording, self._pulse
-            )
-        return fly_in_child(self._scenario, self._directory, recording, self._pulse)
+            fresh_flight.fly_in_fresh_child(self._scenario, folder, recording, self._pulse)
+        return fly_in_child(self._scenario, RunDirectory(folder), recording, self._pulse)
 
     def _allowed_s(self) -> float:
         if self._pulse.ended:
