@@ -1,6 +1,7 @@
 """Who is at fault: real processes that are stopped, blocked or busy, and pages of steps."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from worldsim.fleet.fork import ProcessExit
 
 Start = Callable[[str], int]
 BLOCKED, BUSY = "input()", "\nwhile True: pass"
+TURNS = "import time\nwhile True: time.sleep(0.001)"
 
 
 @pytest.fixture
@@ -52,9 +54,9 @@ def test_a_step_that_does_not_return_is_named_once(
     process: Start, monkeypatch: pytest.MonkeyPatch, line: str, does: str
 ) -> None:
     monkeypatch.setattr(culprits, "HANG_S", 0.2)
-    monkeypatch.setattr(culprits, "BUSY_FRACTION", 0.1)
+    monkeypatch.setattr(culprits, "ASLEEP_S", 0.05)
     steps, told = steps_in(process(line)), list[str]()
-    steps.page.row(1)[2] = 0  # its CPU time at the step's begin
+    steps.page.row(1)[2] = 0  # CPU time at the step's begin, of the process that is looked at
     found = Culprits(steps, told.append)
     found.look([1], 5.0)
     assert (found.failure, told) == (None, [])
@@ -64,9 +66,27 @@ def test_a_step_that_does_not_return_is_named_once(
         return found.failure is not None
 
     eventually(named, 10.0)
-    assert found.failure == f"the controller of agent-1 has not returned since 4.8 s: {does}"
+    assert re.fullmatch(
+        rf"the controller of agent-1 has not returned since [0-4]\.\d s: {does}",
+        found.failure or "",
+    )
     found.look([1], 6.0)
     assert told == [found.failure]
+
+
+def test_a_step_that_a_slow_host_may_delay_is_not_called_a_hang(
+    process: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(culprits, "ASLEEP_S", 10.0)
+    steps = steps_in(process(TURNS))
+    found = Culprits(steps, lambda _: None)
+    steps.page.row(1)[1] -= 2_000_000  # it began two seconds earlier
+    found.look([1], 5.0)
+    assert found.failure is None
+    steps.page.row(1)[1] -= 4_000_000
+    found.look([1], 5.0)
+    assert found.failure is not None
+    assert found.failure.endswith(": it computes and waits in turn")
 
 
 def test_a_stopped_process_is_not_called_a_hang(

@@ -5,6 +5,7 @@ started by hand there is no page, and nobody is named.
 """
 
 import os
+import re
 import signal
 import time
 from collections.abc import Callable, Sequence
@@ -16,9 +17,11 @@ from netem.wire.keys import agent_name, medium_name
 from worldsim.fleet.fork import ProcessExit
 
 HANG_S = 1.0
-"""A step that lasts longer than this wall time hangs; the host's delays are shorter."""
-BUSY_FRACTION = 0.5
-"""From this share of a core on, a process that hangs computes; below it is blocked."""
+"""A step hangs that has used this CPU time, or that sleeps and has lasted this wall time."""
+ASLEEP_S = 0.3
+"""A process sleeps that has not run for so long though no core was denied to it."""
+LONG_HANG_S = 5.0
+"""A step that has lasted this wall time hangs whatever it does: no host delays it so long."""
 SLOW_FRACTION = 0.1
 """From this share of slow steps on, a controller is too slow."""
 CRASH_SIGNALS = frozenset(
@@ -28,6 +31,7 @@ CRASH_SIGNALS = frozenset(
 MAX_NAMED = 5
 LARGE_B = 1024**3
 
+_SWITCHES = re.compile(r"ctxt_switches:\s+(\d+)")
 _PAGE_B = os.sysconf("SC_PAGE_SIZE")
 _CLOCK_HZ = os.sysconf("SC_CLK_TCK")
 
@@ -57,14 +61,17 @@ class _Process(NamedTuple):
     """What /proc says of a process."""
 
     stopped: bool
+    waits: bool  # for anything but a core or the disk
     cpu_s: float
     resident_b: int
+    switches: int  # how often it was given a core
 
 
 class Culprits:
     """Names who is at fault; ``report`` gets a line the first time.
 
-    speed: simulated seconds in a second of wall time. steps: None where nobody can be named.
+    speed: simulated seconds in a second of wall time, 0 where time waits for all. steps: None where
+    nobody can be named.
     """
 
     def __init__(
@@ -75,6 +82,7 @@ class Culprits:
         self._speed = speed
         self._hangs: dict[int, str] = {}
         self._ends: list[str] = []
+        self._asleep_since: dict[int, tuple[int, float]] = {}  # switches and time, by agent
         self._stops: dict[str, str] = {}
 
     def look(self, late: Sequence[int], time_s: float) -> None:
@@ -131,17 +139,37 @@ class Culprits:
         if times.entered_s is None or agent in self._hangs:
             return
         lasts_s = time.monotonic() - times.entered_s
-        if lasts_s <= HANG_S:
+        does = self._hang_in_words(agent, lasts_s, process.cpu_s - times.cpu_s, process)
+        if does is None:
             return
         since_s = max(0.0, time_s - lasts_s * self._speed)
-        busy = process.cpu_s - times.cpu_s > BUSY_FRACTION * lasts_s
-        does = "it computes without end" if busy else "it is blocked"
         holds = f", and holds {process.resident_b / 1e9:.1f} GB of memory"
         self._hangs[agent] = (
             f"the controller of {agent_name(agent)} has not returned since {since_s:.1f} s:"
             f" {does}{holds if process.resident_b > LARGE_B else ''}"
         )
         self._report(self._hangs[agent])
+
+    def _hang_in_words(
+        self, agent: int, lasts_s: float, cpu_s: float, process: _Process
+    ) -> str | None:
+        """Return what a step does that hangs; None for one that a slow host may delay."""
+        if cpu_s > HANG_S:
+            return "it computes without end"
+        if lasts_s <= HANG_S:
+            return None
+        if self._asleep(agent, process):
+            return "it is blocked"
+        return "it computes and waits in turn" if lasts_s > LONG_HANG_S else None
+
+    def _asleep(self, agent: int, process: _Process) -> bool:
+        """Return whether a process has waited without a break for ASLEEP_S."""
+        now_s = time.monotonic()
+        switches, since_s = self._asleep_since.get(agent, (-1, now_s))
+        if not process.waits or process.switches != switches:
+            self._asleep_since[agent] = (process.switches, now_s)
+            return False
+        return now_s - since_s >= ASLEEP_S
 
 
 def _process(pid: int) -> _Process | None:
@@ -150,8 +178,11 @@ def _process(pid: int) -> _Process | None:
         return None
     try:
         stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+        status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
     except OSError:
         return None
+    switches = sum(map(int, _SWITCHES.findall(status)))
     state, *fields = stat.rpartition(")")[2].split()
     cpu_s = (int(fields[10]) + int(fields[11])) / _CLOCK_HZ
-    return _Process(state in "Tt", cpu_s, int(fields[20]) * _PAGE_B)
+    resident_b = int(fields[20]) * _PAGE_B
+    return _Process(state in "Tt", state == "S", cpu_s, resident_b, switches)

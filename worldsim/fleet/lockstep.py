@@ -82,7 +82,7 @@ class LockstepFleet:
         self.medium_counters: MediumCounters | None = None
         self.real_time_factor: float | None = None
         self.failure: str | None = None
-        self._culprits = Culprits(launcher.steps, launcher.report_notice)
+        self._culprits = Culprits(launcher.steps, launcher.report_notice, speed=0.0)
         self.begun = self._landed = False
         self._stepping: list[int] = []
         self._slots = scenario.slots
@@ -113,12 +113,11 @@ class LockstepFleet:
                 self._slot()
                 self._progress_reporter.report(time.perf_counter() - begun_s, None)
         except RunOverError:
-            self.failure = self._launcher_failure()
+            failure = self._launcher_failure()
+            self.failure = None if failure is None else f"{failure}{self._blame()}"
             return False
         except LockstepError as error:
-            blamed = self._culprits.stop or self._culprits.failure
-            at = f"{self.loop.world.time_s:.2f} s into the run"
-            self.failure = f"{error}, {at}{f' ({blamed})' if blamed else ''}"
+            self.failure = f"{error}, {self.loop.world.time_s:.2f} s into the run{self._blame()}"
             return False
         self.failure = self._launcher_failure()
         time_s = self.loop.world.time_s
@@ -216,6 +215,11 @@ class LockstepFleet:
         """Return the failure that the launcher has reported, such as netem's exit, or None."""
         self._launcher.agent_exits()
         return self._launcher.failure
+
+    def _blame(self) -> str:
+        """Return who is at fault, in brackets; nothing where that is not known."""
+        blamed = self._culprits.stop or self._culprits.failure
+        return f" ({blamed})" if blamed else ""
 
     def _packets(self) -> Packets:
         return self.medium_counters.packets() if self.medium_counters is not None else {}
