@@ -7,7 +7,7 @@ import pytest
 from msgspec import inspect
 
 from tests.commands.conftest import Command
-from worldsim.campaign.flight import finished
+from worldsim.campaign.pool import finished
 from worldsim.engine.virtual import fly
 from worldsim.results.summary import summarise
 from worldsim.scenario.file import dump, load, parse

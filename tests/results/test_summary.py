@@ -10,7 +10,7 @@ import pytest
 from netem.link import Cause
 from netem.messages import MediumCounters
 from tests.small_scenario import SMALL
-from worldsim.campaign.flight import finished
+from worldsim.campaign.pool import finished
 from worldsim.engine.step import SlotLoop, world_of
 from worldsim.engine.virtual import fly
 from worldsim.judge.hovering_vehicles import HoveringVehicles

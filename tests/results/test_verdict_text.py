@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from tests.small_scenario import SMALL
-from worldsim.campaign.flight import finished
+from worldsim.campaign.pool import finished
 from worldsim.engine.virtual import fly
 from worldsim.results.overall import FailedRun, Result, over_all
 from worldsim.results.summary import Summary, summarise

@@ -13,11 +13,12 @@ from typing import NamedTuple
 
 from agent.checked_controller import FaultyControllerError
 from netem.wire.shutdown import StopRequest
+from worldsim.campaign.flight import finished
 from worldsim.campaign.watched_flight import Job, WatchedFlight
 from worldsim.fleet.fork import adopt_orphans, children, end_orphans
 from worldsim.results.overall import FailedRun, Made, Result
 
-__all__ = ["FailedFlightError", "Job", "simulate", "sweep"]
+__all__ = ["FailedFlightError", "Job", "finished", "simulate", "sweep"]
 
 POLL_EVERY_S = 0.2
 
