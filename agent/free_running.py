@@ -19,7 +19,7 @@ from netem.wire.latency import LatencyHistogram
 class FreeRunningAgent:
     """An agent on wall-clock pace; about once a second it reports how late frames were used."""
 
-    def __init__(self, bus: Bus, setup: AgentSetup, guard: StepGuard) -> None:
+    def __init__(self, bus: Bus, setup: AgentSetup, guard: StepGuard | None = None) -> None:
         command, radio = bus.publisher("command", setup.id), bus.publisher("tx", setup.id)
         self._stepper = AgentStepper(setup, command, radio, guard)
         self._batches = bus.subscriber("rx", setup.id, BATCH_RING)

@@ -18,7 +18,11 @@ class LockstepAgent:
     """An agent in lockstep. run_is_over: asked while it waits for an inbox."""
 
     def __init__(
-        self, bus: Bus, setup: AgentSetup, guard: StepGuard, run_is_over: Callable[[], bool]
+        self,
+        bus: Bus,
+        setup: AgentSetup,
+        run_is_over: Callable[[], bool],
+        guard: StepGuard | None = None,
     ) -> None:
         command = bus.publisher("command", setup.id, lockstep=True)
         radio = bus.publisher("tx", setup.id, lockstep=True)

@@ -121,7 +121,7 @@ def _checked_setup(answer: bytes) -> AgentSetup:
 def _run_shell(bus: Bus, setup: AgentSetup, guard: StepGuard, ending: RunEnd, run: str) -> None:
     observations = bus.subscriber("observation", setup.id)
     shell = (
-        LockstepAgent(bus, setup, guard, ending)
+        LockstepAgent(bus, setup, ending, guard)
         if setup.lockstep
         else FreeRunningAgent(bus, setup, guard)
     )

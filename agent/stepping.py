@@ -12,11 +12,13 @@ from netem.wire.frame import Batch, Outgoing, Transmission, pack
 class AgentStepper:
     """Runs an agent's core and publishes its commands and transmissions."""
 
-    def __init__(self, setup: AgentSetup, command: Put, radio: Put, guard: StepGuard) -> None:
-        self._guard = guard
-        guard.enter()
+    def __init__(
+        self, setup: AgentSetup, command: Put, radio: Put, guard: StepGuard | None = None
+    ) -> None:
+        self._guard = guard if guard is not None else StepGuard(None, 1.0 / setup.tick_hz)
+        self._guard.enter()
         self.core = Agent(setup)
-        guard.leave()
+        self._guard.leave()
         self._incarnation = setup.incarnation
         self._put_command = command
         self._put_transmission = radio

@@ -8,7 +8,6 @@ import pytest
 from agent.codec import encode
 from agent.free_running import FreeRunningAgent
 from agent.messages import Observation
-from agent.step_page import StepGuard
 from netem.wire.frame import Batch, Delivery, Frame, pack
 from netem.wire.latency import BINS_PER_SLOT, unpack_report
 from worldsim.scenario.file import load
@@ -45,7 +44,7 @@ def bus():
 
 @pytest.fixture
 def shell(bus):
-    return FreeRunningAgent(bus, load(WEDGE, {}).agent_setup(0, 2, 2), StepGuard(None, 0.05))
+    return FreeRunningAgent(bus, load(WEDGE, {}).agent_setup(0, 2, 2))
 
 
 def observation(slot):
