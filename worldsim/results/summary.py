@@ -63,7 +63,6 @@ class FinishedRun:
     loop: SlotLoop
     medium_counters: MediumCounters | None
     late_tick_fraction: float | None
-    late_because: str | None = None  # who but the host made ticks late
     real_time_factor: float | None  # simulated seconds in a second of wall time
     cut_off_by: str | None = None  # what ended the run before its time; None: it is complete
     failure: str | None = None  # an error during the run
