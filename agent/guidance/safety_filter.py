@@ -22,6 +22,7 @@ from agent.messages import ZERO, Vector
 SHARE = 0.18
 """Share of the gap that one vehicle of a pair may close within H: 2 * SHARE <= 1/e."""
 PASSES = 3
+LEAST_EVADING_S = 1e-9
 INNER_SHARE = 0.7
 """Share of the margin for noise within which a vehicle only flies away: noise turns the measured
 line to the other vehicle, and a speed across that line is then a speed towards it."""
@@ -51,10 +52,12 @@ class Margins(NamedTuple):
     """Measured distances may be too long by this much [m]."""
     creep: float = 0.0
     """Speed across that is always allowed [m/s]: noise must not hold a vehicle before a surface."""
-    retreat_hz: float = 0.0
-    """Speed of retreat for each metre by which something measured is too near [1/s]."""
+    retreats: bool = False
+    """Whether the vehicle retreats from what is too near, as fast as it may approach."""
     unnoticed_mps: float = 0.0
     """Speed of approach that is taken for rest [m/s]; the retreat must outrun it."""
+    evading_s: float = 0.0
+    """Time in which a vehicle evades an approaching surface; it begins so much earlier [s]."""
     latency_s: float | None = None
     """H without the braking time [s]; None: H."""
 
@@ -77,12 +80,13 @@ class RangingFilter:
         self._max_speed = max_speed
         self._inner_m = d_ob + INNER_SHARE * margins.noise_m
         margin_m = reach * reach / turning_m
-        if margins.retreat_hz > 0.0:
-            margin_m = max(margin_m, margins.unnoticed_mps / margins.retreat_hz)
+        self._rate = margins.share / horizon_s
+        if margins.retreats:
+            margin_m = max(margin_m, margins.unnoticed_mps / self._rate)
         self._stop_m = turning_m + margin_m
         self._turning_hz = max_speed / (self._stop_m - self._inner_m)
-        self._rate = margins.share / horizon_s
-        self._retreat_hz = margins.retreat_hz
+        self._evading_rate = min(self._rate, 1.0 / max(margins.evading_s, LEAST_EVADING_S))
+        self._retreats = margins.retreats
         self._creep = margins.creep
         self._ignore_m = self._stop_m + max_speed / self._rate
 
@@ -94,7 +98,7 @@ class RangingFilter:
             if r >= self._ignore_m or r == 0.0:
                 continue
             gap = r - self._stop_m
-            limit = self._rate * gap if gap > 0.0 else self._retreat_hz * gap
+            limit = self._rate * (gap if self._retreats else max(0.0, gap))
             turning = self._turning_hz * max(0.0, r - self._inner_m)
             across_limit = max(self._creep, turning) if r < self._stop_m else inf
             found.append(Bound((-x / r, -y / r, -z / r), limit, across_limit))
@@ -113,7 +117,7 @@ class RangingFilter:
         for (x, y, z), (u, v, w) in zip(points, velocities, strict=True):
             r = max(hypot(x, y, z), 1e-9)
             speed = -(x * u + y * v + z * w) / r
-            limit = self._rate * (r - self._stop_m) - speed
+            limit = self._evading_rate * (r - self._stop_m) - speed
             if speed <= 0.0:
                 found += self.bounds([(x, y, z)])
             elif limit < self._max_speed:

@@ -10,7 +10,7 @@ from math import hypot, radians
 from typing import assert_never
 
 from agent.comms.whereabouts import Whereabouts
-from agent.config import AgentSetup, VehicleKind
+from agent.config import AgentSetup, Vehicle, VehicleKind
 from agent.controller import Senses
 from agent.guidance.cone import cone_of
 from agent.guidance.evasion import evasive_velocity
@@ -37,8 +37,8 @@ from agent.guidance.sight import (
 from agent.messages import ZERO, Beacon, Record, Vector
 from agent.sensing.surface_motion import LEAST_MPS, SurfaceMotion
 
-RETREAT_HZ = 5.0
-"""Speed of retreat from a surface at rest, for each metre within the distance to keep [1/s]."""
+CLIMBS = 1.5
+"""How far a vehicle climbs out of the way of a surface, in clearances."""
 CREEP = 0.3
 """Share of its speed at which a vehicle may always fly along a surface that noise may displace."""
 
@@ -69,8 +69,9 @@ class SafetyMonitor:
             Margins(
                 share=2.0 * share,
                 noise_m=surface_margin_m(limits, sensor),
-                retreat_hz=0.0 if self._kind == "forward" else RETREAT_HZ,
+                retreats=self._kind != "forward",
                 unnoticed_mps=LEAST_MPS,
+                evading_s=_evading_s(limits, control.clearance_m),
                 creep=CREEP * limits.max_speed_mps if surface_margin_m(limits, sensor) else 0.0,
                 latency_s=self._latency_s,
             ),
@@ -161,6 +162,20 @@ class SafetyMonitor:
             for bound in bounds
             if bound.limit >= 0.0 or bound.surface_velocity == ZERO
         )
+
+
+def _evading_s(vehicle: Vehicle, clearance_m: float) -> float:
+    """Return the time that a vehicle needs to leave the way of a surface [s]; 0 for at once.
+
+    A vehicle that only flies forward climbs or sinks, over a distance of about the clearance.
+    """
+    match vehicle.kind:
+        case "forward":
+            return CLIMBS * clearance_m / min(vehicle.max_climb_mps, vehicle.max_speed_mps)
+        case "kinematic" | "accelerating":
+            return 0.0
+        case _:
+            assert_never(vehicle.kind)
 
 
 def _share_of(kind: VehicleKind) -> float:

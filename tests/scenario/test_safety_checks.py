@@ -25,6 +25,11 @@ speed_mps = {speed}
 """
 KILL = "[[event]]\nat_s = 1.0\nkill = [1]\n"
 JAM = "[[event]]\nat_s = 1.0\njam = { centre_m = [0, 0, 0], radius_m = 5 }\n"
+JOIN = """
+[[event]]
+at_s = 1.0
+join = { count = 1, start = { kind = "list", positions_m = [[3, 3, 3]] } }
+"""
 DEAF_SENSOR = '[[event]]\nat_s = 2.0\nsensor = { agents = [0], mode = "silent" }\n'
 
 
@@ -78,7 +83,10 @@ def warned(more: str = "", **keys: Any) -> list[str]:
         ),
         (MOVING.format(speed=0.3), {"vehicle__sensors": '["laser", "sonar"]'}, "obstacle[0]"),
         (MOVING.format(speed=0.3) + KILL, {}, "obstacle[0]"),
+        (MOVING.format(speed=0.3) + JOIN, {}, "obstacle[0]"),
         (JAM + DEAF_SENSOR, {}, "event[1].sensor"),
+        ("", {"expect__min_separation_m": "0.3"}, "expect.min_separation_m"),
+        (BALL, {"expect__min_obstacle_distance_m": "0.6"}, "expect.min_obstacle_distance_m"),
     ],
 )
 def test_a_scenario_beyond_the_filter_is_warned_of_by_key(

@@ -26,8 +26,8 @@ from worldsim.scenario.tables import Scenario
 
 SILENCING = (Kill, Leave, Pause, Restart, Join, Partition, Jam, Flap)
 """Faults after which an agent may be silent, or not know of another one."""
-STOPPING = (Kill, Pause, SensorFault)
-"""Faults that leave a vehicle hovering, so that it gives way to nothing."""
+STOPPING = (Kill, Pause, Restart, Join, SensorFault)
+"""Faults by which a vehicle hovers for a while or for good, so that it gives way to nothing."""
 LOSS_OF_SILENCE = 80.0
 """From this loss on, a radio is silent for seconds at a time [%]."""
 ELEVATION_DEG = 75.0
@@ -148,6 +148,26 @@ def room_for_margins(scenario: Scenario) -> Problem | None:
     )
 
 
+def expectations_within_the_filter(scenario: Scenario) -> Problem | None:
+    """Warn of distances to expect that are larger than those that the safety filter keeps."""
+    expected, control = scenario.expect, scenario.control
+    pairs = (
+        ("min_separation_m", expected.min_separation_m, "separation_m", control.separation_m),
+        (
+            "min_obstacle_distance_m",
+            expected.min_obstacle_distance_m,
+            "clearance_m",
+            control.clearance_m,
+        ),
+    )
+    for key, asked, kept_key, kept in pairs:
+        if asked is not None and asked > kept:
+            return Problem(
+                f"expect.{key}", f"{asked:g} is more than control.{kept_key} = {kept:g} keeps"
+            )
+    return None
+
+
 def obstacles_give_way(scenario: Scenario) -> Problem | None:
     """Warn of moving obstacles that vehicles cannot evade."""
     return next(_obstacles_not_evaded(scenario), None)
@@ -248,6 +268,7 @@ SAFETY_WARNINGS = (
     scanners_see_all_round,
     seen_early_enough,
     room_for_margins,
+    expectations_within_the_filter,
     obstacles_give_way,
     sensor_faults_noticed,
 )
