@@ -106,8 +106,10 @@ def _nearest(row: dict[str, Any]) -> str:
     for name in ("separation", "clearance"):
         least, bound = row[f"{name}_m"], row[f"{name}_bound_m"]
         if least is not None and least < bound:
-            when_s, agent = row[f"{name}_at"]
-            told.append(f"{name} {least:.6f} of {bound:g} m, agent {agent} at {when_s:.3f} s")
+            when_s, agent, state = row[f"{name}_at"]
+            told.append(
+                f"{name} {least:.6f} of {bound:g} m, agent {agent} ({state}) at {when_s:.3f} s"
+            )
     return "; ".join(told) or "only by the judge's figures"
 
 

@@ -29,13 +29,20 @@ class Least:
     distance_m: float = inf
     time_s: float = 0.0
     agent: int = -1
+    runs: bool = True
+    """Whether the agent ran then; one that is dead or paused cannot give way."""
 
-    def see(self, distances: Any, time_s: float) -> None:
-        """Take distances (N,) [m]; NaN where there is none."""
+    def see(self, distances: Any, time_s: float, running: Any) -> None:
+        """Take distances (N,) [m]; NaN where there is none; running: (N,)."""
         least = float(np.fmin.reduce(distances, initial=inf))
         if least < self.distance_m:
-            found = int(np.nanargmin(distances))
-            self.distance_m, self.time_s, self.agent = least, time_s, found
+            self.distance_m, self.time_s = least, time_s
+            self.agent = int(np.nanargmin(distances))
+            self.runs = bool(running[self.agent])
+
+    @property
+    def when(self) -> tuple[float, int, str]:
+        return self.time_s, self.agent, "running" if self.runs else "not running"
 
 
 @dataclass
@@ -49,14 +56,14 @@ class Measured:
     _before: Any = None
     _before_s: float = 0.0
 
-    def see(self, positions: Any, time_s: float) -> None:
+    def see(self, positions: Any, time_s: float, running: Any) -> None:
         """Take the true positions (N, 3) [m; world frame] at the start of a slot."""
-        self.separation.see(self._swept.swept(positions), time_s)
+        self.separation.see(self._swept.swept(positions), time_s, running)
         if len(self.obstacles):
             before = positions if self._before is None else self._before
             times_s = (self._before_s, time_s)
             distances = swept_obstacle_distance(before, positions, self.obstacles, times_s)
-            self.clearance.see(distances, time_s)
+            self.clearance.see(distances, time_s, running)
         self._before, self._before_s = positions.copy(), time_s
 
 
@@ -71,11 +78,11 @@ class Flown:
     separation_m: float | None
     """The least distance between two centres, exactly; None: there were never two."""
     separation_bound_m: float
-    separation_at: tuple[float, int]
-    """When it was [s; simulated time], and one of the two agents."""
+    separation_at: tuple[float, int, str]
+    """When it was [s; simulated time], one of the two agents, and whether that one ran."""
     clearance_m: float | None
     clearance_bound_m: float
-    clearance_at: tuple[float, int]
+    clearance_at: tuple[float, int, str]
     rejected: int
     """Messages that agents rejected."""
     features: list[str]
@@ -103,7 +110,7 @@ def measured(scenario: Scenario) -> Flown:
     world = fleet.loop.world
     while world.slot < scenario.slots:
         fleet.slot()
-        seen.see(world.vehicles.position, world.time_s)
+        seen.see(world.vehicles.position, world.time_s, fleet.loop.members.running)
     fleet.loop.finish()
     flight = Flight(fleet.loop, fleet.medium_counters, fleet.rejected, wall_s=1.0, cpu_s=1.0)
     return _flown(scenario, flight, seen)
@@ -119,10 +126,10 @@ def _flown(scenario: Scenario, flight: Flight, seen: Measured) -> Flown:
         broken={name: each.violations for name, each in tallies.items() if each.violations},
         separation_m=near.distance_m if near.distance_m < inf else None,
         separation_bound_m=scenario.control.separation_m,
-        separation_at=(near.time_s, near.agent),
+        separation_at=near.when,
         clearance_m=close.distance_m if close.distance_m < inf else None,
         clearance_bound_m=scenario.obstacle_bound_m,
-        clearance_at=(close.time_s, close.agent),
+        clearance_at=close.when,
         rejected=flight.rejected,
         features=features(scenario, flight),
     )
