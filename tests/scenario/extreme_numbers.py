@@ -19,7 +19,7 @@ from agent.codec import encode
 from agent.config import AgentSetup
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS, admit
 from worldsim.engine.virtual import VirtualFleet
-from worldsim.scenario.file import parse
+from worldsim.scenario.file import dump, parse
 from worldsim.scenario.rules import warnings_for
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
@@ -76,6 +76,18 @@ OBSTACLES: tuple[Data, ...] = (
         "thickness_m": 0.1,
     },
 )
+FIELDS: tuple[Data, ...] = tuple(
+    {
+        "centre_m": [20.0, 0.0, 0.0],
+        "size_m": [20.0, 20.0, 5.0],
+        "count": 3,
+        "shape": shape,
+        "radius_m": [0.3, 0.6],
+        "corridor_m": 1.7,
+        "clear_of_start_m": 1.0,
+    }
+    for shape in ("sphere", "cylinder")
+)
 EVENTS: tuple[Data, ...] = (
     {"kill": [1], "for_s": 0.2},
     {"leave": [1], "for_s": 0.2},
@@ -126,6 +138,7 @@ LINK: Data = {
 
 def base(draw: random.Random) -> Data:
     """Return a sound scenario with one of each kind of table, drawn."""
+    field = {"obstacle_field": draw.choice(FIELDS)} if draw.random() < 0.3 else {}
     queue: Data = {"name": "Q", "vertices": ["V"], "shape": deepcopy(draw.choice(SHAPES))}
     if draw.random() < 0.3:
         queue["orientation"] = {"yaw_deg": "10*d", "pitch_deg": 3.0}
@@ -177,6 +190,7 @@ def base(draw: random.Random) -> Data:
             "netem": {**LINK, "distribution": draw.choice(("uniform", "normal", "pareto"))},
             "frame": draw.choice(FRAMES),
             "obstacle": [draw.choice(OBSTACLES)],
+            **field,
             "event": [{"at_s": 0.5, **draw.choice(EVENTS)}],
             "expect": {"converge_within_s": 1.0, "reform_within_s": 1.0},
         }
@@ -212,7 +226,10 @@ def _other(draw: random.Random, value: Any) -> Any:
 
 
 def checked(data: Data) -> Scenario | None:
-    """Return the scenario as ``check`` accepts it, or None if it is refused."""
+    """Return the scenario as ``check`` accepts it, or None if it is refused.
+
+    What is accepted is accepted again as it is written into a run's folder.
+    """
     text = tomli_w.dumps(data)
     try:
         scenario = parse(text, "extreme.toml")
@@ -221,6 +238,7 @@ def checked(data: Data) -> Scenario | None:
         assert "\n" not in str(error)
         return None
     warnings_for(scenario)
+    assert parse(dump(scenario), "resolved.toml") == scenario
     return scenario
 
 

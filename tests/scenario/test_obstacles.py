@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.small_scenario import SMALL
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS, admit
 from worldsim.scenario.file import dump, load, parse
 from worldsim.scenario.obstacle_tables import Cylinder, Sphere
@@ -156,3 +157,22 @@ def test_a_flat_field_has_no_cylinders_but_may_have_spheres() -> None:
     with pytest.raises(ScenarioError, match=r"obstacle_field\.size_m\[2\]: must be above 0"):
         load(WEDGE, {"obstacle_field": flat % "cylinder"})
     assert len(load(WEDGE, {"obstacle_field": flat % "sphere"}).obstacle) == 3
+
+
+RESOLVED = {
+    "obstacle_field.size_m[2]": {"shape": "'cylinder'", "size_m": "[9, 9, 0.0001]"},
+    "obstacle_field.centre_m[0]": {"centre_m": "[1000000, 0, 0]"},
+    "obstacle_field": {"count": "1000", "size_m": "[4000, 4000, 4000]"},
+}
+
+
+@pytest.mark.parametrize(("key", "change"), RESOLVED.items(), ids=RESOLVED)
+def test_a_field_is_refused_whose_resolved_obstacles_would_be(
+    key: str, change: dict[str, str]
+) -> None:
+    sound = {"centre_m": "[20, 0, 0]", "size_m": "[9, 9, 5]", "count": "1"}
+    overrides = {f"obstacle_field.{name}": value for name, value in (sound | change).items()}
+    listed = {"obstacle": "[{ shape = 'sphere', centre_m = [9, 9, 9], radius_m = 1 }]"}
+    with pytest.raises(ScenarioError) as refused:
+        parse(SMALL, overrides=overrides | listed)
+    assert refused.value.key == key

@@ -17,7 +17,7 @@ from agent.qstructure.mission_check import MissionError, check_mission
 from worldsim.scenario.decoding import decode
 from worldsim.scenario.event_checks import FormationSource, check_timeline
 from worldsim.scenario.library import formation_from
-from worldsim.scenario.obstacle_tables import resolve_field
+from worldsim.scenario.obstacle_tables import MAX_OBSTACLES, resolve_field
 from worldsim.scenario.rules import check_rules, tilt_problem
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.target_frame import path_of
@@ -118,6 +118,9 @@ def _with_field(scenario: Scenario, file: str | Path) -> Scenario:
         key, detail = problem
         raise ScenarioError(file, f"obstacle_field.{key}", detail)
     obstacles = (*scenario.obstacle, *drawn)
+    if len(obstacles) > MAX_OBSTACLES:
+        detail = f"{len(obstacles)} obstacles with those listed; at most {MAX_OBSTACLES}"
+        raise ScenarioError(file, "obstacle_field", detail)
     return msgspec.structs.replace(scenario, obstacle=obstacles, obstacle_field=None)
 
 

@@ -13,11 +13,12 @@ import numpy as np
 from msgspec import Meta
 
 from agent.config import LEAST, Positive, Table
-from agent.messages import Position, Vector
+from agent.messages import MAX_M, Position, Vector
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.start import BoxStart, Degrees, Extent, ListStart
 
 MAX_OBSTACLES = 1000
+MAX_HEIGHT_M = 1e4
 MAX_TRIES = 2000
 """Draws for a field, besides TRIES_EACH for each obstacle, after which its box counts as full."""
 TRIES_EACH = 20
@@ -140,8 +141,12 @@ def field_problem(field: ObstacleField) -> Problem | None:
         return Problem("count", "give count or density_per_m3; one of the two")
     if field.total > MAX_OBSTACLES:
         return Problem("density_per_m3", f"{field.total} obstacles; at most {MAX_OBSTACLES}")
-    if field.shape == "cylinder" and field.size_m[2] <= 0.0:
-        return Problem("size_m[2]", "must be above 0: it is the height of the field's cylinders")
+    if field.shape == "cylinder" and not LEAST <= field.size_m[2] <= MAX_HEIGHT_M:
+        detail = "it is the height of the field's cylinders"
+        return Problem("size_m[2]", f"must be above 0, {LEAST:g} to {MAX_HEIGHT_M:g}: {detail}")
+    for axis, (centre, size) in enumerate(zip(field.centre_m, field.size_m, strict=True)):
+        if abs(centre) + 0.5 * size > MAX_M:
+            return Problem(f"centre_m[{axis}]", f"the field reaches beyond {MAX_M:g} m")
     least, largest = field.radius_m
     if least > largest:
         detail = f"[{least:g}, {largest:g}]; the least first, then the largest"
