@@ -6,13 +6,17 @@ import msgspec
 import numpy as np
 import pytest
 
+from agent.config import Comms
 from netem.link_parameters import Conditions
 from tests.recording.flights import straight_flight, wedge
 from worldsim.judge.connectivity import Connectivity, rounds_to_all
+from worldsim.judge.invariants import InvariantTally
 from worldsim.judge.radio_events import ConditionsChanged, Healed, Partitioned
-from worldsim.judge.run_events import RoleChanged, RunEvent
+from worldsim.judge.run_events import FormationGiven, RoleChanged, RunEvent
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge
+from worldsim.scenario.tables import Scenario
+from worldsim.scenario.target_frame import path_of
 
 AGENTS = 9
 DURATION_S = 30.0
@@ -130,3 +134,48 @@ def test_a_fourth_change_of_role_without_a_fault_violates_i6() -> None:
     assert judged(flight(), *flips)["I6"][1] == 1
     fault = msgspec.structs.replace(HEALED, t_s=12.5)
     assert judged(flight(), *flips[:3], fault, flips[3])["I6"][1] == 0
+
+
+def test_agents_have_time_to_act_however_fast_the_radio() -> None:
+    """A lone agent claims its first place after 1.5 s, though no news has to travel."""
+    fast = msgspec.structs.replace(wedge(1), comms=Comms(multihop_hz=100.0))
+    connectivity = Connectivity(fast)
+    assert connectivity.dissemination_s(1, 0) == 0.5
+    assert connectivity.detection_s(0) == 4.0
+    assert "I2" not in judged_until(fast, 4.9)
+
+
+def judged_until(scenario: Scenario, time_s: float) -> dict[str, InvariantTally]:
+    judge = Judge(scenario)
+    for tick in straight_flight(scenario):
+        if tick.time_s <= time_s:
+            judge.see(replace(tick, place=np.full_like(tick.place, -1)))
+    return judge.invariants()
+
+
+def test_a_mission_that_reaches_only_one_part_is_judged_there() -> None:
+    """The others still fly the mission before, and claim no place of the new one."""
+    scenario = wedge(AGENTS, DURATION_S)
+    judge, path = Judge(scenario), path_of(scenario.frame)
+    alone = Partitioned(
+        t_s=1.0, agent=None, planned=True, number=1, groups=((8,),), parted="clean", bridge=()
+    )
+    for tick in flight():
+        if tick.time_s == 1.0:
+            judge.handle_event(alone)
+            new = FormationGiven(
+                t_s=1.0,
+                agent=0,
+                planned=True,
+                formation="again",
+                mission=5,
+                path=path,
+                tables=scenario.formation,
+            )
+            judge.handle_event(new)
+        mission = tick.mission.copy()
+        mission[:8] = 5 if tick.time_s >= 1.0 else 0
+        judge.see(replace(tick, mission=mission))
+    found = judge.invariants()
+    assert found["I2"].ticks > 0
+    assert found["I2"].violations == 0

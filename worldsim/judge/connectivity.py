@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from agent.comms.gossip import LEAST_RELAYED_SILENCE_S
+from agent.guidance.slot_selection import ALONE_S
 from netem.conditions import NetworkConditions
 from netem.link import LinkModel, burst_variance_factor, unusable_share
 from netem.random_draws import MAX_QUANTILE
@@ -20,6 +22,11 @@ from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
 from worldsim.truth.vehicle import Floats
 
+LEAST_NEWS_S = 0.5
+"""However fast the radio, agents take this long to act on news: they choose at 5 Hz, and wait for
+their knowledge to settle."""
+LEAST_DETECTION_S = LEAST_RELAYED_SILENCE_S + ALONE_S
+"""The same for a loss, or for nobody to be heard at the start."""
 MAX_ROUNDS = 2000
 """More rounds count as infinitely many."""
 
@@ -95,14 +102,14 @@ class Connectivity:
         if self._network.flapping:
             return inf
         lost = self.loss if loss is None else loss
-        rounds = rounds_to_all(agents, hops, lost) * self._burst_factor
-        return rounds * self._round_s + hops * self._delay_s
+        rounds = rounds_to_all(agents, hops, lost) * self._burst_factor if hops else 0.0
+        return max(LEAST_NEWS_S, rounds * self._round_s + hops * self._delay_s)
 
     def detection_s(self, hops: int, loss: float | None = None) -> float:
         """Return T_d [s]: the team knows within this time that an agent is gone."""
         lost = self.loss if loss is None else loss
         rounds = (2 * hops + 10) / (1.0 - lost) if lost < 1.0 else inf
-        return rounds * self._round_s + hops * self._delay_s
+        return max(LEAST_DETECTION_S, rounds * self._round_s + hops * self._delay_s)
 
     def _refresh(self) -> None:
         """Derive loss, delay and cuts from the conditions and partitions in force."""

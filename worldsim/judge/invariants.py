@@ -93,8 +93,8 @@ class Invariants:
         """The rows of each component."""
         self._seen: tuple[object, ...] = ()
         self._claims: Claims = []
+        # For each agent, whether it senses every vehicle near by.
         self._senses = ["proximity" in vehicle.sensors for vehicle in scenario.vehicles]
-        """For each agent, whether it senses every vehicle near by."""
         self._blocked_last: list[frozenset[Place] | None] = []
         """For each component, the places in which others hover."""
         self._breaches: Breaches | None = None
@@ -111,6 +111,7 @@ class Invariants:
         """Changes of place of each agent since the last fault, in a quiet team."""
         self._quiet_since_s: float | None = None
         """Since when every agent is in its place in a settled team [s; simulated time]."""
+        self._before = 0, 0.0  # hops and loss before the components changed last
         self._settling_s = 0.0
         """The time in which a team settles [s]: T_d + 2B."""
         self._twice_s = 0.0
@@ -183,8 +184,11 @@ class Invariants:
         last, self._components, self._members = self._components, found, found.members()
         if last is not None and not last.same_as(found):
             self._restart_premises(tick.time_s)
-        team, (hops, loss) = int(np.count_nonzero(tick.alive)), (found.hops, found.loss)
-        self._twice_s = 2.0 * self._connectivity.dissemination_s(team, hops, loss)
+            self._before = last.hops, last.loss
+        team = int(np.count_nonzero(tick.alive))
+        self._twice_s = 2.0 * self._connectivity.dissemination_s(team, found.hops, found.loss)
+        # Agents wait for those whom they heard before as long as news may come from there.
+        hops, loss = max(found.hops, self._before[0]), max(found.loss, self._before[1])
         self._settling_s = self._connectivity.detection_s(hops, loss) + self._twice_s
 
     def _find_breaches(self, tick: Tick, phase: Phase) -> None:
@@ -193,7 +197,7 @@ class Invariants:
         blocked = [self._blocked(tick, phase, rows) for rows in members]
         seen = (
             *(rows.tobytes() for rows in (tick.place, tick.alive, tick.mission)),
-            self._components.label.tobytes() if self._components is not None else b"",
+            *self._members_key(),
             phase.mission,
             *blocked,
         )
@@ -208,11 +212,20 @@ class Invariants:
         self._breaches = self._judged(phase, blocked)
         self._shared = self._find_shared(members)
 
+    def _members_key(self) -> tuple[bytes, ...]:
+        """Return what changes with the components."""
+        if self._components is None:
+            return ()
+        return self._components.label.tobytes(), self._components.closed.tobytes()
+
     def _blocked(self, tick: Tick, phase: Phase, rows: list[int]) -> frozenset[Place] | None:
         """Return the places in which others hover, for a component.
 
-        None where it cannot know them, or where its own agent stands in such a place.
+        None where it cannot know them, where its own agent stands in such a place, or where the
+        mission has reached none of its agents.
         """
+        if not (tick.mission[rows] >= phase.mission).any():
+            return None
         if len(rows) == len(tick.alive) or self._components is None:
             return NO_PLACES
         occupied = self._hovering.occupied_places(tick, phase, rows)
@@ -228,8 +241,8 @@ class Invariants:
     def _judged(self, phase: Phase, blocked: Sequence[frozenset[Place] | None]) -> Breaches | None:
         """Return the breaches in all components of which it is clear whom their agents know.
 
-        Those are the components that hear of no other agent and can know every blocked place. None
-        where there is no such component.
+        Those are the components that hear of no other agent, and that know the mission and can
+        know every blocked place. None where there is no such component.
         """
         closed = self._components.closed.tolist() if self._components is not None else []
         found = [
