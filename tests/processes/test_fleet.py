@@ -213,7 +213,7 @@ def test_a_disk_that_fills_up_during_the_start_ends_the_run_and_leaves_no_passwo
 ) -> None:
     program = [sys.executable, "-c", FULL_FROM_THE_START]
     fleet = start(*program, "run", scenario(60.0), "--out", str(run))
-    assert fleet.status(15.0) == 1, fleet.text
+    assert fleet.status(15.0) == 3, fleet.text
     assert fleet.text.splitlines()[1:] == [f"{run}/fleet.json: no space left on device"]
     assert not (run / "users").exists()
     assert not list(run.glob("*.part"))
