@@ -47,7 +47,7 @@ LITERAL = {
     "E10 dead band": ("E10 dead band", movement, {"steer": literal.steer_in_a_pyramid}),
     "E11": ("E7", bobber_room, {"bobber": literal.bobber_never_head_on}),
     "E11 Lemma 9": ("Lemma 9", bobber_room, {"bobber": literal.bobber_never_head_on}),
-    "E13": ("E13", Queue, {"_behind": literal.members_by_chord}),
+    "E13": ("E13", Queue, {"members": literal.members_by_chord}),
     "E14": ("E14", RecordTable, {"adopt": literal.adopt_nothing}),
     "E16": ("E16", Formation, {"_holders": literal.holders_queue_by_queue}),
     "E17": ("E17", allocation, {"allocate": literal.allot_by_distance}),
