@@ -5,7 +5,7 @@ passed on.
 """
 
 from collections.abc import Sequence
-from math import inf
+from math import ceil, inf
 
 import msgspec
 
@@ -17,8 +17,9 @@ from netem.wire.channels import LOCAL, MULTIHOP, Channel
 
 REMEMBERED_BEACONS = 200
 """How many own sending times are kept, for echoes that may come."""
-MAX_ECHOES = 65
-"""Most echoes that fit a frame: a Beacon takes up to 345 B with its checksum, an echo 13 B."""
+MAX_ECHOES = 67
+"""Most echoes that fit a frame: a Beacon of few places takes up to 317 B with its checksum."""
+FEW_PLACES, PLACE_B, ECHO_B = 8, 7, 13
 
 
 class OwnState(msgspec.Struct, frozen=True, gc=False):
@@ -100,7 +101,7 @@ class Broadcast:
             rank=rank,
             cost_mm=cost_mm,
             speed_cap=own.speed_cap,
-            echoes=_echoes_of_turn(echoes, sequence),
+            echoes=_echoes_of_turn(echoes, sequence, most_echoes(len(own.blocked))),
             mission=own.mission,
             frame_key=own.frame_key,
             frame=own.frame,
@@ -133,9 +134,16 @@ class Broadcast:
         return self.sequence
 
 
-def _echoes_of_turn(echoes: tuple[tuple[int, int], ...], turn: int) -> tuple[tuple[int, int], ...]:
+def most_echoes(places: int) -> int:
+    """Return how many echoes fit a beacon that names so many blocked places."""
+    return MAX_ECHOES - ceil(max(0, places - FEW_PLACES) * PLACE_B / ECHO_B)
+
+
+def _echoes_of_turn(
+    echoes: tuple[tuple[int, int], ...], turn: int, most: int
+) -> tuple[tuple[int, int], ...]:
     """Return as many echoes as fit a beacon; if not all fit, other ones in each turn."""
-    if len(echoes) <= MAX_ECHOES:
+    if len(echoes) <= most:
         return echoes
-    start = turn * MAX_ECHOES % len(echoes)
-    return (echoes + echoes)[start : start + MAX_ECHOES]
+    start = turn * most % len(echoes)
+    return (echoes + echoes)[start : start + most]

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from agent.codec import add_checksum, decode_beacon, decode_gossip, encode
-from agent.comms.broadcast import MAX_ECHOES, Broadcast, OwnState
+from agent.comms.broadcast import Broadcast, OwnState, most_echoes
 from agent.comms.gossip import RecordTable
 from agent.comms.hierarchy import HierarchyState
 from agent.messages import FRAME_M, MAX_PLACES, Drift, Place, Pose
@@ -93,22 +93,28 @@ def test_a_beacon_fits_its_frame_with_any_number_of_neighbours(neighbours):
         payload = sender.frames(LATE_S - 60.0 + tick, EXTREME, echoes, table)[0][1]
         assert len(payload) <= MAX_PAYLOAD_B
         sent = decode_beacon(payload)
-        assert len(sent.echoes) == min(neighbours, MAX_ECHOES)
+        assert len(sent.echoes) == min(neighbours, most_echoes(MAX_PLACES))
         echoed.update(sent.echoes)
     assert echoed == set(echoes), "every neighbour is echoed in some beacon"
 
 
-def test_as_many_echoes_as_possible_fit_beside_the_greatest_numbers():
-    def size_b(echoes):
-        echoed = tuple((2**16 - 1 - k, GREATEST) for k in range(echoes))
-        payload = broadcast(incarnation=GREATEST).frames(
-            LATE_S, EXTREME, echoed, RecordTable(3, 2.0)
-        )[0][1]
-        sent = decode_beacon(payload)
-        extreme = msgspec.structs.replace(sent, id=2**16 - 1, sequence=GREATEST, echoes=echoed)
-        return len(add_checksum(encode(extreme)))
+def greatest_beacon_b(places, echoes):
+    """Return the size of a beacon of the greatest numbers [B]."""
+    echoed = tuple((2**16 - 1 - k, GREATEST) for k in range(echoes))
+    own = msgspec.structs.replace(EXTREME, blocked=(FARTHEST,) * places)
+    frames = broadcast(incarnation=GREATEST).frames(LATE_S, own, echoed, RecordTable(3, 2.0))
+    sent = decode_beacon(frames[0][1])
+    extreme = msgspec.structs.replace(sent, id=2**16 - 1, sequence=GREATEST, echoes=echoed)
+    return len(add_checksum(encode(extreme)))
 
-    assert size_b(MAX_ECHOES) <= MAX_PAYLOAD_B < size_b(MAX_ECHOES + 1)
+
+@pytest.mark.parametrize("places", range(MAX_PLACES + 1))
+def test_the_echoes_fit_beside_the_greatest_numbers(places):
+    assert greatest_beacon_b(places, most_echoes(places)) <= MAX_PAYLOAD_B
+
+
+def test_as_many_echoes_as_possible_fit_beside_eight_places():
+    assert greatest_beacon_b(8, most_echoes(8) + 1) > MAX_PAYLOAD_B
 
 
 def test_each_round_sends_the_whole_table():
