@@ -122,7 +122,10 @@ def sensor(draw: Draw, carried: set[str]) -> Tables:
         "laser": laser(draw),
         "sonar": sonar(draw),
     }
-    return {kind: table for kind, table in tables.items() if kind in carried}
+    found: Tables = {kind: table for kind, table in tables.items() if kind in carried}
+    if carried & {"laser", "sonar"} and draw.chance(0.1):
+        found["coverage"] = "planar"
+    return found
 
 
 def carried(vehicle: Tables, differing: list[Tables]) -> set[str]:
