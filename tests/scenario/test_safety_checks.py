@@ -76,6 +76,7 @@ def warned(more: str = "", **keys: Any) -> list[str]:
             "vehicle.max_speed_mps",
         ),
         (MOVING.format(speed=0.6), {}, "obstacle[0].speed_mps"),
+        (MOVING.format(speed=0.3), {"control__controller": "my:Own"}, "obstacle[0]"),
         (
             MOVING.format(speed=0.3),
             {"vehicle__kind": "forward", "vehicle__max_climb_mps": "0.2"},

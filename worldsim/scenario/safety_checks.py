@@ -196,6 +196,12 @@ def _obstacles_not_evaded(scenario: Scenario) -> Iterator[Problem]:
 
 
 def _not_evaded(scenario: Scenario, speed: float, key: str) -> Iterator[Problem]:
+    if scenario.rows > 1 and scenario.control.controller not in BUILT_IN:
+        yield Problem(
+            key,
+            "moves, and may reach a vehicle that others hold in its way: only the built-in"
+            " controllers are known to make room",
+        )
     for agent, vehicle in enumerate(scenario.vehicles):
         evading = _evading_mps(vehicle)
         if speed >= evading:
