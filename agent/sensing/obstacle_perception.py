@@ -4,6 +4,7 @@ from agent.config import SCANNERS, AgentSetup, Sensors
 from agent.messages import Observation, Vector
 from agent.sensing.point_map import PointMap
 from agent.sensing.ray_pattern import pattern_of
+from agent.sensing.scan_jumps import VehicleJumps
 from agent.sensing.sensor_health import PROXIMITY, SensorHealth
 
 
@@ -17,9 +18,12 @@ class ObstaclePerception:
         kinds = [kind for kind in SCANNERS if kind in setup.vehicle.sensors]
         patterns = [pattern_of(kind, setup.sensor, setup.tick_hz) for kind in kinds]
         self._map = PointMap(patterns) if patterns else None
-        ranging = "proximity" in setup.vehicle.sensors
+        fastest = setup.fleet_max_speed_mps
+        jumps = None
+        if "proximity" in setup.vehicle.sensors:
+            jumps = VehicleJumps(fastest, setup.sensor.proximity.noise_m)
         self.sensor_health = SensorHealth(
-            patterns, ranging, _noisy(setup.sensor), setup.tick_hz, setup.fleet_max_speed_mps
+            patterns, jumps, _noisy(setup.sensor), setup.tick_hz, fastest
         )
 
     def near_points(self, observation: Observation, others: list[Vector]) -> tuple[Vector, ...]:

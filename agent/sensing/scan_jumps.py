@@ -1,27 +1,69 @@
-"""Detection of jumping scans: most echoes at quite another distance than in the scan before.
+"""Detection of jumping sensors: most of a reading is quite elsewhere than in the one before.
 
 No vehicle is so fast, and no flight past obstacles does that to most rays at once. A sensor that
 jumps several times in a row measures nothing real.
 """
 
 from array import array
+from collections.abc import Sequence
+from math import dist, hypot
 
-from agent.messages import NO_ECHO_MM, Scan
+from agent.messages import NO_ECHO_MM, PROXIMITY_RANGE_M, Scan, Vector
 
 JUMP_MM = 1000
 MIN_ECHOES = 8
 """Scans with fewer rays that have an echo in both are not compared."""
-SCANS = 3
-"""So many jumps in a row make a sensor wrong; so many quiet scans in a row make it right again."""
+READINGS = 3
+"""So many jumps in a row make a sensor wrong; so many quiet readings make it right again."""
+SLACK_M = 0.05
 
 
-class ScanJumps:
-    """Watches the scans of one sensor; ``wrong``: whether its readings are arbitrary."""
+class _Jumps:
+    """Counts readings that jumped; ``wrong``: whether the sensor's readings are arbitrary."""
 
     def __init__(self) -> None:
         self.wrong = False
-        self._before = array("H")
         self._jumps = self._quiet = 0
+
+    def count(self, *, jumped: bool) -> None:
+        """Count a reading that could be compared with the one before."""
+        self._jumps = self._jumps + 1 if jumped else 0
+        self._quiet = 0 if jumped else self._quiet + 1
+        self.wrong = self._jumps >= READINGS or (self.wrong and self._quiet < READINGS)
+
+
+class VehicleJumps(_Jumps):
+    """Watches the vehicles that a proximity sensor reads.
+
+    max_speed: of the fleet's fastest vehicle [m/s]; noise_m: of a reading, per axis [m].
+    """
+
+    def __init__(self, max_speed: float, noise_m: float) -> None:
+        super().__init__()
+        self._closing_mps = 2.0 * max_speed
+        self._slack_m = SLACK_M + 2.0**0.5 * 6.0 * noise_m
+        self._before: Sequence[Vector] = ()
+        self._read_s = 0.0
+
+    def add(self, now_s: float, vehicles: Sequence[Vector]) -> None:
+        """Take the next reading, relative to the own centre [m; world axes].
+
+        A vehicle near the edge of the sensor's range may have come in from outside.
+        """
+        step_m = self._slack_m + self._closing_mps * (now_s - self._read_s)
+        inside = [each for each in vehicles if hypot(*each) < PROXIMITY_RANGE_M - step_m]
+        if inside:
+            new = sum(all(dist(each, old) > step_m for old in self._before) for each in inside)
+            self.count(jumped=2 * new > len(inside))
+        self._before, self._read_s = vehicles, now_s
+
+
+class ScanJumps(_Jumps):
+    """Watches the scans of one sensor."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._before = array("H")
 
     def add(self, scan: Scan) -> None:
         """Take the next scan; with too few echoes in common with the last it changes nothing."""
@@ -33,9 +75,4 @@ class ScanJumps:
         ]
         self._before = ranges
         if len(jumped) >= MIN_ECHOES:
-            self._count(jumped=2 * sum(jumped) > len(jumped))
-
-    def _count(self, *, jumped: bool) -> None:
-        self._jumps = self._jumps + 1 if jumped else 0
-        self._quiet = 0 if jumped else self._quiet + 1
-        self.wrong = self._jumps >= SCANS or (self.wrong and self._quiet < SCANS)
+            self.count(jumped=2 * sum(jumped) > len(jumped))

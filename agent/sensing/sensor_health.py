@@ -2,7 +2,7 @@
 
 Stuck: a reading stays exactly the same while the vehicle moves. Silent: due scans do not arrive.
 Silent or wrong: no vehicle is sensed where a near neighbour reports itself. Wrong: most echoes of a
-scan jump, several scans in a row.
+scan, or most sensed vehicles, jump several times in a row.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from math import dist, hypot
 
 from agent.messages import Beacon, Observation, Vector
 from agent.sensing.ray_pattern import Pattern
-from agent.sensing.scan_jumps import ScanJumps
+from agent.sensing.scan_jumps import ScanJumps, VehicleJumps
 
 MOVED_M = 0.03
 """Once a vehicle has moved this far, its reading must have changed."""
@@ -30,6 +30,8 @@ NO_READING: tuple[object, ...] = ((), (), ())
 class SensorHealth:
     """Watches one agent's sensors. max_speed: limit of the fleet's fastest vehicle [m/s].
 
+    vehicle_jumps: of the proximity sensor; None without one.
+
     noisy: sensors of which no two readings are equal. Without noise, vehicles side by side sense
     one another at the same position for ever, and so does a vehicle along a wall. Then only
     surfaces at rest prove a stuck sensor, to a vehicle that approaches or leaves them.
@@ -38,7 +40,7 @@ class SensorHealth:
     def __init__(
         self,
         patterns: Sequence[Pattern],
-        ranging: bool,
+        vehicle_jumps: VehicleJumps | None,
         noisy: frozenset[int],
         tick_hz: float,
         max_speed: float,
@@ -47,7 +49,7 @@ class SensorHealth:
         self._due_s = {p.kind: LOST_SCANS * p.every / tick_hz for p in patterns}
         self._scanned_s: dict[int, float] = {}
         self._jumps = {p.kind: ScanJumps() for p in patterns}
-        self._ranging = ranging
+        self._vehicle_jumps = vehicle_jumps
         self._max_speed = max_speed
         self._reading: tuple[object, ...] = ()
         self._read_at: Vector | None = None
@@ -60,11 +62,11 @@ class SensorHealth:
         """Take a new observation; return whether the sensors may be trusted."""
         self._update_stuck(observation)
         faulty = bool(self._due_s) and (self._is_late(observation) or self._jumped(observation))
-        return not (self._stuck or faulty or self._blind)
+        return not (self._stuck or faulty or self._vehicles_jumped(observation) or self._blind)
 
     def compare(self, observation: Observation, neighbours: Sequence[Beacon]) -> None:
         """Check that near neighbours are sensed where they report themselves."""
-        if not self._ranging:
+        if self._vehicle_jumps is None:
             return
         here = observation.position
         near = [beacon for beacon in neighbours if dist(here, beacon.position) <= NEAR_M]
@@ -129,6 +131,13 @@ class SensorHealth:
             if scan.kind in self._jumps:
                 self._jumps[scan.kind].add(scan)
         return any(jumps.wrong for jumps in self._jumps.values())
+
+    def _vehicles_jumped(self, observation: Observation) -> bool:
+        """Whether the proximity sensor jumps."""
+        if self._vehicle_jumps is None:
+            return False
+        self._vehicle_jumps.add(observation.time_s, observation.vehicles)
+        return self._vehicle_jumps.wrong
 
     def _is_missed(self, observation: Observation, beacon: Beacon) -> bool | None:
         """Whether a near neighbour is not sensed; None where its beacon is too old to tell."""

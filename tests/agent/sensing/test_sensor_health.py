@@ -8,6 +8,7 @@ import pytest
 from agent.config import Sensors
 from agent.messages import NO_ECHO_MM, Observation, Scan
 from agent.sensing.ray_pattern import pattern_of
+from agent.sensing.scan_jumps import READINGS, VehicleJumps
 from agent.sensing.sensor_health import LOOKS, PROXIMITY, SensorHealth
 from tests.agent.comms.builders import beacon
 
@@ -37,7 +38,8 @@ def observation(tick, x=0.0, vehicles=(), scans=(), obstacles=()):
 
 
 def sensor_health(patterns=(), ranging=True, noisy=(PROXIMITY, 0)):
-    return SensorHealth(patterns, ranging, frozenset(noisy), 20.0, 0.5)
+    jumps = VehicleJumps(0.5, 0.0) if ranging else None
+    return SensorHealth(patterns, jumps, frozenset(noisy), 20.0, 0.5)
 
 
 def test_an_unchanged_reading_of_a_moving_vehicle_is_distrusted_until_it_changes():
@@ -69,6 +71,38 @@ def test_without_noise_a_reading_may_stay_along_a_wall_but_not_on_approach():
     assert not all(
         towards.update(observation(tick, 0.01 * tick, obstacles=ahead)) for tick in range(8)
     )
+
+
+def anywhere(random, count):
+    return tuple(tuple(random.uniform(-1.1, 1.1) for _ in range(3)) for _ in range(count))
+
+
+@pytest.mark.parametrize("count", [1, 3, 8])
+def test_vehicles_that_leap_are_distrusted_without_any_report(count):
+    watch, random = sensor_health(), Random(count)
+    trusted = [watch.update(observation(tick, 0.0, anywhere(random, count))) for tick in range(60)]
+    assert not all(trusted[: 3 * READINGS])
+    assert sum(trusted) < 20
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_vehicles_that_fly_as_fast_as_they_can_do_not_leap(noise):
+    random, watch = Random(3), VehicleJumps(0.5, noise)
+    at = [list(each) for each in anywhere(random, 5)]
+    for tick in range(400):
+        for each in at:
+            for axis in range(3):
+                each[axis] += random.choice((-1, 1)) * 0.05 / 3**0.5
+        read = [tuple(x + random.gauss(0.0, noise) for x in each) for each in at]
+        watch.add(0.05 * tick, [each for each in read if sum(x * x for x in each) < 4.0])
+        assert not watch.wrong
+
+
+def test_vehicles_that_appear_and_vanish_are_trusted():
+    watch = sensor_health()
+    for tick in range(80):
+        there = ((1.0, 0.001 * tick, 0.0),) if tick // 10 % 2 else ()
+        assert watch.update(observation(tick, 0.0, there))
 
 
 def test_missing_scans_are_noticed():
