@@ -29,7 +29,7 @@ def evasive_velocity(
     Of the ways that retreat fast enough the first is flown: aside of a moving surface, as wanted,
     straight back.
     """
-    firm = [bound for bound in bounds if bound.limit >= 0.0]
+    firm = [_not_approached(each) for each in bounds if _is_firm(each)]
     retreats = [bound for bound in bounds if bound.limit < 0.0]
     worst = min(retreats, key=lambda bound: bound.limit)
     ways = [velocity, _scaled(max_speed, worst.away)]
@@ -37,6 +37,15 @@ def evasive_velocity(
         ways = [*_ways_aside(worst, max_speed), *ways]
     flown = [slid(saturated(slid(way, bounds), max_speed, max_climb), firm) for way in ways]
     return min(flown, key=lambda way: _shortfall(way, retreats))
+
+
+def _is_firm(bound: Bound) -> bool:
+    """Whether a bound holds in any case: no surface at rest is approached to evade another one."""
+    return bound.limit >= 0.0 or bound.surface_velocity == ZERO
+
+
+def _not_approached(bound: Bound) -> Bound:
+    return bound if bound.limit >= 0.0 else bound._replace(limit=0.0)
 
 
 def _ways_aside(retreat: Bound, max_speed: float) -> list[Vector]:

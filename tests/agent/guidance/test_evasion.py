@@ -105,3 +105,15 @@ def test_beside_a_passing_surface_it_goes_round_behind_it():
     assert approach_of(flown, retreat) == pytest.approx(-0.3)
     assert flown[0] < 0.0 < flown[1]
     assert dist(flown, (0.0, 0.0, 0.0)) == pytest.approx(1.0)
+
+
+def test_a_retreat_from_a_surface_at_rest_approaches_no_other_one():
+    random = Random(11)
+    for _ in range(300):
+        bounds = [
+            Bound(unit(random), limit)
+            for limit in (-random.uniform(0.1, 1.5), -random.uniform(0.0, 0.3), 0.2)
+        ]
+        wanted = tuple(random.uniform(-0.5, 0.5) for _ in range(3))
+        flown = evasive_velocity(wanted, bounds, 0.5, 0.5)
+        assert all(approach_of(flown, each) <= max(0.0, each.limit) + 1e-9 for each in bounds)
