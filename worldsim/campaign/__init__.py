@@ -1,1 +1,1 @@
-"""Many runs at once: seeds, spread over worker processes."""
+"""Many runs at once: seeds, each in a child process that is watched."""
