@@ -9,6 +9,9 @@ from agent.comms.unidentified_vehicles import UNIDENTIFIED_AFTER_S
 from agent.messages import Place
 from tests.recording.flights import straight_flight, wedge
 from worldsim.judge.hovering_vehicles import HoveringVehicles
+from worldsim.judge.invariants import InvariantTally
+from worldsim.judge.run_events import Killed, Restarted
+from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge
 
 SCENARIO = wedge(9)
@@ -43,3 +46,47 @@ def test_a_vehicle_that_flies_past_occupies_none(speed):
 def test_a_vehicle_hovers_only_after_some_time_in_place():
     assert occupied((0.0, 0.0, 0.0), UNIDENTIFIED_AFTER_S - 0.1) == frozenset()
     assert occupied((0.0, 0.0, 0.0), UNIDENTIFIED_AFTER_S + 0.1) == {APEX}
+
+
+KILLED_S = 10.0
+
+
+def survivor_flight(place: Place, metres: float, restarted: bool = False) -> InvariantTally:
+    """Judge I2 of two agents of which the vertex agent dies at its place, and hovers there.
+
+    The survivor claims a place from then on, and hovers so far from the dead vehicle.
+    """
+    judge = Judge(wedge(2, 30.0))
+    killed = Killed(t_s=KILLED_S, agent=0, planned=True)
+    again = Restarted(t_s=KILLED_S + 1.0, agent=1, planned=True)
+    for tick in straight_flight(wedge(2, 30.0)):
+        if tick.time_s == KILLED_S:
+            judge.handle_event(killed)
+        if restarted and tick.time_s == again.t_s:
+            judge.handle_event(again)
+        judge.see(alone(tick, place, metres) if tick.time_s >= KILLED_S else tick)
+    return judge.invariants().get("I2", InvariantTally())
+
+
+def alone(tick: Tick, place: Place, metres: float) -> Tick:
+    """Return the tick without its first agent; the second claims a place, so far from it."""
+    position = np.array([[0.0, 0.0, 0.0], [-metres, 0.0, 0.0]])
+    alive = np.array([False, True])
+    places = np.array([APEX, place], dtype=np.int16)
+    return replace(tick, position=position, alive=alive, place=places)
+
+
+def test_the_last_survivor_that_stays_in_an_occupied_place_is_judged() -> None:
+    assert survivor_flight(APEX, 0.6).violations > 100
+
+
+def test_the_last_survivor_that_takes_the_next_place_violates_nothing() -> None:
+    found = survivor_flight(Place(0, 1), 1.0)
+    assert found.ticks > 100
+    assert found.violations == 0
+
+
+def test_a_restarted_survivor_that_has_heard_nobody_is_not_judged() -> None:
+    """It has no reason to take what it senses for the vehicle of a member."""
+    before_the_death = survivor_flight(APEX, 1.9).ticks
+    assert survivor_flight(APEX, 0.6, restarted=True).ticks == before_the_death

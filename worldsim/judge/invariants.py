@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from agent.messages import Place
 from agent.qstructure.formation import NO_PLACES
 from worldsim.judge.connectivity import Components, Connectivity
-from worldsim.judge.hovering_vehicles import HoveringVehicles, seen_by
+from worldsim.judge.hovering_vehicles import HoveringVehicles, Watchers
 from worldsim.judge.phase import Phase
 from worldsim.judge.radio_events import RadioRunEvent
 from worldsim.judge.run_events import (
@@ -83,6 +83,7 @@ class Invariants:
         self.tallies = {name: InvariantTally() for name in ("I2", "I3", "I4", "I6", "I7")}
         self._connectivity = Connectivity(scenario)
         self._hovering = hovering
+        self._watchers = Watchers(["proximity" in each.sensors for each in scenario.vehicles])
         self._boot_s = scenario.fleet.boot_s
         self._fault_s = 0.0
         """When the last fault is over [s; simulated time]."""
@@ -93,8 +94,6 @@ class Invariants:
         """The rows of each component."""
         self._seen: tuple[object, ...] = ()
         self._claims: Claims = []
-        # For each agent, whether it senses every vehicle near by.
-        self._senses = ["proximity" in vehicle.sensors for vehicle in scenario.vehicles]
         self._blocked_last: list[frozenset[Place] | None] = []
         """For each component, the places in which others hover."""
         self._breaches: Breaches | None = None
@@ -127,6 +126,8 @@ class Invariants:
             case RoleChanged():
                 self._count_role_change(event)
             case Restarted() | Joined():
+                if event.agent is not None:
+                    self._watchers.restart(event.agent)
                 self._fault(event.t_s, event.t_s + self._boot_s)
             case Killed() | Left() | Paused() | Resumed() | FormationGiven() | FrameGiven():
                 self._fault(event.t_s, event.t_s)
@@ -139,6 +140,7 @@ class Invariants:
         """Evaluate a tick; in_place: whether every running agent is in its place."""
         if tick.time_s >= self._components_due_s:
             self._find_components(tick)
+        self._watchers.see(tick.position)
         last_claims = self._claims
         self._find_breaches(tick, phase)
         self.tallies["I6"].count(self._excess_role_changes)
@@ -181,6 +183,7 @@ class Invariants:
         """Find the connected components: once a second, and after each fault."""
         self._components_due_s = tick.time_s + COMPONENTS_EVERY_S
         found = self._connectivity.components(tick)
+        self._watchers.hear(found.hears)
         last, self._components, self._members = self._components, found, found.members()
         if last is not None and not last.same_as(found):
             self._restart_premises(tick.time_s)
@@ -230,8 +233,7 @@ class Invariants:
             return NO_PLACES
         occupied = self._hovering.occupied_places(tick, phase, rows)
         if occupied:
-            watchers = [row for row in rows if self._senses[row]]
-            seen = seen_by(tick.position, watchers, self._components.hears)
+            seen = self._watchers.seen_by(tick.position, rows)
             if occupied != self._hovering.occupied_places(tick, phase, rows, seen):
                 return None
             if occupied & self._hovering.held_places(tick, phase, rows):
