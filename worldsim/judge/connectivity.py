@@ -16,7 +16,7 @@ from agent.guidance.slot_selection import ALONE_S
 from netem.conditions import NetworkConditions
 from netem.link import LinkModel, burst_variance_factor, unusable_share
 from netem.random_draws import MAX_QUANTILE
-from netem.wire.channels import LOCAL, MULTIHOP
+from netem.wire.channels import CHANNELS, LOCAL, MAX_PAYLOAD_B, MULTIHOP
 from worldsim.judge.radio_events import RadioRunEvent, order_of
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
@@ -27,6 +27,8 @@ LEAST_NEWS_S = 0.5
 their knowledge to settle."""
 LEAST_DETECTION_S = LEAST_RELAYED_SILENCE_S + ALONE_S
 """The same for a loss, or for nobody to be heard at the start."""
+MAX_QUEUED_S = 0.5
+"""A frame that waits longer in its sender's queue makes news late, however slow the rate."""
 MAX_ROUNDS = 2000
 """More rounds count as infinitely many."""
 
@@ -68,6 +70,8 @@ class Connectivity:
     """The connectivity of the running agents under the radio conditions in force."""
 
     def __init__(self, scenario: Scenario) -> None:
+        self._slack_s = 2.0 / scenario.fleet.tick_hz
+        """Within this time of being due, a frame is received [s]."""
         self._round_s = 1.0 / scenario.comms.multihop_hz if scenario.comms.multihop_hz else inf
         self._rows = range(scenario.rows)
         self._network = NetworkConditions(scenario.netem)
@@ -119,6 +123,13 @@ class Connectivity:
         multihop = models.of_any_link(MULTIHOP)
         self._burst_factor = max(1.0, *map(burst_variance_factor, multihop))
         self._delay_s = max(map(_longest_delay_s, multihop))
+        links = [link for at in range(len(CHANNELS)) for link in models.of_any_link(at)]
+        queued_s = max(map(_longest_queued_s, links))
+        self.longest_s = inf
+        """The longest time that a frame is in flight where no queue grows [s]; infinite for a radio
+        without queues."""
+        if queued_s > 0.0:
+            self.longest_s = max(map(_longest_delay_s, links)) + queued_s + self._slack_s
         rows = self._rows
         cut = [[self._network.partitions(a, b) for b in rows] for a in rows]
         self._cut = np.array(cut, dtype=np.bool_)
@@ -170,6 +181,12 @@ def _longest_delay_s(model: LinkModel) -> float:
     """Return the longest delay on a link [s]."""
     widest = 1.0 if model.distribution == "uniform" else MAX_QUANTILE
     return (model.delay_ms + widest * model.jitter_ms) / 1000.0
+
+
+def _longest_queued_s(model: LinkModel) -> float:
+    """Return how long a frame may wait for others and be on the air [s]; 0 without a queue."""
+    size_bit = 8.0 * (MAX_PAYLOAD_B + model.rate_overhead_b)
+    return min(MAX_QUEUED_S, size_bit / (1000.0 * model.rate_kbit))
 
 
 def _components(linked: NDArray[np.bool_], alive: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -8,8 +8,9 @@ I4: no two agents of a component claim one place for longer than 2B.
 I6: no agent that news reaches within a bound changes its role more than 3 times after a fault.
 I7: no agent changes its place in a settled team in which every agent is in its place; where frames
 are lost, each agent may once.
-A fault is an event of the timeline, an exit, a change of the connected components, or a vehicle
-that comes to hover in a component's place or leaves it.
+A fault is an event of the timeline, an exit, a change of the connected components, a vehicle that
+comes to hover in a component's place or leaves it, or a radio whose queues cannot carry the
+traffic; while that lasts, none of the invariants is evaluated.
 """
 
 from collections import Counter
@@ -27,6 +28,7 @@ from worldsim.judge.connectivity import Components, Connectivity
 from worldsim.judge.hovering_vehicles import HoveringVehicles, Watchers
 from worldsim.judge.phase import Phase
 from worldsim.judge.radio_events import RadioRunEvent
+from worldsim.judge.radio_load import RadioLoad
 from worldsim.judge.run_events import (
     FormationGiven,
     FrameGiven,
@@ -81,7 +83,7 @@ class Invariants:
 
     def __init__(self, scenario: Scenario, hovering: HoveringVehicles) -> None:
         self.tallies = {name: InvariantTally() for name in ("I2", "I3", "I4", "I6", "I7")}
-        self._connectivity = Connectivity(scenario)
+        self._connectivity, self._load = Connectivity(scenario), RadioLoad()
         self._hovering = hovering
         self._watchers = Watchers(["proximity" in each.sensors for each in scenario.vehicles])
         self._boot_s = scenario.fleet.boot_s
@@ -143,6 +145,9 @@ class Invariants:
         self._watchers.see(tick.position)
         last_claims = self._claims
         self._find_breaches(tick, phase)
+        if self._load.is_overloaded(tick, self._connectivity.longest_s):
+            self._excuse(tick.time_s)
+            return
         self.tallies["I6"].count(self._excess_role_changes)
         self._excess_role_changes = 0
         self.tallies["I4"].count(self._count_lasting(tick.time_s))
@@ -172,6 +177,12 @@ class Invariants:
         """Start anew after a fault that begins and is over at these times [s]."""
         self._components_due_s = begins_s
         self._restart_premises(over_s)
+
+    def _excuse(self, time_s: float) -> None:
+        """Evaluate nothing at a tick at which news takes no bounded time, and start anew then."""
+        self._restart_premises(time_s)
+        self._shared_since = {}
+        self._excess_role_changes = 0
 
     def _restart_premises(self, time_s: float) -> None:
         self._fault_s = max(self._fault_s, time_s)
