@@ -207,6 +207,6 @@ def test_scenarios_stand_in_the_order_given_and_a_controller_error_is_a_row(
 def test_interrupted_runs_say_how_many_were_made(summary: Summary) -> None:
     cut: Any = {**summary, "outcome": "inconclusive", "reason": "interrupted after 2.0 s"}
     results = [Result(Path("many/small-seed1"), summary), Result(Path("many/small-seed2"), cut)]
-    lines = table(over_all(results, interrupted_of=6), Path("many")).splitlines()
+    lines = table(over_all(results, "interrupted", 6), Path("many")).splitlines()
     assert "small: 1 of 2 runs passed, 1 inconclusive" in lines
     assert lines[-1] == "inconclusive (interrupted: 2 of 6 runs made)  many/summary.json"

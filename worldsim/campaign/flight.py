@@ -44,7 +44,8 @@ def fly_in_child(scenario: Scenario, directory: RunDirectory, recording: bool, p
         pulse.note_end(str(error))
         os._exit(FAILED)
     except RunWriteError as error:
-        pulse.note_end(str(error))
+        path, reason = error.args
+        pulse.note_end(f"{path.name}: {reason}")
         return NOT_WRITTEN
     except BaseException as error:  # noqa: BLE001, RUF100 - whatever it is, the parent is told
         _lift_memory_limit()

@@ -17,6 +17,7 @@ from worldsim.campaign.flight import finished
 from worldsim.campaign.watched_flight import Job, WatchedFlight
 from worldsim.fleet.fork import adopt_orphans, children, end_orphans
 from worldsim.results.overall import FailedRun, Made, Result
+from worldsim.results.run_folder import RunDirectoryError, RunWriteError
 
 __all__ = ["FailedFlightError", "Job", "finished", "simulate", "sweep"]
 
@@ -37,10 +38,13 @@ def simulate(
     """Make one run, and write its folder. A stop request ends it early, and inconclusive.
 
     on_progress: called now and then with the simulated time [s]. Raises RunDirectoryError when the
-    folder exists or cannot be written, FailedFlightError when the run fails before its end.
+    folder exists or cannot be written, RunWriteError when the summary cannot, FailedFlightError
+    when the run fails before its end.
     """
     (made,) = _Pool([job], 1, stop, on_progress).results()
     if isinstance(made, FailedRun):
+        if made.outcome == "inconclusive":
+            raise RunWriteError(made.folder, made.error)
         raise FailedFlightError(made)
     return made
 
@@ -48,7 +52,9 @@ def simulate(
 def sweep(jobs: list[Job], workers: int, stop: StopRequest) -> Iterator[Made]:
     """Make many runs, up to ``workers`` at once; yield each result as soon as it is there.
 
-    An error fails its run alone. After a stop request no further run begins.
+    An error fails its run alone. After a stop request no further run begins. Raises
+    RunDirectoryError where the first run's folder cannot be written; where that of a later one
+    cannot, RunWriteError, once the active runs have ended.
     """
     return _Pool(jobs, workers, stop, lambda _: None).results()
 
@@ -75,6 +81,9 @@ class _Pool:
         self._flights: list[WatchedFlight] = []
         self._selector = selectors.DefaultSelector()
         self._others = children()
+        self._begun = False
+        self._lost: RunWriteError | None = None
+        """Why no further run can begin."""
 
     def results(self) -> Iterator[Made]:
         """Yield each run's result as soon as it is there."""
@@ -83,13 +92,23 @@ class _Pool:
                 while self._may_begin():
                     self._begin(self._waiting.popleft())
                 yield from self._poll()
+        if self._lost is not None:
+            raise self._lost
 
     def _may_begin(self) -> bool:
         room = len(self._flights) < self._workers
         return room and bool(self._waiting) and not self._stop.requested
 
     def _begin(self, job: Job) -> None:
-        flight = WatchedFlight(job)
+        try:
+            flight = WatchedFlight(job)
+        except RunDirectoryError as error:
+            if not self._begun:
+                raise
+            self._lost = RunWriteError(*error.args)
+            self._waiting.clear()
+            return
+        self._begun = True
         self._flights.append(flight)
         self._selector.register(flight.output, selectors.EVENT_READ, _Ready(flight, True))
         self._selector.register(flight.exit_descriptor, selectors.EVENT_READ, _Ready(flight, False))

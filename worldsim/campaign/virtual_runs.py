@@ -8,9 +8,20 @@ from worldsim.campaign.pool import Job, simulate, sweep
 from worldsim.results.exit_status import EXIT_STATUS, INTERRUPTED
 from worldsim.results.overall import Made, over_all
 from worldsim.results.progress_line import ProgressLine
-from worldsim.results.run_folder import RunDirectoryError, make_folder, write_json
+from worldsim.results.run_folder import (
+    RunDirectoryError,
+    RunWriteError,
+    make_folder,
+    room_reserved,
+    write_json,
+)
 from worldsim.results.verdict_text import table, verdict
 from worldsim.scenario.tables import Scenario
+
+ROW_B = 2048
+"""Room for a run's row in the summary over all runs [bytes]."""
+HEAD_B = 16 * 1024
+"""Room for the rest of it [bytes]."""
 
 
 def simulate_one(scenario: Scenario, out: Path | None, recording: bool) -> int:
@@ -35,6 +46,7 @@ def simulate_many(
 ) -> int:
     """Make many runs, each in its own folder within ``out``, and print a table over all.
 
+    A disk that fills up between two runs ends them; the table tells of those that were made.
     Returns the exit status. Raises RunDirectoryError, also for two runs of one name and seed.
     """
     names = [f"{scenario.name}-seed{scenario.seed}" for scenario in scenarios]
@@ -46,21 +58,27 @@ def simulate_many(
         Job(scenario, folder / name, recording)
         for scenario, name in zip(scenarios, names, strict=True)
     ]
-    with stop_requests() as stop:
-        results = _results(jobs, workers, stop)
-    overall = over_all(results, len(jobs) if stop.requested else None)
+    with stop_requests() as stop, room_reserved(folder, HEAD_B + ROW_B * len(jobs)):
+        results, lost = _results(jobs, workers, stop)
+    cut_off_by = "interrupted" if stop.requested else lost
+    overall = over_all(results, cut_off_by, len(jobs))
     write_json(folder / "summary.json", overall)
     print(table(overall, folder))
     return INTERRUPTED if stop.requested else EXIT_STATUS[overall["outcome"]]
 
 
-def _results(jobs: list[Job], workers: int, stop: StopRequest) -> list[Made]:
+def _results(jobs: list[Job], workers: int, stop: StopRequest) -> tuple[list[Made], str | None]:
+    """Return the results in the order of the jobs, and why no further run could begin."""
     line = ProgressLine()
     results: list[Made] = []
-    for result in sweep(jobs, workers, stop):
-        results.append(result)
-        passed = sum(each.outcome == "pass" for each in results)
-        line.update(f"{len(results)} of {len(jobs)} runs done, {passed} passed")
+    lost: str | None = None
+    try:
+        for result in sweep(jobs, workers, stop):
+            results.append(result)
+            passed = sum(each.outcome == "pass" for each in results)
+            line.update(f"{len(results)} of {len(jobs)} runs done, {passed} passed")
+    except RunWriteError as error:
+        lost = str(error)
     line.clear()
     order = {job.folder: index for index, job in enumerate(jobs)}
-    return sorted(results, key=lambda made: order[made.folder])
+    return sorted(results, key=lambda made: order[made.folder]), lost

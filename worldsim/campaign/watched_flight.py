@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from worldsim.campaign import fresh_flight
-from worldsim.campaign.flight import FLOWN, fly_in_child
+from worldsim.campaign.flight import FLOWN, NOT_WRITTEN, fly_in_child
 from worldsim.campaign.printed import PrintedOutput
 from worldsim.campaign.pulse import Place, Pulse, blame
 from worldsim.fleet.fork import ProcessExit, fork, reap
 from worldsim.results.overall import FailedRun, Made, Result
 from worldsim.results.run_folder import RunDirectory
-from worldsim.results.summary import Summary
+from worldsim.results.summary import Outcome, Summary
 from worldsim.scenario.tables import Scenario
 
 STEP_WITHIN_S = 10.0
@@ -93,7 +93,9 @@ class WatchedFlight:
             summary: Summary = json.loads(self._directory.summary.read_text("utf-8"))
             return Result(self._directory.path, summary)
         name, seed = self._scenario.name, self._scenario.seed
-        return FailedRun(self._directory.path, name, seed, error or self._cause(), details)
+        unwritten = self._exit == ProcessExit(None, NOT_WRITTEN) and self._pulse.ended
+        outcome: Outcome = "inconclusive" if unwritten else "fail"
+        return FailedRun(self._directory.path, name, seed, error or self._cause(), details, outcome)
 
     def kill(self) -> None:
         """End the flight at once, whatever it does."""

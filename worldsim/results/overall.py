@@ -23,18 +23,17 @@ class Result(NamedTuple):
 
 
 class FailedRun(NamedTuple):
-    """One run that an error ended, a controller's as a rule; it has no summary."""
+    """One run that an error ended, a controller's as a rule; it has no summary.
+
+    It is inconclusive where only its summary could not be written.
+    """
 
     folder: Path
     scenario: str
     seed: int
     error: str
     details: str = ""  # the traceback, where there is one
-
-    @property
-    def outcome(self) -> Outcome:
-        """The run's outcome."""
-        return "fail"
+    outcome: Outcome = "fail"
 
 
 Made = Result | FailedRun
@@ -89,23 +88,21 @@ class Overall(Provenance):
     rows: list[Row]
 
 
-def over_all(results: Iterable[Made], interrupted_of: int | None = None) -> Overall:
+def over_all(results: Iterable[Made], cut_off_by: str | None = None, asked: int = 0) -> Overall:
     """Return the summary over many runs: figures by scenario, and a row for each run, as given.
 
-    interrupted_of: number of runs that were asked for, where a stop request ended them.
+    cut_off_by: why not all of the runs that were asked for were made; None: they were.
     """
     rows = [_row(result) for result in results]
     names = list(dict.fromkeys(row["scenario"] for row in rows))
-    interrupted = interrupted_of is not None
-    outcomes = [row["outcome"] for row in rows] + ["inconclusive"] * interrupted
+    cut = cut_off_by is not None
+    outcomes = [row["outcome"] for row in rows] + ["inconclusive"] * cut
     return {
         "schema": 1,
         "mode": "virtual",
         "runs": len(rows),
         "outcome": next((bad for bad in ("fail", "inconclusive") if bad in outcomes), "pass"),
-        "reason": f"interrupted: {len(rows)} of {interrupted_of} runs made"
-        if interrupted
-        else None,
+        "reason": f"{cut_off_by}: {len(rows)} of {asked} runs made" if cut else None,
         "scenarios": [_of_scenario(name, rows) for name in names],
         "rows": rows,
         **provenance(),

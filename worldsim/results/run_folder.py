@@ -3,8 +3,8 @@
 import json
 import os
 import sys
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from shutil import rmtree
@@ -48,7 +48,6 @@ class RunDirectory:
         self.summary = path / SUMMARY_FILE
         self._events = path / "events.jsonl"
         self._events_lost = False
-        self._reserve = path / RESERVE
         self.lost: str | None = None
         """What of the results was lost first, and why; None: nothing."""
 
@@ -64,7 +63,7 @@ class RunDirectory:
             directory.logs.mkdir()
             (directory.path / "scenario.toml").write_text(dump(scenario), encoding="utf-8")
             directory._events.touch()
-            directory._keep_room()
+            _keep_room(directory.path, RESERVED_B)
         except OSError as error:
             rmtree(directory.path, ignore_errors=True)
             raise unwritable(directory.path, error) from error
@@ -98,8 +97,9 @@ class RunDirectory:
         Scenario and logs stay, for the reason. Raises RunWriteError.
         """
         try:
-            for file in (self.recording, self.summary, self._events, self._reserve):
+            for file in (self.recording, self.summary, self._events):
                 file.unlink(missing_ok=True)
+            (self.path / RESERVE).unlink(missing_ok=True)
         except OSError as error:
             raise RunWriteError(self.path, _reason(error)) from error
 
@@ -112,8 +112,7 @@ class RunDirectory:
         if self.lost is not None and summary["outcome"] == "pass":
             reason = f"results were lost: {self.lost}"
             written = {**summary, "outcome": "inconclusive", "reason": reason}
-        with suppress(OSError):
-            self._reserve.unlink(missing_ok=True)
+        _free_room(self.path)
         write_json(self.summary, written)
         return cast("Content", written)
 
@@ -123,9 +122,25 @@ class RunDirectory:
         with suppress(OSError):
             print(text, file=sys.stderr, flush=True)
 
-    def _keep_room(self) -> None:
-        with self._reserve.open("xb") as file:
-            os.posix_fallocate(file.fileno(), 0, RESERVED_B)
+
+@contextmanager
+def room_reserved(folder: Path, room_b: int) -> Iterator[None]:
+    """Keep room on the disk for a file in a new folder, until this block is left [bytes].
+
+    Where a RunDirectoryError leaves the block, nothing has been written, and the folder is removed.
+    Raises RunDirectoryError where there is no room.
+    """
+    try:
+        try:
+            _keep_room(folder, room_b)
+        except OSError as error:
+            raise unwritable(folder, error) from error
+        yield
+    except RunDirectoryError:
+        rmtree(folder, ignore_errors=True)
+        raise
+    finally:
+        _free_room(folder)
 
 
 def make_folder(path: Path | None, name: str) -> Path:
@@ -164,6 +179,16 @@ def _named_after_now(name: str) -> Path:
         count += 1
         chosen = RUNS / f"{name}-{stamp}-{count}"
     return chosen
+
+
+def _keep_room(folder: Path, room_b: int) -> None:
+    with (folder / RESERVE).open("xb") as file:
+        os.posix_fallocate(file.fileno(), 0, room_b)
+
+
+def _free_room(folder: Path) -> None:
+    with suppress(OSError):
+        (folder / RESERVE).unlink(missing_ok=True)
 
 
 def _reason(error: OSError) -> str:
