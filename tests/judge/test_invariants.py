@@ -179,3 +179,18 @@ def test_a_mission_that_reaches_only_one_part_is_judged_there() -> None:
     found = judge.invariants()
     assert found["I2"].ticks > 0
     assert found["I2"].violations == 0
+
+
+def test_agents_that_come_into_reach_are_one_component_at_once() -> None:
+    """Components are found once a second, but agents act on whom they hear meanwhile."""
+    scenario = msgspec.structs.replace(wedge(2, 14.0), netem=Conditions(range_m=1.5))
+    judge, meet_s = Judge(scenario), 12.3
+    for tick in straight_flight(scenario):
+        met = tick.time_s >= meet_s
+        flown_m = 0.2 * tick.time_s
+        position = np.array([[0.0, flown_m - 2.0, 0.0], [-1.0 if met else -4.0, 0.0, 0.0]])
+        place = np.array([(0, 0), (0, 1) if met else (0, 0)], dtype=np.int16)
+        judge.see(replace(tick, position=position, place=place))
+    found = judge.invariants()
+    assert found["I2"].ticks > 100
+    assert (found["I2"].violations, found["I3"].violations) == (0, 0)

@@ -145,6 +145,10 @@ class Invariants:
         self._watchers.see(tick.position)
         last_claims = self._claims
         self._find_breaches(tick, phase)
+        if self._is_suspect(tick.time_s, last_claims):
+            # Agents may have come into reach since the components were found, or gone out of it.
+            self._find_components(tick)
+            self._find_breaches(tick, phase)
         if self._load.is_overloaded(tick, self._connectivity.longest_s):
             self._excuse(tick.time_s)
             return
@@ -160,6 +164,13 @@ class Invariants:
     def _settled_s(self) -> float:
         """When the team must have settled after the last fault [s; simulated time]."""
         return self._fault_s + self._settling_s
+
+    def _is_suspect(self, time_s: float, last_claims: Claims) -> bool:
+        """Return whether an invariant is violated, if the components are still the same."""
+        if time_s < self._settled_s:
+            return False
+        moved = self._quiet_since_s is not None and last_claims is not self._claims
+        return moved or (self._breaches is not None and any(self._breaches))
 
     def _count_role_change(self, event: RoleChanged) -> None:
         if event.agent is not None and self._is_informed(event.agent):
