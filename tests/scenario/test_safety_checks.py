@@ -85,6 +85,7 @@ def warned(more: str = "", **keys: Any) -> list[str]:
         (MOVING.format(speed=0.3), {"vehicle__sensors": '["laser", "sonar"]'}, "obstacle[0]"),
         (MOVING.format(speed=0.3) + KILL, {}, "obstacle[0]"),
         (MOVING.format(speed=0.3) + JOIN, {}, "obstacle[0]"),
+        (MOVING.format(speed=0.3) + "from_s = 2.0\n", {}, "obstacle[0].from_s"),
         (JAM + DEAF_SENSOR, {}, "event[1].sensor"),
         ("", {"expect__min_separation_m": "0.3"}, "expect.min_separation_m"),
         (BALL, {"expect__min_obstacle_distance_m": "0.6"}, "expect.min_obstacle_distance_m"),

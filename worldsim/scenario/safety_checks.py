@@ -189,18 +189,24 @@ def sensor_faults_noticed(scenario: Scenario) -> Problem | None:
 
 def _obstacles_not_evaded(scenario: Scenario) -> Iterator[Problem]:
     for index, obstacle in enumerate(scenario.obstacle):
-        speed = _speed_mps(obstacle)
-        if speed > 0.0:
-            key = f"obstacle[{index}]"
-            yield from _not_evaded(scenario, speed, key)
+        if _speed_mps(obstacle) > 0.0:
+            yield from _not_evaded(scenario, obstacle, f"obstacle[{index}]")
 
 
-def _not_evaded(scenario: Scenario, speed: float, key: str) -> Iterator[Problem]:
+def _not_evaded(scenario: Scenario, obstacle: Obstacle, key: str) -> Iterator[Problem]:
+    speed = _speed_mps(obstacle)
     if scenario.rows > 1 and scenario.control.controller not in BUILT_IN:
         yield Problem(
             key,
             "moves, and may reach a vehicle that others hold in its way: only the built-in"
             " controllers are known to make room",
+        )
+    if _from_s(obstacle) > 0.0:
+        surprise_m = 2.0 * speed / scenario.fleet.tick_hz
+        yield Problem(
+            f"{key}.from_s",
+            f"a vehicle beside it sees it start two ticks late, when it is {surprise_m:.2g} m"
+            " nearer: clearance_m may be missed by that much",
         )
     for agent, vehicle in enumerate(scenario.vehicles):
         evading = _evading_mps(vehicle)
@@ -218,6 +224,10 @@ def _not_evaded(scenario: Scenario, speed: float, key: str) -> Iterator[Problem]
             yield Problem(
                 key, f"may hit vehicles that hover after event[{number}]: they cannot give way"
             )
+
+
+def _from_s(obstacle: Obstacle) -> float:
+    return 0.0 if isinstance(obstacle, Wall) else obstacle.from_s
 
 
 def _evading_mps(vehicle: Vehicle) -> float:
