@@ -30,6 +30,7 @@ JOIN = """
 at_s = 1.0
 join = { count = 1, start = { kind = "list", positions_m = [[3, 3, 3]] } }
 """
+DENSE = '{ kind = "box", size_m = [2, 2, 1], spacing_m = 0.3 }'
 DEAF_SENSOR = '[[event]]\nat_s = 2.0\nsensor = { agents = [0], mode = "silent" }\n'
 
 
@@ -66,6 +67,11 @@ def warned(more: str = "", **keys: Any) -> list[str]:
         ),
         (BALL, {"control__clearance_m": "2.5"}, "control.clearance_m"),
         ("", {"sensor__proximity__noise_m": "0.2"}, "sensor.proximity.noise_m"),
+        (
+            "",
+            {"fleet__start": DENSE, "sensor__proximity__noise_m": "0.05"},
+            "fleet.start",
+        ),
         (
             "",
             {
@@ -107,6 +113,7 @@ def test_a_scenario_beyond_the_filter_is_warned_of_by_key(
         (MOVING.format(speed=0.3), {}),
         (DEAF_SENSOR, {}),
         ("", {"sensor__proximity__noise_m": "0.02"}),
+        ("", {"fleet__start": DENSE}),
         ("", {"vehicle__kind": "accelerating", "vehicle__max_accel_mps2": "1.0"}),
     ],
 )

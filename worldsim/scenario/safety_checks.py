@@ -5,7 +5,9 @@ another, or come nearer to an obstacle than ``control.clearance_m``.
 """
 
 from collections.abc import Iterator
-from math import ceil, inf
+from itertools import combinations
+from math import ceil, dist, inf
+from typing import assert_never
 
 from agent.config import SCANNERS, Vehicle
 from agent.controller import BUILT_IN
@@ -22,6 +24,7 @@ from netem.link_parameters import Conditions
 from worldsim.scenario.faults import Join, Kill, Leave, Pause, Restart, SensorFault
 from worldsim.scenario.obstacle_tables import Obstacle, Wall
 from worldsim.scenario.problem import Problem
+from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.tables import Scenario
 
 SILENCING = (Kill, Leave, Pause, Restart, Join, Partition, Jam, Flap)
@@ -146,6 +149,44 @@ def room_for_margins(scenario: Scenario) -> Problem | None:
         f"{control.clearance_m:g} and a margin of {margin_m:.2g} m for noise are not seen in time:"
         f" the sensors see {_sight_m(scenario):g} m",
     )
+
+
+def starts_beyond_the_noise(scenario: Scenario) -> Problem | None:
+    """Warn of vehicles that start nearer to one another than noise lets them fly."""
+    margin_m = vehicle_margin_m(scenario.sensor)
+    ranging = any("proximity" in each.sensors for each in scenario.vehicles)
+    if margin_m == 0.0 or not ranging or scenario.rows == 1:
+        return None
+    keeps_m = scenario.control.separation_m + margin_m
+    for key, start in _starts(scenario):
+        least_m = _least_distance_m(start)
+        if least_m < keeps_m:
+            return Problem(
+                key,
+                f"vehicles start {least_m:.3g} m apart; within {keeps_m:.3g} m, for"
+                f" sensor.proximity.noise_m = {scenario.sensor.proximity.noise_m:g}, they hardly"
+                " move, and give way to nothing",
+            )
+    return None
+
+
+def _starts(scenario: Scenario) -> Iterator[tuple[str, BoxStart | ListStart]]:
+    """Yield the starts of the fleet and of those that join, with their keys."""
+    yield "fleet.start", scenario.fleet.start
+    for index, event in enumerate(scenario.event):
+        if isinstance(event.action, Join) and event.action.start is not None:
+            yield f"event[{index}].join.start", event.action.start
+
+
+def _least_distance_m(start: BoxStart | ListStart) -> float:
+    match start:
+        case BoxStart():
+            return start.spacing_m
+        case ListStart():
+            pairs = combinations(start.positions_m, 2)
+            return min((dist(here, there) for here, there in pairs), default=inf)
+        case _:
+            assert_never(start)
 
 
 def expectations_within_the_filter(scenario: Scenario) -> Problem | None:
@@ -284,6 +325,7 @@ SAFETY_WARNINGS = (
     scanners_see_all_round,
     seen_early_enough,
     room_for_margins,
+    starts_beyond_the_noise,
     expectations_within_the_filter,
     obstacles_give_way,
     sensor_faults_noticed,
