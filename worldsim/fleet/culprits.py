@@ -1,4 +1,4 @@
-"""Who is at fault: agents that end or hang by themselves, processes that are stopped, or the host.
+"""The process at fault: agents that end or hang, processes that are stopped, or the host.
 
 Agents note their steps in a shared page; /proc says what a process does. Where processes are
 started by hand there is no page, and nobody is named.
@@ -68,7 +68,7 @@ class _Process(NamedTuple):
 
 
 class Culprits:
-    """Names who is at fault; ``report`` gets a line the first time.
+    """Names the process at fault; ``report`` gets a line the first time.
 
     speed: simulated seconds in a second of wall time, 0 where time waits for all. steps: None where
     nobody can be named.

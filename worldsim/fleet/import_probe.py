@@ -22,7 +22,7 @@ SURVIVED = 77
 def import_problem(name: str) -> str | None:
     """Return how the import of a controller ends or blocks its process; None: it does neither.
 
-    An import that raises an error is left to whoever imports it for good.
+    An import that raises an error is not reported here; the flight imports it again.
     """
     if name in BUILT_IN:
         return None

@@ -217,7 +217,7 @@ class LockstepFleet:
         return self._launcher.failure
 
     def _blame(self) -> str:
-        """Return who is at fault, in brackets; nothing where that is not known."""
+        """Return the process at fault, in brackets; nothing where it is not known."""
         blamed = self._culprits.stop or self._culprits.failure
         return f" ({blamed})" if blamed else ""
 

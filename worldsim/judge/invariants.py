@@ -2,8 +2,8 @@
 
 I2: in each connected component, each vertex of the formation has exactly one agent.
 I3: in each component, the number of agents of a queue is within 1 of the queue's share.
-Premise of both: T_d + 2B have passed since the last fault, and it is clear of whom and of which
-hovering vehicles the component's agents can know.
+Premise of both: T_d + 2B have passed since the last fault, and the judge can tell which agents and
+which hovering vehicles the component's agents know.
 I4: no two agents of a component claim one place for longer than 2B.
 I6: no agent that news reaches within a bound changes its role more than 3 times after a fault.
 I7: no agent changes its place in a settled team in which every agent is in its place; where frames

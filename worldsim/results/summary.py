@@ -66,7 +66,7 @@ class FinishedRun:
     real_time_factor: float | None  # simulated seconds in a second of wall time
     cut_off_by: str | None = None  # what ended the run before its time; None: it is complete
     failure: str | None = None  # an error during the run
-    late_because: str | None = None  # who but the host made ticks late
+    late_because: str | None = None  # the process that made ticks late, if not the host
     rejected_by_world: Mapping[str, int] = field(default_factory=dict)  # messages by cause
     delivery: "DeliveryRow | None" = None  # of frames that agents used
 
