@@ -1,1 +1,1 @@
-"""Communication: neighbours, gossip, missions, hierarchy, and the allocation of places."""
+"""Communication: neighbours, gossip, missions and the hierarchy."""

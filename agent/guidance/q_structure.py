@@ -6,6 +6,7 @@ potentials (18)-(28), then move or turn. All numbers are plain floats.
 
 from math import dist, hypot, pi, radians, sqrt
 
+from agent.assignment.slot_selection import SlotSelection
 from agent.config import DEFAULT_CAST_FAR_M, AgentSetup
 from agent.controller import Intent, Senses
 from agent.guidance.bobber import bobber, cast_zone
@@ -14,7 +15,6 @@ from agent.guidance.constellation import avoidance_of
 from agent.guidance.deadlock_escape import DeadlockEscape
 from agent.guidance.movement import DEAD_BAND_MPS, saturated, steer
 from agent.guidance.potential import Potential
-from agent.guidance.slot_selection import SlotSelection
 from agent.messages import ZERO, Vector
 from agent.qstructure.target_frame import Frame
 

@@ -3,7 +3,7 @@
 from agent.config import AgentSetup
 from agent.controller import Senses
 from agent.guidance.q_structure import QStructure
-from agent.guidance.target_on_queue import OwnTarget
+from agent.places.place_points import OwnTarget
 
 
 class ByNumber:

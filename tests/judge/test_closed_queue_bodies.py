@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agent.controller import Flown
-from agent.guidance.target_on_queue import TargetOnQueue
+from agent.places.place_points import PlacePoints
 from agent.qstructure.formation import Formation
 from agent.qstructure.target_frame import Frame
 from worldsim.engine.virtual import fly
@@ -32,7 +32,7 @@ def standing(team: list[int], alive_at: int) -> Iterator[Tick]:
     dead = [row for row in range(AGENTS) if row not in team]
     bodies = [tuple(each) for each in position[dead].tolist()]
     mission = Flown(0, FORMATION, Frame())
-    blocked = TargetOnQueue(-1, SCENARIO.control.spacing_m).taken_by(mission, len(team), bodies)
+    blocked = PlacePoints(SCENARIO.control.spacing_m).taken_by(mission, len(team), bodies)
     left = FORMATION.layout(len(team), frozenset(blocked))
     for index in range(LAST):
         alive = np.ones(AGENTS, dtype=np.bool_)

@@ -7,7 +7,7 @@ place: see test_literal_forms.py.
 from math import dist, hypot
 from random import Random
 
-from agent.comms import allocation
+from agent.assignment import allocation
 from agent.controller import Peer
 from agent.guidance import potential as potential_room
 from agent.messages import Place, Vector

@@ -2,7 +2,7 @@
 
 import pytest
 
-from agent.comms import allocation
+from agent.assignment import allocation
 from agent.comms.gossip import RecordTable
 from agent.guidance import bobber as bobber_room
 from agent.guidance import movement

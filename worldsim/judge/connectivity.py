@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from agent.assignment.slot_selection import ALONE_S
 from agent.comms.gossip import LEAST_RELAYED_SILENCE_S
-from agent.guidance.slot_selection import ALONE_S
 from netem.conditions import NetworkConditions
 from netem.link import LinkModel, burst_variance_factor, unusable_share
 from netem.random_draws import MAX_QUANTILE

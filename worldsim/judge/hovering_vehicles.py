@@ -14,15 +14,13 @@ from numpy.typing import NDArray
 
 from agent.comms.unidentified_vehicles import SAME_VEHICLE_M, SURE_RANGE_M, UNIDENTIFIED_AFTER_S
 from agent.controller import Flown
-from agent.guidance.target_on_queue import TargetOnQueue
 from agent.messages import Place
+from agent.places.place_points import PlacePoints
 from agent.qstructure.formation import NO_PLACES, Layout
 from worldsim.judge.phase import Phase
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import CONVERGED_M
 from worldsim.truth.vehicle import Floats
-
-NO_AGENT = -1
 
 
 class HoveringVehicles:
@@ -32,7 +30,7 @@ class HoveringVehicles:
     """
 
     def __init__(self, spacing: float) -> None:
-        self._targets = TargetOnQueue(NO_AGENT, spacing)
+        self._targets = PlacePoints(spacing)
         self._positions: deque[tuple[float, Floats]] = deque()
 
     def see(self, tick: Tick) -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agent.comms.allocation import CONFLICT_M, HYSTERESIS_M2, allocate
+from agent.assignment.allocation import CONFLICT_M, HYSTERESIS_M2, allocate
 from tests.agent.comms.builders import peer, places
 
 coordinate = st.floats(-10.0, 10.0)

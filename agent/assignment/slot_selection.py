@@ -8,11 +8,12 @@ so a place is kept until the knowledge has settled.
 from collections.abc import Sequence
 from math import dist
 
+from agent.assignment.target_on_queue import TargetOnQueue
 from agent.config import AgentSetup
 from agent.controller import Heard, Peer, Senses
-from agent.guidance.occupied_slots import OccupiedSlots
-from agent.guidance.target_on_queue import OwnTarget, TargetOnQueue
 from agent.messages import Place
+from agent.places.occupied_slots import OccupiedSlots
+from agent.places.place_points import OwnTarget, PlacePoints
 from agent.qstructure.formation import NO_PLACES
 
 CHOICE_HZ = 5.0
@@ -37,8 +38,9 @@ class SlotSelection:
 
     def __init__(self, setup: AgentSetup) -> None:
         self.cost_m = 0.0
-        self._targets = TargetOnQueue(setup.id, setup.control.spacing_m)
-        self._occupied = OccupiedSlots(self._targets, "proximity" in setup.vehicle.sensors)
+        points = PlacePoints(setup.control.spacing_m)
+        self._targets = TargetOnQueue(setup.id, points)
+        self._occupied = OccupiedSlots(points, "proximity" in setup.vehicle.sensors)
         self._own: OwnTarget | None = None
         self._known: tuple[tuple[int, ...], frozenset[Place]] = ((), NO_PLACES)
         self._listening, self._new_at_s, self._changed_s = True, 0.0, 0.0

@@ -1,17 +1,14 @@
-"""Target-on-queue: the own slot, from the known team and its claims (Algorithm 1).
+"""Where the places of a formation are in the world, and which of them a vehicle stands in.
 
-The paper orders the agents of a queue by distance, anew each time. Here a claimed place is kept
-(E17): the assignment of :mod:`agent.comms.allocation` gives it up only for a gain beyond noise. A
-vertex shared by queues has one agent (E16); slots stand by arc length (E13).
+A vertex shared by queues is one place (E16); slots stand by arc length (E13).
 """
 
 from collections.abc import Iterable, Sequence
 from math import dist, hypot
 from typing import NamedTuple
 
-from agent.comms.allocation import own_place
 from agent.comms.unidentified_vehicles import SURE_RANGE_M
-from agent.controller import Flown, Peer
+from agent.controller import Flown
 from agent.messages import Place, Vector
 from agent.qstructure.formation import NO_PLACES, Layout, Slot
 from agent.qstructure.target_frame import Frame
@@ -25,28 +22,12 @@ class OwnTarget(NamedTuple):
     vertex: bool  # whether its holder is a queue-vertex agent
 
 
-class TargetOnQueue:
-    """Chooses an agent's place in a formation. spacing: d_ir [m]."""
+class PlacePoints:
+    """The positions of a mission's places. spacing: d_ir [m]."""
 
-    def __init__(self, own_id: int, spacing: float) -> None:
-        self._own_id = own_id
+    def __init__(self, spacing: float) -> None:
         self._blocks_within_m = 0.5 * spacing
         self._cached: tuple[Layout, Frame, list[Vector]] | None = None
-
-    def choose(
-        self, mission: Flown, team: Sequence[Peer], blocked: frozenset[Place]
-    ) -> OwnTarget | None:
-        """Return the own target; None if all queues are full.
-
-        team: all known members, the own agent included, sorted by id; blocked: the places that are
-        not available.
-        """
-        layout = mission.formation.layout(len(team), blocked)
-        points = self._points(layout, mission.frame)
-        place = own_place(self._own_id, team, layout.places, points)
-        if place is None:
-            return None
-        return OwnTarget(place=place, slot=layout.slots[place], vertex=place in layout.heads)
 
     def taken_by(
         self,
@@ -65,7 +46,7 @@ class TargetOnQueue:
         found = {*self.near_vehicles(mission, agents, reported, vehicles)}
         while True:
             layout = mission.formation.layout(agents, reported.union(found))
-            points = self._points(layout, mission.frame)
+            points = self.of_layout(layout, mission.frame)
             new = {
                 place
                 for place, point in zip(layout.places, points, strict=True)
@@ -119,8 +100,8 @@ class TargetOnQueue:
         in_sight = hypot(*away) <= SURE_RANGE_M - self._blocks_within_m
         return in_sight and all(dist(away, vehicle) > self._blocks_within_m for vehicle in near)
 
-    def _points(self, layout: Layout, frame: Frame) -> list[Vector]:
-        """Return the positions of a layout's places [m; world frame]; cached while both stay."""
+    def of_layout(self, layout: Layout, frame: Frame) -> list[Vector]:
+        """Return the positions of a layout's places [m; world frame], kept while both stay."""
         if self._cached is None or self._cached[0] is not layout or self._cached[1] is not frame:
             points = [frame.to_world(layout.slots[place].point) for place in layout.places]
             self._cached = (layout, frame, points)

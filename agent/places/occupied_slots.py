@@ -11,8 +11,8 @@ from math import dist
 
 from agent.comms.unidentified_vehicles import SAME_MEMBER_M
 from agent.controller import Peer, Senses
-from agent.guidance.target_on_queue import TargetOnQueue
 from agent.messages import MAX_PLACES, Place, Vector
+from agent.places.place_points import PlacePoints
 from agent.qstructure.formation import NO_PLACES
 
 HELD_M = 0.2
@@ -30,9 +30,9 @@ class OccupiedSlots:
     carries a sensor for vehicles.
     """
 
-    def __init__(self, targets: TargetOnQueue, senses_vehicles: bool) -> None:
+    def __init__(self, points: PlacePoints, senses_vehicles: bool) -> None:
         self.seen: tuple[Place, ...] = ()
-        self._targets = targets
+        self._points = points
         self._senses_vehicles = senses_vehicles
         self._recent: dict[Place, float] = {}
         self._agents, self._grown_s = 0, 0.0
@@ -42,7 +42,7 @@ class OccupiedSlots:
         if len(team) > self._agents:
             self._grown_s = senses.now_s
         self._agents = len(team)
-        seen = self._targets.taken_by(senses.mission, len(team), senses.silent, senses.blocked)
+        seen = self._points.taken_by(senses.mission, len(team), senses.silent, senses.blocked)
         if not (seen or senses.blocked or self._recent):
             self.seen = ()
             return NO_PLACES
@@ -58,9 +58,9 @@ class OccupiedSlots:
         if self._senses_vehicles:
             recent = [place for place in self._recent if place not in seen]
             strangers = _vehicles_without_neighbour(senses)
-            seen.update(self._targets.near_vehicles(mission, agents, recent, strangers))
+            seen.update(self._points.near_vehicles(mission, agents, recent, strangers))
             here, near = senses.position, senses.vehicles
-            reported = self._targets.plausible(mission, agents, reported, here, near)
+            reported = self._points.plausible(mission, agents, reported, here, near)
         self.seen = _first_to_fill(seen - held)
         return (reported - held).union(seen - held)
 
@@ -69,7 +69,7 @@ class OccupiedSlots:
         held = set()
         for peer in team:
             if peer.place is not None:
-                point = self._targets.point(senses.mission, len(team), peer.place)
+                point = self._points.point(senses.mission, len(team), peer.place)
                 if point is not None and dist(point, peer.position) < HELD_M:
                     held.add(peer.place)
         return held

@@ -3,9 +3,9 @@
 import msgspec
 import pytest
 
+from agent.assignment.slot_selection import ALONE_S, PATIENCE_S, SETTLED_S, SlotSelection
 from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.controller import Flown, Heard, Peer, Senses
-from agent.guidance.slot_selection import ALONE_S, PATIENCE_S, SETTLED_S, SlotSelection
 from agent.messages import Place
 from agent.qstructure.formation import Formation
 from agent.qstructure.target_frame import Frame

@@ -3,9 +3,9 @@
 import pytest
 
 from agent.controller import Flown, Peer, Senses
-from agent.guidance.occupied_slots import FREED_S, GROWN_S, OccupiedSlots
-from agent.guidance.target_on_queue import TargetOnQueue
 from agent.messages import MAX_PLACES, Place
+from agent.places.occupied_slots import FREED_S, GROWN_S, OccupiedSlots
+from agent.places.place_points import PlacePoints
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
 from agent.qstructure.target_frame import Frame
@@ -42,7 +42,7 @@ def senses(now_s, unidentified=(), vehicles=(), reported=frozenset(), at=ME.posi
 
 @pytest.fixture
 def occupied():
-    made = OccupiedSlots(TargetOnQueue(0, 1.0), senses_vehicles=True)
+    made = OccupiedSlots(PlacePoints(1.0), senses_vehicles=True)
     assert made.update(senses(START_S - GROWN_S), (ME, FAR)) == frozenset()
     return made
 
@@ -61,7 +61,7 @@ def test_places_beyond_those_that_others_report_are_examined_too(occupied):
 
 
 def test_all_seen_places_count_and_the_first_to_fill_are_reported():
-    made = OccupiedSlots(TargetOnQueue(0, 1.0), senses_vehicles=True)
+    made = OccupiedSlots(PlacePoints(1.0), senses_vehicles=True)
     team = (Peer(0, (9.0, 0.0, 0.0), None),)
     made.update(senses(START_S - GROWN_S), team)
     line = [(-float(rank), 0.0, 0.0) for rank in range(MAX_PLACES + 3)]
