@@ -16,6 +16,7 @@ Hertz = Annotated[float, Meta(ge=LEAST, le=1000)]
 FrameSpeed = Annotated[float, Meta(ge=LEAST, le=MAX_SPEED_MPS)]
 Noise = Annotated[float, Meta(ge=0, le=1)]
 VehicleKind = Literal["kinematic", "accelerating", "forward"]
+AllocationKind = Literal["structure", "assignment"]
 AvoidanceKind = Literal["constellation", "direct", "none"]
 
 
@@ -151,6 +152,8 @@ class Control(Table, frozen=True):
 
     avoidance: what leads round obstacles before the safety filter has to stop the vehicle: the bent
     lines of Algorithm 3, a direct repulsion from each near point, or only the escape manoeuvre.
+    allocation: who takes which place: "structure" by leaders, trees and neighbours; "assignment" for
+    comparison: every agent knows all members and solves for all (E24).
     clearance_m: distance from a vehicle's centre to an obstacle's surface that the safety filter
     keeps. ``cast_far_m`` left out follows from the range (Lemma 7, E20).
     """
@@ -163,6 +166,7 @@ class Control(Table, frozen=True):
     cast_near_m: Positive = 0.05
     cast_far_m: Positive | None = None
     avoidance: AvoidanceKind = "constellation"
+    allocation: AllocationKind = "structure"
 
 
 class Comms(Table, frozen=True):
@@ -192,4 +196,7 @@ class AgentSetup(Table, frozen=True):
     """Number of agents that the fleet started with; their ids are 0 to ``team`` - 1."""
     ids: Annotated[int, Meta(ge=1, le=AGENT_IDS)] = AGENT_IDS
     """Number of agent ids in use: 0 to ids - 1, joining agents included."""
+    relays: bool = True
+    """Whether it passes on a table of all members: for the assignment, and where vehicles cannot
+    sense each other."""
     lockstep: bool = False  # whether the process waits for the inbox of each of its slots

@@ -9,12 +9,13 @@ vehicle.
 from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import entry_points
+from math import inf
 from typing import NamedTuple, Protocol
 
 import msgspec
 
 from agent.config import AgentSetup
-from agent.messages import Place, Vector
+from agent.messages import MEMBER, Place, Standing, Summary, Vector
 from agent.qstructure.formation import Formation
 from agent.qstructure.target_frame import Frame
 
@@ -39,6 +40,30 @@ class Heard(msgspec.Struct, frozen=True, gc=False, order=True):
     velocity: Vector  # as reported [m/s; world frame]
     target: Vector  # its immediate target q_tg, as reported [m; world frame]
     place: Place | None  # the place that it claims
+    mission: int = 0  # key of the mission that it flies
+    cost_m: float | None = None  # see Peer
+    standing: Standing | None = None  # in the Q-structure, None where it uses none
+    hears_me: bool = False  # whether it echoed an own beacon of late
+
+
+class Link(NamedTuple):
+    """The radio as the agent measures it, over all neighbours."""
+
+    loss: float  # share of beacons lost, from gaps in their sequence
+    latency_s: float  # mean delay of beacons [s]
+    reach_m: float  # from how far a neighbour was heard at most [m]
+
+
+UNHEARD = Link(loss=0.0, latency_s=0.0, reach_m=inf)
+"""Before any neighbour was heard."""
+
+
+class HeardSummary(NamedTuple):
+    """A summary of the Q-structure, heard on the multihop channel."""
+
+    sender: int
+    stamp_s: float  # the sender's time [s]
+    summary: Summary
 
 
 class Peer(msgspec.Struct, frozen=True, gc=False, order=True):
@@ -74,8 +99,24 @@ class Senses(msgspec.Struct, frozen=True, gc=False):
     silent: tuple[Vector, ...] = ()  # unidentified vehicles [m; world frame] (E18)
     blocked: frozenset[Place] = frozenset()
     """Places that others see taken by an unidentified vehicle (E18)."""
+    link: Link = UNHEARD
+    summaries: tuple[HeardSummary, ...] = ()  # heard since the last step
     obstacles: tuple[Vector, ...] = ()
     """Near points of obstacles, relative to the own centre [m; world axes]."""
+
+
+class Words(NamedTuple):
+    """What an agent says of its part in the Q-structure."""
+
+    standing: Standing | None = None  # for the beacons
+    summary: Summary | None = None  # for the multihop channel, where one is due now
+    tier: int = -1  # in the queue's tree: 0 for its vertex agent, -1 in distress
+    parent: int = -1  # the agent that it follows, -1 for none
+    role: int = MEMBER  # index of ROLES
+
+
+NO_WORDS = Words()
+"""Of a controller without a Q-structure."""
 
 
 class Intent(msgspec.Struct, frozen=True, gc=False):
@@ -93,6 +134,7 @@ class Intent(msgspec.Struct, frozen=True, gc=False):
     """Distance to the place when it was first claimed [m]; it decides a contest."""
     vertex: bool = False  # whether the agent is a queue-vertex agent at its place
     blocked: tuple[Place, ...] = ()  # places seen taken by an unidentified vehicle (E18)
+    words: Words = NO_WORDS
 
 
 class Controller(Protocol):

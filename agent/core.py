@@ -15,7 +15,6 @@ from agent.checked_controller import CheckedController
 from agent.codec import RejectedError, decode_beacon, decode_gossip
 from agent.comms.broadcast import Broadcast, OwnState
 from agent.comms.gossip import RecordTable
-from agent.comms.hierarchy import IN_DISTRESS, Hierarchy
 from agent.comms.mission import Missions
 from agent.comms.neighbours import Neighbours
 from agent.comms.unidentified_vehicles import (
@@ -25,7 +24,7 @@ from agent.comms.unidentified_vehicles import (
     UnidentifiedVehicles,
 )
 from agent.config import AgentSetup
-from agent.controller import Intent, Peer, Senses
+from agent.controller import UNHEARD, HeardSummary, Intent, Peer, Senses
 from agent.guidance.safety_monitor import SafetyMonitor
 from agent.messages import (
     CAUSES,
@@ -46,6 +45,8 @@ from agent.sensing.obstacle_perception import ObstaclePerception
 from netem.wire import channels
 from netem.wire.channels import Channel
 
+MAX_SUMMARIES = 256
+"""Most summaries taken in one step."""
 HOUSEKEEPING_S = 0.2
 """Period of what need not be done every tick [s]."""
 IMPLAUSIBLE_SPEEDS = 4.0
@@ -84,14 +85,15 @@ class Agent:
         self._neighbours = Neighbours(setup.id, comms.local_hz, self._slack_s)
         self._table = RecordTable(setup.id, comms.multihop_hz, setup.ids)
         round_s = 1.0 / comms.multihop_hz if comms.multihop_hz > 0.0 else inf
-        self._broadcast = Broadcast(setup.id, setup.incarnation, 1.0 / comms.local_hz, round_s)
+        self._broadcast = Broadcast(
+            setup.id, setup.incarnation, 1.0 / comms.local_hz, round_s, setup.relays
+        )
         self._safety_monitor = SafetyMonitor(setup)
         self._perception = ObstaclePerception(setup)
         self._missions = Missions(
             setup.id, setup.formation, setup.control.spacing_m, setup.frame, setup.ids
         )
-        self._hierarchy = Hierarchy(setup.id)
-        self._hierarchy_state = IN_DISTRESS
+        self._summaries: list[HeardSummary] = []
         self._unidentified_vehicles = UnidentifiedVehicles(setup.fleet_max_speed_mps)
         self._unidentified: tuple[Vector, ...] = ()
         self._blocked: frozenset[Place] = frozenset()
@@ -100,6 +102,7 @@ class Agent:
         self._blocks_within_m = 0.5 * setup.control.spacing_m + SAME_VEHICLE_M
         self._housekeeping_at_s = 0.0
         self._record_age_s = 0.0
+        self._link = UNHEARD
 
     def receive(self, source: int, channel: Channel, payload: bytes, now_s: float) -> None:
         """Take a frame heard from ``source``; a rejected one is counted by its cause."""
@@ -143,9 +146,10 @@ class Agent:
             frame_key=missions.frame_key,
             frame=frame,
             drift=drift,
-            hierarchy=self._hierarchy_state,
             blocked=intent.blocked,
             cost_mm=min(round(1000.0 * intent.cost_m), MAX_COST_MM),
+            standing=intent.words.standing,
+            summary=intent.words.summary,
         )
 
     def _accept_order(self, mission: Mission) -> None:
@@ -172,6 +176,8 @@ class Agent:
         if gossip.id != source:
             raise RejectedError("spoofed", f"gossip of agent {source} with the id {gossip.id}")
         self._table.adopt(gossip, now_s, self._slack_s)
+        if gossip.summary is not None and len(self._summaries) < MAX_SUMMARIES:
+            self._summaries.append(HeardSummary(source, gossip.stamp_s, gossip.summary))
         if gossip.piece is not None:
             self._missions.receive(gossip.piece, source, now_s)
 
@@ -184,6 +190,7 @@ class Agent:
         place = self._intent.place if self._intent is not None else None
         cost_m = self._intent.cost_m if self._intent is not None else None
         own = Peer(id=self.id, position=observation.position, place=place, cost_m=cost_m)
+        summaries, self._summaries = tuple(self._summaries), []
         return Senses(
             now_s=now_s,
             position=observation.position,
@@ -195,6 +202,8 @@ class Agent:
             mission=mission,
             silent=self._unidentified,
             blocked=self._blocked,
+            link=self._link,
+            summaries=summaries,
             obstacles=self._obstacles(observation),
         )
 
@@ -228,10 +237,7 @@ class Agent:
         self._perception.sensor_health.compare(observation, beacons)
         self._neighbour_lacks_mission = self._neighbours.any_behind(self._missions.flown.key)
         self._blocked = self._table.blocked(self._missions.flown.key)
-        vertex = self._intent is not None and self._intent.vertex
-        self._hierarchy_state = self._hierarchy.update(
-            now_s, self._broadcast.sequence, vertex, self._beacons_of_own_queue()
-        )
+        self._link = self._neighbours.link(observation.position)
 
     def _reports_vehicle(self, agents: int) -> ReportsVehicle:
         """Return a function: whether a neighbour reports an unidentified vehicle at a position.
@@ -253,22 +259,6 @@ class Agent:
 
         return reports_vehicle
 
-    def _beacons_of_own_queue(self) -> list[Beacon]:
-        """Return the last beacons heard of the own queue, its vertex agents included."""
-        mission = self._missions.flown
-        if self._intent is None or self._intent.place is None:
-            return []
-        own, formation = mission.formation.queues_of(self._intent.place), mission.formation
-        return [
-            beacon
-            for beacon in self._neighbours.beacons()
-            if beacon.mission == mission.key
-            and (
-                beacon.queue in own
-                or not own.isdisjoint(formation.queues_of((beacon.queue, beacon.rank)))
-            )
-        ]
-
     def _command(self, slot: int, intent: Intent, velocity: Vector) -> Command:
         rejected = [(CAUSES.index(cause), count) for cause, count in sorted(self.rejected.items())]
         telemetry = Telemetry(
@@ -279,9 +269,9 @@ class Agent:
             heard=self._neighbours.sorted_ids[:MAX_HEARD],
             rejected=tuple(rejected),
             mission=self._missions.flown.key,
-            tier=self._hierarchy_state.tier,
-            parent=self._hierarchy_state.parent,
-            role=self._hierarchy_state.role,
+            tier=intent.words.tier,
+            parent=intent.words.parent,
+            role=intent.words.role,
             record_age_s=self._record_age_s,
         )
         return Command(

@@ -51,12 +51,19 @@ FlightPosition = tuple[FlightMetres, FlightMetres, FlightMetres]
 """Where a vehicle may be."""
 Velocity = tuple[Speed, Speed, Speed]
 Cost = Annotated[int, Meta(ge=0, le=MAX_COST_MM)]
+MAX_VERTICES = 16
+"""Most vertices of a formation whose places leaders allocate."""
+MAX_LABELS_B = 512
+"""Longest run of labels in one frame [B]."""
+Label = Annotated[int, Meta(ge=0, lt=2**16)]
+"""Age and queue of a member; see agent.structure.census."""
 MAX_PLACES = 12
 """Most occupied places in one report: with more, a whole table would not fit a transmission."""
 Places = Annotated[tuple[tuple[Index, Index], ...], Meta(max_length=MAX_PLACES)]
 """Some places, each (queue, rank)."""
 
 ROLES = ("member", "sub-vertex", "vertex", "distress")
+MEMBER, SUB_VERTEX, VERTEX, DISTRESS = range(len(ROLES))
 """Roles of an agent in its queue. A sub-vertex is a member that another agent follows."""
 
 CAUSES = (
@@ -205,6 +212,113 @@ class Command(Message, frozen=True):
     telemetry: Telemetry
 
 
+class RootKey(NamedTuple):
+    """Who leads a vertex: of two roots the lower key wins."""
+
+    cost_cm: Cost  # distance to the vertex at the election [cm]
+    id: AgentId
+
+
+class Branch(NamedTuple):
+    """An agent's position in the tree of one vertex (E15)."""
+
+    root: RootKey
+    version: Count  # the root's time as it came down the tiers [10 ms]
+    tier: Index  # 0: the root; else the parent's tier + 1; -1: in distress
+    parent: ParentId  # the agent that it follows, -1 for none
+
+
+class Swap(NamedTuple):
+    """A swap of places with another agent, proposed or agreed to."""
+
+    partner: AgentId
+    place: tuple[Index, Index]  # own, at the proposal
+    other: tuple[Index, Index]  # the partner's
+
+
+class Standing(Message, frozen=True):
+    """An agent's standing in the Q-structure: what is urgent of it, for the local channel."""
+
+    branches: Annotated[tuple[Branch | None, ...], Meta(max_length=MAX_VERTICES)]
+    """In the tree of each vertex; None where no root is known."""
+    leads: Index  # the vertex that it leads, -1 for none
+    queue: Index  # the queue that it belongs to, -1 for none
+    heard: Annotated[int, Meta(ge=0, lt=AGENT_IDS)]  # members that it hears, itself included
+    pushes: bool  # its claim comes before others', up the queue to the tail
+    proposal: Swap | None
+    reservation: Swap | None  # it took the partner's place and keeps its own for the partner
+
+
+class Order(NamedTuple):
+    """A leader's order to one agent: leave one queue for another."""
+
+    agent: AgentId
+    queue: Index  # from here
+    to: Index
+
+
+class Candidate(NamedTuple):
+    """An agent that could leave its queue for another."""
+
+    extra_dm: Annotated[int, Meta(ge=-(2**31), lt=2**31)]  # its way, less its present way [0.1 m]
+    agent: AgentId
+    to: Index
+
+
+Orders = Annotated[tuple[Order, ...], Meta(max_length=64)]
+Histogram = Annotated[bytes, Meta(min_length=0, max_length=64)]
+"""Agents by distance from the vertex, one byte a bin; see agent.structure.histogram."""
+Counts = Annotated[tuple[Annotated[int, Meta(ge=0, lt=AGENT_IDS)], ...], Meta(max_length=64)]
+
+
+class LeaderSummary(Message, frozen=True):
+    """What the leader of a vertex says of the queues that begin there; it comes down the tiers."""
+
+    root: RootKey
+    version: Count  # the leader's time at the writing [10 ms]
+    total: Annotated[int, Meta(ge=0, lt=AGENT_IDS)]  # members of the team
+    counts: Counts  # members of each queue, those in vertices apart
+    highest: Counts  # number of the last claimed place of each queue
+    histogram: Histogram
+    go: bool  # whether the counts were steady once: agents may take ranks
+    order: Count  # number of the orders
+    orders: Orders
+    blocked: Places  # places taken by unidentified vehicles, as its tree reports them (E18)
+
+
+class Subtree(Message, frozen=True):
+    """What an agent reports up the tiers: of itself and of those that follow it."""
+
+    highest: Counts
+    histogram: Histogram
+    candidates: Annotated[
+        tuple[Annotated[tuple[Candidate, ...], Meta(max_length=8)], ...], Meta(max_length=64)
+    ]
+    blocked: Places
+
+
+class TreeReport(Message, frozen=True):
+    """An agent's report on one vertex's tree."""
+
+    vertex: Annotated[int, Meta(ge=0, lt=MAX_VERTICES)]
+    tier: Index
+    parent: ParentId
+    down: LeaderSummary | None
+    up: Subtree | None
+
+
+class Summary(Message, frozen=True):
+    """What is slow of the Q-structure, for the multihop channel."""
+
+    mission: Count  # key of the mission that it is about
+    first: AgentId  # the id of the first label
+    labels: Annotated[bytes, Meta(max_length=MAX_LABELS_B)]
+    """Two bytes an id, from ``first`` on; see agent.structure.census."""
+    news: Annotated[tuple[tuple[AgentId, Label], ...], Meta(max_length=64)]
+    """Labels that changed since the sender's last frame."""
+    trees: Annotated[tuple[TreeReport, ...], Meta(max_length=MAX_VERTICES)]
+
+
 class Beacon(Message, frozen=True):
     """The local channel's broadcast (E22): heard directly, never forwarded."""
 
@@ -230,10 +344,8 @@ class Beacon(Message, frozen=True):
     still on its way."""
     frame: Pose  # of the target's frame
     drift: Drift | None  # velocity of the target's frame; None where it rests for good
-    tier: Index  # 0: queue-vertex agent; else the parent's tier + 1; -1: in distress
-    parent: ParentId  # the agent that it follows, -1 for none
-    root: Count  # the vertex agent's sequence as it came down the tiers (E15)
     blocked: Places  # places that the sender sees taken by an unidentified vehicle (E18)
+    standing: Standing | None  # in the Q-structure; None where the sender uses none
 
 
 class Record(Message, frozen=True):
@@ -264,9 +376,10 @@ class Piece(Message, frozen=True):
 
 
 class Gossip(Message, frozen=True):
-    """One frame of the multihop channel: some records of the sender's table, or a piece."""
+    """One frame of the multihop channel: records of the sender's table, a piece, or a summary."""
 
     id: AgentId  # the sender
     stamp_s: Seconds  # the sender's Observation time [s]
     records: Annotated[tuple[Record, ...], Meta(max_length=64)]
     piece: Piece | None
+    summary: Summary | None = None

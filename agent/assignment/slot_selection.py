@@ -10,8 +10,8 @@ from math import dist
 
 from agent.assignment.target_on_queue import TargetOnQueue
 from agent.config import AgentSetup
-from agent.controller import Heard, Peer, Senses
-from agent.messages import Place
+from agent.controller import Heard, Peer, Senses, Words
+from agent.messages import DISTRESS, MEMBER, VERTEX, Place
 from agent.places.occupied_slots import OccupiedSlots
 from agent.places.place_points import OwnTarget, PlacePoints
 from agent.qstructure.formation import NO_PLACES
@@ -53,12 +53,19 @@ class SlotSelection:
         """The places that the agent sees taken by an unidentified vehicle (E18)."""
         return self._occupied.seen
 
+    def words(self, _now_s: float) -> Words:
+        """Return the own role; the assignment knows no tiers."""
+        own = self._own
+        role = DISTRESS if own is None else VERTEX if own.vertex else MEMBER
+        return Words(role=role)
+
     def select(self, senses: Senses) -> OwnTarget | None:
         """Return the own target; chosen anew at 5 Hz (Algorithm 1), at once in a new mission."""
         new = senses.mission.key != self._mission_key
         if senses.now_s >= self._next_choice_s or new:
             team = senses.team()
-            blocked = self._occupied.update(senses, team)
+            holders = [(peer.place, peer.position) for peer in team]
+            blocked = self._occupied.update(senses, holders, len(team), senses.blocked)
             if not self._is_listening(senses.now_s, team, blocked):
                 self._choose(senses, team, blocked, new)
         return self._own

@@ -5,21 +5,31 @@ passed on.
 """
 
 from collections.abc import Sequence
-from math import ceil, inf
+from math import inf
 
 import msgspec
 
 from agent.codec import add_checksum, encode
 from agent.comms.gossip import RecordTable
-from agent.comms.hierarchy import IN_DISTRESS, HierarchyState
-from agent.messages import HOME, Beacon, Drift, Piece, Place, Pose, Record, Vector
+from agent.messages import (
+    HOME,
+    Beacon,
+    Drift,
+    Gossip,
+    Piece,
+    Place,
+    Pose,
+    Record,
+    Standing,
+    Summary,
+    Vector,
+)
 from netem.wire.channels import LOCAL, MULTIHOP, Channel
 
 REMEMBERED_BEACONS = 200
 """How many own sending times are kept, for echoes that may come."""
-MAX_ECHOES = 67
-"""Most echoes that fit a frame: a Beacon of few places takes up to 317 B with its checksum."""
-FEW_PLACES, PLACE_B, ECHO_B = 8, 7, 13
+MAX_ECHOES = 8
+"""Most echoes of one beacon; of more neighbours others have their turn in the next."""
 
 
 class OwnState(msgspec.Struct, frozen=True, gc=False):
@@ -34,9 +44,10 @@ class OwnState(msgspec.Struct, frozen=True, gc=False):
     frame_key: int = 0
     frame: Pose = HOME
     drift: Drift | None = None
-    hierarchy: HierarchyState = IN_DISTRESS
     blocked: tuple[Place, ...] = ()
     cost_mm: int = 0  # [mm]
+    standing: Standing | None = None
+    summary: Summary | None = None
 
     @property
     def claim(self) -> tuple[int, int, int]:
@@ -48,12 +59,19 @@ class Broadcast:
     """An agent's sending side of both channels.
 
     It numbers the beacons (``sequence``) and remembers when each was sent (``sent_s``). The periods
-    of the two channels are in [s]; infinite for a channel that is off.
+    of the two channels are in [s]; infinite for a channel that is off. relays: whether it passes
+    the table of members on.
     """
 
     def __init__(
-        self, own_id: int, incarnation: int, beacon_period_s: float, round_period_s: float
+        self,
+        own_id: int,
+        incarnation: int,
+        beacon_period_s: float,
+        round_period_s: float,
+        relays: bool = True,
     ) -> None:
+        self._relays = relays
         self._id = own_id
         self._incarnation = incarnation
         self._beacon_period_s = beacon_period_s
@@ -81,9 +99,11 @@ class Broadcast:
             frames.append((LOCAL, add_checksum(encode(self._beacon(now_s, own, echoes)))))
         if now_s >= self._next_round_s:
             self._next_round_s = now_s + self._round_period_s - 1e-9
-            frames.extend(
-                (MULTIHOP, frame) for frame in table.frames(self._record(now_s, own), pieces)
-            )
+            record = self._record(now_s, own) if self._relays else None
+            frames.extend((MULTIHOP, frame) for frame in table.frames(now_s, record, pieces))
+        if own.summary is not None and self._round_period_s < inf:
+            gossip = Gossip(self._id, now_s, records=(), piece=None, summary=own.summary)
+            frames.append((MULTIHOP, add_checksum(encode(gossip))))
         return tuple(frames)
 
     def _beacon(self, now_s: float, own: OwnState, echoes: tuple[tuple[int, int], ...]) -> Beacon:
@@ -101,15 +121,13 @@ class Broadcast:
             rank=rank,
             cost_mm=cost_mm,
             speed_cap=own.speed_cap,
-            echoes=_echoes_of_turn(echoes, sequence, most_echoes(len(own.blocked))),
+            echoes=_echoes_of_turn(echoes, sequence),
             mission=own.mission,
             frame_key=own.frame_key,
             frame=own.frame,
             drift=own.drift,
-            tier=own.hierarchy.tier,
-            parent=own.hierarchy.parent,
-            root=own.hierarchy.root,
             blocked=own.blocked,
+            standing=own.standing,
         )
 
     def _record(self, now_s: float, own: OwnState) -> Record:
@@ -134,16 +152,9 @@ class Broadcast:
         return self.sequence
 
 
-def most_echoes(places: int) -> int:
-    """Return how many echoes fit a beacon that names so many blocked places."""
-    return MAX_ECHOES - ceil(max(0, places - FEW_PLACES) * PLACE_B / ECHO_B)
-
-
-def _echoes_of_turn(
-    echoes: tuple[tuple[int, int], ...], turn: int, most: int
-) -> tuple[tuple[int, int], ...]:
-    """Return as many echoes as fit a beacon; if not all fit, other ones in each turn."""
-    if len(echoes) <= most:
+def _echoes_of_turn(echoes: tuple[tuple[int, int], ...], turn: int) -> tuple[tuple[int, int], ...]:
+    """Return the echoes of one beacon; if there are more, other ones in each turn."""
+    if len(echoes) <= MAX_ECHOES:
         return echoes
-    start = turn * most % len(echoes)
-    return (echoes + echoes)[start : start + most]
+    start = turn * MAX_ECHOES % len(echoes)
+    return (echoes + echoes)[start : start + MAX_ECHOES]

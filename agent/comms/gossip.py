@@ -138,21 +138,24 @@ class RecordTable:
         ]
         return frozenset(Place(*place) for newest in reports for place in newest.blocked)
 
-    def frames(self, own: Record, pieces: Sequence[Piece] = ()) -> list[bytes]:
+    def frames(self, now_s: float, own: Record | None, pieces: Sequence[Piece] = ()) -> list[bytes]:
         """Return the payloads of one round: the whole table, the own record first.
 
-        pieces: of a mission that a neighbour lacks; each travels in a frame of its own.
+        own: None where the table is not passed on. pieces: of a mission that a neighbour lacks; each travels in a frame of its own.
         """
-        records = [own, *(_record_of(self._newest[each]) for each in sorted(self._newest))]
         frames = [
-            Gossip(id=self._own_id, stamp_s=own.stamp_s, records=chunk, piece=None)
-            for chunk in _chunks(records)
+            Gossip(id=self._own_id, stamp_s=now_s, records=chunk, piece=None)
+            for chunk in self._chunks(own)
         ]
         frames += [
-            Gossip(id=self._own_id, stamp_s=own.stamp_s, records=(), piece=piece)
-            for piece in pieces
+            Gossip(id=self._own_id, stamp_s=now_s, records=(), piece=piece) for piece in pieces
         ]
         return [add_checksum(encode(gossip)) for gossip in frames]
+
+    def _chunks(self, own: Record | None) -> Iterator[tuple[Record, ...]]:
+        if own is None:
+            return iter(())
+        return _chunks([own, *(_record_of(self._newest[each]) for each in sorted(self._newest))])
 
     def _may_know(self, subject: int) -> bool:
         """Whether a subject is known, or another agent of the run for which there is room."""

@@ -5,12 +5,12 @@ never read.
 """
 
 from collections.abc import Collection
-from math import inf, log
+from math import dist, inf, log
 from typing import NamedTuple
 
 from agent.codec import RejectedError
-from agent.controller import Heard
-from agent.messages import Beacon, Place
+from agent.controller import UNHEARD, Heard, Link
+from agent.messages import Beacon, Place, Vector
 
 MAX_AGE_S = 5.0
 """An older beacon is rejected."""
@@ -23,6 +23,10 @@ LOG_FALSE_ALARM = log(1e-6)
 """Logarithm of the probability that chance alone makes a silence of T_lost (E17)."""
 HEARD_BY_OTHERS = 0.25
 """Share of T_lost by which others may hear a departing agent's last beacon later."""
+POOLED = 0.005
+"""Weight of one beacon in the radio's quality: it follows from the last 200 beacons or so."""
+ECHO_LASTS_S = 3.0
+"""A neighbour that echoed a beacon hears this agent for so long."""
 SMOOTHING = 0.05
 MARGIN = 1.2
 """The loss is estimated from the last 39 gaps or so: n (1e6^(1/n) - 1) / ln 1e6 at n = 39."""
@@ -50,10 +54,38 @@ NEVER_HEARD = Version(-inf, -1, -1)
 """Of a sender not heard so far: older than any."""
 
 
+class LinkQuality:
+    """The radio's quality, pooled over all neighbours, so that it is known within a second."""
+
+    def __init__(self) -> None:
+        self._beacons = self._sent = self._latency_s = 0.0
+        self._reach_m = 0.0
+
+    def note(self, gap: float, latency_s: float) -> None:
+        """Note a beacon heard. gap: beacons that its sender has sent since the last one heard."""
+        self._beacons += 1.0 - POOLED * self._beacons
+        self._sent += gap - POOLED * self._sent
+        self._latency_s += latency_s - POOLED * self._latency_s
+
+    def note_distance(self, away_m: float) -> None:
+        """Note from how far a neighbour was heard [m]."""
+        self._reach_m = max(self._reach_m, away_m)
+
+    def link(self) -> Link:
+        """Return the quality now."""
+        if self._beacons == 0.0:
+            return UNHEARD
+        return Link(
+            loss=max(0.0, 1.0 - self._beacons / self._sent),
+            latency_s=self._latency_s / self._beacons,
+            reach_m=self._reach_m,
+        )
+
+
 class Neighbour:
     """One neighbour: its last beacon, and the radio's quality estimated from its sequence."""
 
-    __slots__ = ("beacon", "latency_s", "mean_gap", "place", "version")
+    __slots__ = ("beacon", "echoed_s", "latency_s", "mean_gap", "place", "version")
 
     def __init__(self, beacon: Beacon, latency_s: float) -> None:
         self.beacon = beacon
@@ -61,10 +93,16 @@ class Neighbour:
         self.latency_s = latency_s
         self.mean_gap = 1.0
         self.place = _claimed_place(beacon)
+        self.echoed_s = -inf
+        """When it last echoed an own beacon [s]."""
 
-    def update(self, beacon: Beacon, version: Version, latency_s: float, beacon_hz: float) -> None:
-        """Take a newer beacon. latency_s: its delay [s]; beacon_hz: the expected rate [Hz]."""
+    def update(self, beacon: Beacon, version: Version, latency_s: float, beacon_hz: float) -> float:
+        """Take a newer beacon; return how many the sender has sent since the last one.
+
+        latency_s: its delay [s]; beacon_hz: the expected rate [Hz].
+        """
         before, self.version = self.beacon, version
+        gap = 1.0
         if beacon.incarnation == before.incarnation:
             # An invented sequence must not make a long silence seem likely.
             most = 2.0 + 2.0 * (beacon.stamp_s - before.stamp_s) * beacon_hz
@@ -74,6 +112,7 @@ class Neighbour:
         if beacon.rank != before.rank or beacon.queue != before.queue:
             self.place = _claimed_place(beacon)
         self.beacon = beacon
+        return gap
 
     def silence_s(self, beacon_hz: float) -> float:
         """Return T_lost of E17 [s]: after a longer silence the neighbour counts as gone.
@@ -100,6 +139,7 @@ class Neighbours:
         self._in_order: list[Neighbour] = []
         self.sorted_ids: tuple[int, ...] = ()
         self._last: dict[int, Version] = {}
+        self._quality = LinkQuality()
 
     def receive(self, beacon: Beacon, now_s: float, own_sent_s: dict[int, float]) -> None:
         """Take a beacon, or raise RejectedError for a replay or an implausible stamp.
@@ -124,10 +164,20 @@ class Neighbours:
             raise RejectedError("offset", "the stamp is older than a beacon that it echoes")
         latency_s = age_s if age_s > 0.0 else 0.0
         if known is not None:
-            known.update(beacon, version, latency_s, self._beacon_hz)
+            gap = known.update(beacon, version, latency_s, self._beacon_hz)
         else:
-            self._known[sender] = Neighbour(beacon, latency_s)
+            gap, known = 1.0, Neighbour(beacon, latency_s)
+            self._known[sender] = known
             self._put_in_order()
+        self._quality.note(gap, latency_s)
+        if any(echoed == self._own_id for echoed, _ in beacon.echoes):
+            known.echoed_s = beacon.stamp_s
+
+    def link(self, here: Vector) -> Link:
+        """Return the radio's quality as measured. here: own position [m; world frame]."""
+        for known in self._in_order:
+            self._quality.note_distance(dist(here, known.beacon.position))
+        return self._quality.link()
 
     def _contradicts_echo(self, beacon: Beacon, own_sent_s: dict[int, float]) -> bool:
         """Whether a beacon echoes an own beacon that was sent after its stamp."""
@@ -186,6 +236,10 @@ class Neighbours:
                     velocity=velocity,
                     target=beacon.target,
                     place=place,
+                    mission=beacon.mission,
+                    cost_m=beacon.cost_mm / 1000.0,
+                    standing=beacon.standing,
+                    hears_me=now_s - known.echoed_s <= ECHO_LASTS_S,
                 )
             )
         return tuple(heard)
@@ -212,4 +266,4 @@ def _version_of(beacon: Beacon) -> Version:
 
 
 def _claimed_place(beacon: Beacon) -> Place | None:
-    return Place(beacon.queue, beacon.rank) if beacon.queue >= 0 else None
+    return Place(beacon.queue, beacon.rank) if beacon.queue >= 0 and beacon.rank >= 0 else None

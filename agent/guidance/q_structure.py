@@ -6,7 +6,6 @@ potentials (18)-(28), then move or turn. All numbers are plain floats.
 
 from math import dist, hypot, pi, radians, sqrt
 
-from agent.assignment.slot_selection import SlotSelection
 from agent.config import DEFAULT_CAST_FAR_M, AgentSetup
 from agent.controller import Intent, Senses
 from agent.guidance.bobber import bobber, cast_zone
@@ -14,6 +13,7 @@ from agent.guidance.cone import azimuth_error, cone_of
 from agent.guidance.constellation import avoidance_of
 from agent.guidance.deadlock_escape import DeadlockEscape
 from agent.guidance.movement import DEAD_BAND_MPS, saturated, steer
+from agent.guidance.place_selection import place_selection
 from agent.guidance.potential import Potential
 from agent.messages import ZERO, Vector
 from agent.qstructure.target_frame import Frame
@@ -39,13 +39,13 @@ class QStructure:
             radians(vehicle.max_yaw_rate_dps),
         )
         self._potential = Potential(control.separation_m)
-        self._slot_selection = SlotSelection(setup)
+        self._places = place_selection(setup)
         self._avoidance = avoidance_of(control.avoidance, control.safety_m)
         self._escape = DeadlockEscape(setup.id)
 
     def decide(self, senses: Senses) -> Intent:
         """Return the intent; an agent without a place stays where it is and gives way."""
-        q, own, frame = senses.position, self._slot_selection.select(senses), senses.mission.frame
+        q, own, frame = senses.position, self._places.select(senses), senses.mission.frame
         q_toq = frame.to_world(own.slot.point) if own is not None else q
         q_tg = bobber(q, senses.yaw, _aim_point(q_toq, frame), self._zone)
         x, y, z = self._potential.omega(q, q_tg, senses.neighbours)
@@ -69,9 +69,10 @@ class QStructure:
             target=q_toq if own is not None else None,
             place=own.place if own is not None else None,
             tilt=tilt,
-            cost_m=self._slot_selection.cost_m,
+            cost_m=self._places.cost_m,
             vertex=own is not None and own.vertex,
-            blocked=self._slot_selection.blocked,
+            blocked=self._places.blocked,
+            words=self._places.words(senses.now_s),
         )
 
     def _obstacle_term(self, senses: Senses) -> Vector:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from math import dist
 
 from agent.comms.unidentified_vehicles import SAME_MEMBER_M
-from agent.controller import Peer, Senses
+from agent.controller import Senses
 from agent.messages import MAX_PLACES, Place, Vector
 from agent.places.place_points import PlacePoints
 from agent.qstructure.formation import NO_PLACES
@@ -21,6 +21,9 @@ FREED_S = 1.0
 """How long a place that a vehicle has left stays unavailable."""
 GROWN_S = 1.0
 """How long blocked places are not remembered after the team has grown."""
+
+Holder = tuple[Place | None, Vector]
+"""A member's claimed place and its position [m; world frame]."""
 
 
 class OccupiedSlots:
@@ -37,23 +40,36 @@ class OccupiedSlots:
         self._recent: dict[Place, float] = {}
         self._agents, self._grown_s = 0, 0.0
 
-    def update(self, senses: Senses, team: Sequence[Peer]) -> frozenset[Place]:
-        """Return the places that are not available, by own sight and by others' reports."""
-        if len(team) > self._agents:
+    def update(
+        self,
+        senses: Senses,
+        holders: Sequence[Holder],
+        agents: int,
+        reported: frozenset[Place],
+    ) -> frozenset[Place]:
+        """Return the places that are not available, by own sight and by others' reports.
+
+        holders: the known members; agents: size of the team; reported: places that others see taken.
+        """
+        if agents > self._agents:
             self._grown_s = senses.now_s
-        self._agents = len(team)
-        seen = self._points.taken_by(senses.mission, len(team), senses.silent, senses.blocked)
-        if not (seen or senses.blocked or self._recent):
+        self._agents = agents
+        seen = self._points.taken_by(senses.mission, agents, senses.silent, reported)
+        if not (seen or reported or self._recent):
             self.seen = ()
             return NO_PLACES
-        return self._with_recent(senses.now_s, self._occupied(senses, team, seen))
+        return self._with_recent(senses.now_s, self._occupied(senses, holders, reported, seen))
 
     def _occupied(
-        self, senses: Senses, team: Sequence[Peer], silent: frozenset[Place]
+        self,
+        senses: Senses,
+        holders: Sequence[Holder],
+        reported: frozenset[Place],
+        silent: frozenset[Place],
     ) -> frozenset[Place]:
         """Return the places that are occupied now; silent: by unidentified vehicles."""
-        mission, agents, reported = senses.mission, len(team), senses.blocked
-        held = self._held(senses, team)
+        mission, agents = senses.mission, self._agents
+        held = self._held(senses, holders)
         seen = {*silent}
         if self._senses_vehicles:
             recent = [place for place in self._recent if place not in seen]
@@ -64,14 +80,14 @@ class OccupiedSlots:
         self.seen = _first_to_fill(seen - held)
         return (reported - held).union(seen - held)
 
-    def _held(self, senses: Senses, team: Sequence[Peer]) -> set[Place]:
+    def _held(self, senses: Senses, holders: Sequence[Holder]) -> set[Place]:
         """Return the places in which the agents that claim them stand."""
         held = set()
-        for peer in team:
-            if peer.place is not None:
-                point = self._points.point(senses.mission, len(team), peer.place)
-                if point is not None and dist(point, peer.position) < HELD_M:
-                    held.add(peer.place)
+        for place, position in holders:
+            if place is not None:
+                point = self._points.point(senses.mission, self._agents, place)
+                if point is not None and dist(point, position) < HELD_M:
+                    held.add(place)
         return held
 
     def _with_recent(self, now_s: float, blocked: frozenset[Place]) -> frozenset[Place]:

@@ -17,7 +17,7 @@ from agent.qstructure.target_frame import Frame
 class OwnTarget(NamedTuple):
     """An agent's place and its slot."""
 
-    place: Place
+    place: Place | None  # None where the agent waits by a slot without claiming it
     slot: Slot  # [m, rad; target's frame]
     vertex: bool  # whether its holder is a queue-vertex agent
 

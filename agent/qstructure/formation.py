@@ -99,11 +99,15 @@ class Formation:
         queue = self.queues[place.queue]
         if queue.closed or queue.usable(place.rank) < place.rank:
             return None
-        return self._slot(place.queue, queue.behind(place.rank))
+        return self.slot_at(place.queue, queue.behind(place.rank))
 
     def queues_of(self, place: Place | tuple[int, int]) -> frozenset[int]:
         """Return the queues that a place belongs to; for a vertex, all that pass through it."""
         return self._queues_of_vertex.get(place) or frozenset(place[:1])
+
+    def first_vertex_of(self, queue: int) -> str:
+        """Return the name of a queue's first vertex."""
+        return self._vertices_of[queue][0]
 
     def divide(self, agents: int, blocked: frozenset[Place] = NO_PLACES) -> tuple[int, ...]:
         """Return how many agents each queue gets besides those of shared vertices.
@@ -198,7 +202,7 @@ class Formation:
             )
             found |= {place: self._station(place) for place in own}
             found |= {
-                place: self._slot(j, arc_lengths[place.rank - len(queue.stations)])
+                place: self.slot_at(j, arc_lengths[place.rank - len(queue.stations)])
                 for place in members
             }
             ordered += [(0, 1, place) for place in own]
@@ -228,9 +232,9 @@ class Formation:
         )
 
     def _station(self, place: Place) -> Slot | None:
-        return self._slot(place.queue, self.queues[place.queue].stations[place.rank])
+        return self.slot_at(place.queue, self.queues[place.queue].stations[place.rank])
 
-    def _slot(self, queue: int, s: float) -> Slot | None:
+    def slot_at(self, queue: int, s: float) -> Slot | None:
         """Return the slot at an arc length [m]; None if its point cannot be computed."""
         where = self.queues[queue]
         try:

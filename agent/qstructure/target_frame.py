@@ -37,6 +37,15 @@ class Frame:
             self.origin[2] + z,
         )
 
+    def to_frame(self, point: Vector) -> Vector:
+        """Return a point in world coordinates [m] in this frame [m]."""
+        x, y = point[0] - self.origin[0], point[1] - self.origin[1]
+        return (
+            self._cos * x + self._sin * y,
+            self._cos * y - self._sin * x,
+            point[2] - self.origin[2],
+        )
+
     def velocity_at(self, point: Vector) -> Vector:
         """Return the velocity of a point at rest in this frame: v + w x r [m/s; world frame].
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agent.comms.hierarchy import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
+from agent.messages import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
 from worldsim.engine.virtual import VirtualFleet
 from worldsim.scenario.file import load, parse
 

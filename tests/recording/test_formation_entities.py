@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from rerun.chunk import Chunk, RrdReader
 
-from agent.comms.hierarchy import DISTRESS
-from agent.messages import FramePath
+from agent.messages import DISTRESS, FramePath
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
 from tests.recording.flights import straight_flight, wedge

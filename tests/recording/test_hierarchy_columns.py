@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rerun.chunk import Chunk, RrdReader
 
-from agent.comms.hierarchy import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
+from agent.messages import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
 from tests.recording.flights import record, straight_flight, wedge
 from worldsim.judge.tick import HierarchyRows, Tick
 from worldsim.recording.hierarchy_columns import parent_lines

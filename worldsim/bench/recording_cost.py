@@ -7,7 +7,7 @@ from time import process_time
 
 import numpy as np
 
-from agent.comms.hierarchy import MEMBER, SUB_VERTEX, VERTEX
+from agent.messages import MEMBER, SUB_VERTEX, VERTEX
 from worldsim.bench.fleets import EIGHT_IN_RANGE_M, wedge
 from worldsim.judge.run_events import SlotChanged
 from worldsim.judge.tick import HierarchyRows, Tick

@@ -10,8 +10,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from agent.comms.hierarchy import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
-from agent.messages import ROLES
+from agent.messages import DISTRESS, MEMBER, ROLES, SUB_VERTEX, VERTEX
 from worldsim.judge.tick import NO_ROLE, HierarchyRows, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout, palette

@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agent.comms.hierarchy import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
-from agent.messages import ROLES
+from agent.messages import DISTRESS, MEMBER, ROLES, SUB_VERTEX, VERTEX
 
 Colours = NDArray[np.uint32]
 

@@ -10,7 +10,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from agent.comms.hierarchy import DISTRESS
+from agent.messages import DISTRESS
 from worldsim.judge.tick import Float32s, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout, palette

@@ -214,7 +214,18 @@ class Scenario(Table, frozen=True, omit_defaults=False):
             frame=path_of(self.frame),
             team=self.fleet.agents,
             ids=self.rows,
+            relays=self.relays,
         )
+
+    @property
+    def relays(self) -> bool:
+        """Whether agents pass on a table of all members.
+
+        The assignment needs it, and so does a fleet with a vehicle that senses no others: it has to
+        know where each of them may be.
+        """
+        blind = any("proximity" not in vehicle.sensors for vehicle in self.vehicles)
+        return blind or self.control.allocation == "assignment"
 
     def _resolved_control(self) -> Control:
         """Return [control] with a cast_far_m that the radio's range allows (Lemma 7, E20)."""

@@ -1,0 +1,68 @@
+"""What goes up a tree: each agent adds its own part to its followers' and tells its parent."""
+
+from collections.abc import Iterable, Sequence
+
+from agent.messages import MAX_PLACES, Candidate, Place, Subtree, TreeReport
+from agent.structure import histogram
+from agent.structure.leader import CANDIDATES
+
+ROUNDS = 4.0
+"""A follower's report holds for so many rounds at no loss."""
+
+
+class Convergecast:
+    """One agent's reports from its followers in one tree."""
+
+    def __init__(self, own_id: int) -> None:
+        self._own_id = own_id
+        self._reports: dict[int, tuple[float, TreeReport]] = {}
+
+    def hear(self, sender: int, report: TreeReport, stamp_s: float) -> None:
+        """Take an agent's report; one that names another parent ends what it told before."""
+        if report.parent == self._own_id and report.up is not None:
+            self._reports[sender] = (stamp_s, report)
+        else:
+            self._reports.pop(sender, None)
+
+    def forget(self, oldest_s: float) -> None:
+        """Drop reports with a stamp before that time [s]."""
+        self._reports = {s: kept for s, kept in self._reports.items() if kept[0] >= oldest_s}
+
+    def followers(self) -> list[Subtree]:
+        """Return the present reports of the followers."""
+        return [report.up for _, report in self._reports.values() if report.up is not None]
+
+
+def joined(parts: Iterable[Subtree], queues: int) -> Subtree:
+    """Return the sum of some agents' parts. queues: number of queues that begin at the vertex."""
+    highest = [0] * queues
+    candidates: list[set[Candidate]] = [set() for _ in range(queues)]
+    blocked: set[Place] = set()
+    histograms: list[bytes] = []
+    for part in parts:
+        if len(part.highest) != queues or len(part.candidates) != queues:
+            continue
+        highest = [max(a, b) for a, b in zip(highest, part.highest, strict=True)]
+        for known, more in zip(candidates, part.candidates, strict=True):
+            known.update(more)
+        blocked.update(Place(*place) for place in part.blocked)
+        histograms.append(part.histogram)
+    return Subtree(
+        highest=tuple(highest),
+        histogram=histogram.total(histograms),
+        candidates=tuple(tuple(sorted(each)[:CANDIDATES]) for each in candidates),
+        blocked=tuple(sorted(blocked)[:MAX_PLACES]),
+    )
+
+
+def own_part(
+    queues: Sequence[int], queue: int, number: int, away_m: float, candidate: Candidate | None
+) -> Subtree:
+    """Return one agent's own part. queues: those of the vertex; away_m: distance from it [m]."""
+    mine = [queue == j for j in queues]
+    return Subtree(
+        highest=tuple(number if each else 0 for each in mine),
+        histogram=histogram.of_one(away_m) if any(mine) else histogram.EMPTY,
+        candidates=tuple((candidate,) if each and candidate else () for each in mine),
+        blocked=(),
+    )

@@ -1,0 +1,100 @@
+"""The direct rule: where the whole team hears the whole team, the assignment is over neighbours.
+
+It is a team's rule, not an agent's own: an agent decides directly only if every member that it
+hears also hears all. Otherwise agents of two minds take each other's places. Leaders stay.
+"""
+
+from agent.assignment.allocation import own_place
+from agent.controller import Peer
+from agent.messages import Place
+from agent.structure.claim import Claim
+from agent.structure.view import View, leads
+
+ENTER_S = 0.4
+"""How long the members heard must have been all, and the same."""
+LEAVE_S = 1.0
+LEAST_HEARD_S = 0.5
+CHOICE_HZ = 5.0
+
+
+class DirectRule:
+    """Whether one agent decides directly, and its choice. ``heard``: members heard, itself too."""
+
+    def __init__(self, own_id: int, now_s: float) -> None:
+        self._own_id = own_id
+        self._ids: tuple[int, ...] = ()
+        self._same_since_s = now_s
+        self._full_since_s: float | None = None
+        self._short_since_s: float | None = None
+        self._next_choice_s = now_s
+        self.applies = False
+        self.heard = 1
+
+    def update(self, view: View, claim: Claim) -> None:
+        """Decide anew whether the rule applies."""
+        timing, now_s = view.timing, view.now_s
+        within_s = max(LEAST_HEARD_S, 2.0 * (timing.parent_s - timing.latency_s)) + timing.latency_s
+        members = [h for h in view.heard if h.age_s < within_s]
+        ids = tuple([h.id for h in members])
+        if ids != self._ids:
+            self._ids, self._same_since_s = ids, now_s
+        self.heard = len(ids) + 1
+        short = view.total == 0 or self.heard < view.total
+        short = short or any(
+            h.standing is not None and h.standing.heard < view.total for h in members
+        )
+        full = not short and self.heard == view.total
+        if self.applies:
+            self._leave(short, now_s)
+        else:
+            self._enter(full, view, claim)
+
+    def _leave(self, short: bool, now_s: float) -> None:
+        if not short:
+            self._short_since_s = None
+        elif self._short_since_s is None:
+            self._short_since_s = now_s
+        elif now_s - self._short_since_s > LEAVE_S:
+            self.applies, self._full_since_s = False, None
+
+    def _enter(self, full: bool, view: View, claim: Claim) -> None:
+        if not full:
+            self._full_since_s = None
+            return
+        if self._full_since_s is None:
+            self._full_since_s = view.now_s
+        # Before its first claim an agent counts the time since it last heard somebody new, so that
+        # the first choice is direct already.
+        since_s = self._full_since_s if claim.ranked else self._same_since_s
+        if view.now_s - since_s > ENTER_S + view.timing.latency_s and not claim.swapping:
+            self.applies, self._short_since_s = True, None
+            claim.push_until_s = view.now_s
+
+    def choose(self, view: View, claim: Claim) -> None:
+        """Take the place that the assignment over all members gives."""
+        now_s = view.now_s
+        if now_s < self._next_choice_s or self.heard != view.total:
+            return
+        self._next_choice_s = now_s + 1.0 / CHOICE_HZ - 1e-9
+        if claim.number > 0 and now_s - claim.since_s < view.timing.hold_s:
+            return
+        layout = view.map.formation.layout(view.total, view.blocked)
+        held = {h.place for h in view.heard if leads(h) and h.place is not None}
+        places = [place for place in layout.places if place not in held]
+        if any(place in view.map.vertex_of for place in places):
+            return  # a vertex without a leader: the election comes first
+        points = [view.frame.to_world(layout.slots[place].point) for place in places]
+        place = own_place(self._own_id, self._team(view, claim), places, points)
+        if place is not None:
+            self._take(view, claim, place)
+
+    def _team(self, view: View, claim: Claim) -> list[Peer]:
+        own = view.map.place(claim.queue, claim.number) if claim.number > 0 else None
+        peers = [Peer(self._own_id, view.here, own, claim.cost_m)]
+        peers += [Peer(h.id, h.position, h.place, h.cost_m) for h in view.heard if not leads(h)]
+        return sorted(peers)
+
+    def _take(self, view: View, claim: Claim, place: Place) -> None:
+        queue, number = place.queue, view.map.number(place)
+        if (queue, number) != (claim.queue, claim.number):
+            claim.take(queue, number, view.distance(queue, number), view.now_s)

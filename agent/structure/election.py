@@ -1,0 +1,112 @@
+"""Who leads a vertex: the nearest agent at first, the next of its queue when it falls silent.
+
+A leader stands in the vertex, and is the root of its tree (Sec. 3.1). Where an unidentified vehicle
+stands in the vertex, the leader leads from its own place in the queue (E18).
+"""
+
+from math import inf
+
+from agent.controller import Heard
+from agent.messages import LeaderSummary, RootKey
+from agent.structure.claim import Claim
+from agent.structure.tree import Tree
+from agent.structure.view import View, leads, queue_of
+
+MAX_COST_CM = 2**31 - 1
+TURN_S, TURN_LATENCIES, TURN_STEP_S = 1.3, 4.0, 0.5
+"""How much longer agents of other queues wait for a shared vertex than those of the queue that has
+members to spare."""
+
+
+class Election:
+    """One agent's part in elections."""
+
+    def __init__(self, own_id: int, started_s: float) -> None:
+        self._own_id = own_id
+        self._started_s = started_s
+        self.key: RootKey | None = None
+        """The own key while the agent leads."""
+        self._last: dict[int, LeaderSummary] = {}
+        """The last summary of each vertex."""
+
+    def note(self, view: View) -> None:
+        """Remember the leaders' summaries, for the succession."""
+        for v, summary in enumerate(view.summaries):
+            if summary is not None:
+                self._last[v] = summary
+
+    def stand(self, view: View, claim: Claim, trees: list[Tree]) -> bool:
+        """Take the lead of a vertex of the own queue that has no leader; return whether it did."""
+        for v in view.map.vertices_of[claim.queue]:
+            if (
+                trees[v].root is None
+                and not self._is_led(view, v)
+                and self._is_next(view, claim, trees[v], v)
+            ):
+                self._lead(view, claim, trees[v], v)
+                return True
+        return False
+
+    def _is_led(self, view: View, vertex: int) -> bool:
+        return any(h.standing is not None and h.standing.leads == vertex for h in view.heard)
+
+    def _is_next(self, view: View, claim: Claim, tree: Tree, vertex: int) -> bool:
+        now_s, timing = view.now_s, view.timing
+        if claim.number < 1:
+            listened = now_s - self._started_s >= timing.listen_s
+            return listened and self._is_nearest(view, vertex)
+        wait_s = timing.lost_s + self._turn_s(view, claim, vertex)
+        return now_s - tree.advanced_s > wait_s and self._is_first(view, claim, vertex)
+
+    def _is_nearest(self, view: View, vertex: int) -> bool:
+        """Whether no agent heard is nearer to the vertex and may lead it."""
+        own = (view.to_vertex(vertex), self._own_id)
+        return all(
+            (view.to_vertex(vertex, other.position), other.id) > own
+            for other in view.heard
+            if self._may_lead(view, other, vertex)
+        )
+
+    def _may_lead(self, view: View, other: Heard, vertex: int) -> bool:
+        queue = queue_of(other)
+        return not leads(other) and (queue < 0 or vertex in view.map.vertices_of[queue])
+
+    def _is_first(self, view: View, claim: Claim, vertex: int) -> bool:
+        """Whether no member heard of the own queue stands nearer to the vertex."""
+        own = self._along(view, claim.queue, claim.number, vertex)
+        return all(
+            self._along(view, claim.queue, view.number_of(other), vertex) >= own
+            for other in view.same_queue(claim.queue)
+            if view.number_of(other) > 0
+        )
+
+    def _along(self, view: View, queue: int, number: int, vertex: int) -> float:
+        if not view.map.closed[queue]:
+            return number
+        point = view.point(queue, number)
+        return view.to_vertex(vertex, point) if point is not None else inf
+
+    def _turn_s(self, view: View, claim: Claim, vertex: int) -> float:
+        """Return how much longer than others the own queue waits [s]."""
+        last = self._last.get(vertex)
+        if last is None or not view.map.is_common(vertex):
+            return 0.0
+        homed = view.map.homed[vertex]
+        if claim.queue not in homed or len(last.counts) != len(homed):
+            return TURN_S + TURN_LATENCIES * view.timing.latency_s + TURN_STEP_S * len(homed)
+        counts = dict(zip(homed, last.counts, strict=True))
+        shares = view.map.members(max(last.total - 1, 0), view.blocked)
+        spare = [j for j in homed if counts[j] > shares[j]] or homed
+        if claim.queue == spare[0]:
+            return 0.0
+        behind = TURN_STEP_S * homed.index(claim.queue)
+        return TURN_S + TURN_LATENCIES * view.timing.latency_s + behind
+
+    def _lead(self, view: View, claim: Claim, tree: Tree, vertex: int) -> None:
+        cost_m = view.to_vertex(vertex)
+        self.key = RootKey(min(round(100.0 * cost_m), MAX_COST_CM), self._own_id)
+        tree.take_root(self.key, view.now_s)
+        if view.map.vertex_places[vertex] in view.blocked and claim.number > 0:
+            claim.vertex = vertex
+        else:
+            claim.lead(vertex, cost_m, view.now_s)

@@ -1,0 +1,37 @@
+"""How far the members of a queue are from its vertex: counts in bins, a byte each."""
+
+from bisect import bisect_left
+from collections.abc import Iterable
+
+BINS = 16
+EDGES_M = tuple(0.75 * 1.31**k for k in range(BINS - 1))
+"""Upper edge of each bin but the last [m]."""
+EMPTY = bytes(BINS)
+
+
+def of_one(away_m: float) -> bytes:
+    """Return the histogram of one member at a distance from the vertex [m]."""
+    bins = bytearray(BINS)
+    bins[bisect_left(EDGES_M, away_m)] = 1
+    return bytes(bins)
+
+
+def total(histograms: Iterable[bytes]) -> bytes:
+    """Return the sum of histograms; a bin holds at most 255."""
+    bins = [0] * BINS
+    for each in histograms:
+        if len(each) == BINS:
+            bins = [a + b for a, b in zip(bins, each, strict=True)]
+    return bytes([min(each, 255) for each in bins])
+
+
+def share_nearer(histogram: bytes, away_m: float) -> float:
+    """Return the share of the members that are nearer than a distance [m], from 0 to 1."""
+    number = sum(histogram)
+    if number == 0 or len(histogram) != BINS:
+        return 0.0
+    k = bisect_left(EDGES_M, away_m)
+    low = EDGES_M[k - 1] if k > 0 else 0.0
+    high = EDGES_M[k] if k < BINS - 1 else EDGES_M[-1] * 1.31
+    within = min(1.0, (away_m - low) / (high - low))
+    return (sum(histogram[:k]) + histogram[k] * within) / number

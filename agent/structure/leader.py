@@ -1,0 +1,144 @@
+"""What the leader of a vertex does: it counts, shares out its queues' members, and gives orders.
+
+The census counts the members of each queue. Once the counts have been steady, the leader says go:
+agents then take numbers. Where steady counts differ from the shares (largest remainders, E16), it
+orders the candidates with the least extra way to change their queue, and gives no new order until
+the counts have followed or the time for it is over.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from agent.messages import Candidate, LeaderSummary, Order, Place, RootKey, Subtree
+from agent.structure.census import Population
+from agent.structure.transfers import transfers
+from agent.structure.tree import version_at
+from agent.structure.view import View
+
+CANDIDATES = 4
+"""Most candidates of a queue that are passed on."""
+MAX_ORDERS = 16
+FOLLOWED_S, FOLLOWED_LATENCIES = 2.5, 6.0
+"""How long a leader waits for its orders to show in the counts."""
+COLLECTED_S, COLLECTED_LATENCIES = 1.0, 4.0
+"""How long it waits for candidates to come up the tiers, if there are too few."""
+
+
+class Counted(NamedTuple):
+    """The counts that must be steady."""
+
+    total: int
+    members: tuple[int, ...]
+
+
+class Leader:
+    """The leader of one vertex. heard_s: rounds of the multihop channel take so long [s]."""
+
+    def __init__(self, vertex: int, key: RootKey, now_s: float, round_s: float) -> None:
+        self.vertex = vertex
+        self._key = key
+        self._round_s = round_s
+        self._counted: Counted | None = None
+        self._since_s = now_s
+        self._go = False
+        self._order = version_at(now_s)
+        self._orders: tuple[Order, ...] = ()
+        self._ordered_s = -1e9
+        self._expected: list[int] | None = None
+        self._uneven_s: float | None = None
+
+    def summary(
+        self, view: View, population: Population, subtree: Subtree, blocked: frozenset[Place]
+    ) -> LeaderSummary:
+        """Return the summary for now. subtree: what came up the tiers, the own part included."""
+        steady = self._is_steady(view, population)
+        self._go = self._go or steady
+        self._follow_up(view, population)
+        if steady and self._expected is None:
+            self._give_orders(view, population, subtree, blocked)
+        homed = view.map.homed[self.vertex]
+        return LeaderSummary(
+            root=self._key,
+            version=version_at(view.now_s),
+            total=population.total,
+            counts=tuple(population.members[j] for j in homed),
+            highest=subtree.highest,
+            histogram=subtree.histogram,
+            go=self._go,
+            order=self._order,
+            orders=self._orders,
+            blocked=tuple(sorted(blocked)),
+        )
+
+    def _is_steady(self, view: View, population: Population) -> bool:
+        counted = Counted(population.total, population.members)
+        if counted != self._counted:
+            self._counted, self._since_s = counted, view.now_s
+        timing = view.timing
+        wait_s = timing.resettle_s if self._go else timing.settle_s
+        if not self._go and counted.total < len(view.heard) + 1:
+            return False
+        return view.now_s - self._since_s >= wait_s - 1e-9 and counted.total > 0
+
+    def _follow_up(self, view: View, population: Population) -> None:
+        """Take orders back once they have been followed, or have had the time for it."""
+        if self._expected is None:
+            return
+        wait_s = FOLLOWED_S + FOLLOWED_LATENCIES * view.timing.latency_s + 2.0 * self._round_s
+        followed = list(population.members) == self._expected
+        if followed or view.now_s - self._ordered_s > wait_s:
+            self._expected, self._orders = None, ()
+
+    def _give_orders(
+        self, view: View, population: Population, subtree: Subtree, blocked: frozenset[Place]
+    ) -> None:
+        counts = population.members
+        shares = view.map.members(population.total, blocked)
+        given = transfers(view.map, counts, shares)
+        homed = view.map.homed[self.vertex]
+        own = {j: given[j] for j in homed if j in given}
+        if not own:
+            self._uneven_s = None
+            return
+        if self._uneven_s is None:
+            self._uneven_s = view.now_s
+        spare = {j: counts[j] - shares[j] for j in own}
+        offered = {j: _offered(subtree, homed.index(j)) for j in own}
+        orders = _cheapest(own, spare, offered)
+        complete = all(len(offered[j]) >= min(CANDIDATES, spare[j]) for j in own)
+        wait_s = COLLECTED_S + COLLECTED_LATENCIES * view.timing.latency_s + self._round_s
+        if orders and (complete or view.now_s - self._uneven_s > wait_s):
+            self._issue(view, orders, counts)
+
+    def _issue(self, view: View, orders: list[Order], counts: Sequence[int]) -> None:
+        self._order = max(self._order + 1, version_at(view.now_s))
+        self._orders, self._ordered_s, self._uneven_s = tuple(orders), view.now_s, None
+        self._expected = list(counts)
+        for order in orders:
+            self._expected[order.queue] -= 1
+            self._expected[order.to] += 1
+
+
+def _offered(subtree: Subtree, index: int) -> Sequence[Candidate]:
+    return subtree.candidates[index] if index < len(subtree.candidates) else ()
+
+
+def _cheapest(
+    given: dict[int, list[int]], spare: dict[int, int], offered: dict[int, Sequence[Candidate]]
+) -> list[Order]:
+    """Return orders for the candidates with the least extra way, as many as queues give and take."""
+    left = {j: list(takers) for j, takers in given.items()}
+    shared = len({id(takers) for takers in given.values()}) == 1
+    if shared:
+        first = next(iter(left.values()))
+        left = dict.fromkeys(left, first)
+    ranked = sorted((each, j) for j, candidates in offered.items() for each in candidates)
+    orders: list[Order] = []
+    for (_, agent, to), j in ranked:
+        known = any(order.agent == agent for order in orders)
+        if known or spare[j] < 1 or not 0 <= to < len(left[j]) or left[j][to] < 1:
+            continue
+        spare[j] -= 1
+        left[j][to] -= 1
+        orders.append(Order(agent, j, to))
+    return orders[:MAX_ORDERS]

@@ -1,0 +1,53 @@
+"""Time limits of the Q-structure, derived from the radio as an agent measures it."""
+
+from math import log
+from typing import NamedTuple
+
+from agent.controller import Link
+
+LEAST_SILENCE_S = 1.5
+LEAST_PARENT_S = 0.25
+LOG_LOST, LOG_PARENT = log(1e-6), log(1e-3)
+"""Logarithms of the probability that chance alone makes such a silence."""
+LEAST_LOSS = 1e-3
+MOST_LOSS = 0.95
+
+
+class Timing(NamedTuple):
+    """Time limits [s]."""
+
+    latency_s: float
+    loss: float
+    hop_s: float  # mean time until a neighbour has heard a statement
+    listen_s: float  # before an election
+    lost_s: float  # silence after which a member counts as lost (E17)
+    parent_s: float  # silence after which a parent is replaced
+    root_s: float  # standstill of its version after which a root is void (E15)
+    hold_s: float  # a new claim is kept so long, until others may have heard it
+    pending_s: float  # a proposed swap waits so long for its answer
+    push_s: float  # a claim pushes so long
+    settle_s: float  # counts are steady when unchanged for so long, at the start
+    resettle_s: float  # the same later, when a wrong order would move vehicles for nothing
+
+
+def timing_of(link: Link, beacon_period_s: float) -> Timing:
+    """Return the time limits for a radio as measured. beacon_period_s: of the local channel."""
+    latency, loss = link.latency_s, min(link.loss, MOST_LOSS)
+    known = max(loss, LEAST_LOSS)
+    hop_s = latency + beacon_period_s / (1.0 - loss)
+    lost_s = max(LEAST_SILENCE_S, LOG_LOST / log(known) * beacon_period_s) + latency
+    parent_s = max(LEAST_PARENT_S, LOG_PARENT / log(known) * beacon_period_s) + latency
+    return Timing(
+        latency_s=latency,
+        loss=loss,
+        hop_s=hop_s,
+        listen_s=0.2 + 1.5 * latency,
+        lost_s=lost_s,
+        parent_s=parent_s,
+        root_s=lost_s + 0.5,
+        hold_s=0.1 + 2.0 * latency,
+        pending_s=0.6 + 3.0 * latency,
+        push_s=1.0 + 3.0 * latency,
+        settle_s=0.25 + 2.0 * hop_s,
+        resettle_s=1.0 + 4.0 * latency,
+    )

@@ -1,0 +1,43 @@
+"""A member of the Q-structure: the structure of the mission that it flies, begun anew with each."""
+
+from agent.config import AgentSetup
+from agent.controller import NO_WORDS, Senses, Words
+from agent.messages import Place
+from agent.places.place_points import OwnTarget
+from agent.structure.queue_map import map_of
+from agent.structure.structure import Structure
+
+
+class StructureMember:
+    """One agent's place, by the Q-structure."""
+
+    def __init__(self, setup: AgentSetup) -> None:
+        self._setup = setup
+        self._structure: Structure | None = None
+        self._mission = -1
+
+    @property
+    def cost_m(self) -> float:
+        """Distance to the place when it was first claimed [m]."""
+        return self._structure.claim.cost_m if self._structure is not None else 0.0
+
+    @property
+    def blocked(self) -> tuple[Place, ...]:
+        """The places that the agent sees taken by an unidentified vehicle (E18)."""
+        return self._structure.blocked if self._structure is not None else ()
+
+    def select(self, senses: Senses) -> OwnTarget | None:
+        """Return the own target now; None for an agent without one."""
+        mission = senses.mission
+        if self._structure is None or mission.key != self._mission:
+            self._mission = mission.key
+            formation = map_of(mission.formation)
+            self._structure = Structure(self._setup, formation, mission.key, senses.now_s)
+        return self._structure.update(senses)
+
+    def words(self, now_s: float) -> Words:
+        """Return what the agent says of its part in the structure; once a tick, after ``select``."""
+        own = self._structure
+        if own is None:
+            return NO_WORDS
+        return Words(own.standing(now_s), own.summary(now_s), own.tier, own.parent, own.role)

@@ -1,0 +1,241 @@
+"""Which number an agent takes in its queue (Algorithm 1, target-on-queue; E17).
+
+The first number follows from the distance to the vertex: exactly where the whole queue is heard,
+else by the leader's histogram. Of two agents with one number the one that claimed it from farther
+away moves on. It takes a number known to be free, or pushes into the next one; so a push runs up to
+the tail. Gaps close inwards.
+"""
+
+from math import inf
+
+from agent.controller import Heard
+from agent.structure import histogram
+from agent.structure.claim import Claim
+from agent.structure.view import View
+
+CONFLICT_M = 0.05
+"""Of two claims the nearer by more than this keeps the number, else the lower id (E17)."""
+LATE_S, LATE_LATENCIES = 6.0, 20.0
+"""Who has no number so long after it took off comes late: it takes the nearest and pushes."""
+GREW_WITHIN_S, GREW_BY = 12.0, 1.3
+"""A number taken when fewer members were known is taken anew, if so many more turn up so soon."""
+COMPLETE_GAP_S, GAP_S, FAR_GAP_S = 0.25, 0.5, 1.0
+"""How long a number has not been heard until it counts as a gap."""
+NEAR_M = 1.0
+
+
+class Numbers:
+    """One agent's number in its queue. started_s: when it took the mission [s]."""
+
+    def __init__(self, own_id: int, started_s: float) -> None:
+        self._own_id = own_id
+        self._started_s = started_s
+        self._seen_s: dict[tuple[int, int], float] = {}
+        """When each number of a queue was last heard to be claimed [s]."""
+        self._first_count, self._first_s = 0, 0.0
+
+    def take_first(self, view: View, claim: Claim) -> None:
+        """Take a number, once the leader has counted the team."""
+        home = view.home_of(claim.queue)
+        if home is None or not home.go or view.now_s - self._started_s < view.timing.listen_s:
+            return
+        same = view.same_queue(claim.queue)
+        self._first_count = view.counts[claim.queue] or len(same) + 1
+        first = self._first_s == 0.0
+        self._first_s = self._first_s or view.now_s
+        late_s = LATE_S + LATE_LATENCIES * view.timing.latency_s
+        late = first and view.now_s - self._started_s > late_s
+        if claim.ranked or late:
+            self._join(view, claim)
+        else:
+            self._claim(view, claim, self._by_distance(view, claim, same))
+
+    def _join(self, view: View, claim: Claim) -> None:
+        """Take the nearest number of a queue that stands already, and push."""
+        members = max(view.counts[claim.queue], 0) + 1
+        number = view.nearest_number(claim.queue, members)
+        taken = view.map.blocked_numbers(claim.queue, view.blocked)
+        self._claim(view, claim, _available(number, taken))
+        claim.push_until_s = view.now_s + view.timing.push_s
+
+    def _by_distance(self, view: View, claim: Claim, same: list[Heard]) -> int:
+        """Return the number by the order of distances from the vertex."""
+        queue = claim.queue
+        occupied = self._occupied(view, same)
+        share = max(1, view.shares[queue])
+        complete = len(same) + 1 >= view.counts[queue]
+        number, last = self._order(view, queue, same, complete, share)
+        taken = view.map.blocked_numbers(queue, view.blocked)
+        number = _nth_available(number, taken)
+        last = _nth_available(last, taken)
+        free = [k for k in range(1, last + 1) if k not in occupied and k not in taken]
+        if number in occupied and free:
+            number = min(free, key=lambda k: abs(k - number))
+        return number
+
+    def _order(
+        self, view: View, queue: int, same: list[Heard], complete: bool, share: int
+    ) -> tuple[int, int]:
+        """Return the own number among the members, and the last number of the queue."""
+        count = view.counts[queue]
+        if view.map.closed[queue]:
+            return view.nearest_number(queue, max(count, share)), max(count, share)
+        vertex = view.map.home[queue]
+        own = (view.to_vertex(vertex), self._own_id)
+        nearer = sum((view.to_vertex(vertex, h.position), h.id) < own for h in same)
+        if complete:
+            return 1 + nearer, max(count, share)
+        home = view.home_of(queue)
+        bins = home.histogram if home is not None else b""
+        if not sum(bins):
+            return 1 + nearer, share
+        quantile = histogram.share_nearer(bins, own[0])
+        return 1 + min(share - 1, int(quantile * share)), share
+
+    def keep_up(self, view: View, claim: Claim) -> bool:
+        """Resolve a conflict, or close a gap; return whether the number changed."""
+        same = view.same_queue(claim.queue)
+        if self._grew(view, claim):
+            claim.give_up(claim.queue, view.now_s)
+            claim.ranked = False
+            return True
+        occupied = self._occupied(view, same)
+        for number in occupied:
+            self._seen_s[(claim.queue, number)] = view.now_s
+        if view.now_s - claim.since_s <= view.timing.hold_s:
+            return False
+        return self._resolve(view, claim, same, occupied) or self._close_gap(
+            view, claim, same, occupied
+        )
+
+    def _grew(self, view: View, claim: Claim) -> bool:
+        """Whether so many more members turned up that the number is to be taken anew."""
+        early = view.now_s - self._first_s < GREW_WITHIN_S
+        many = view.counts[claim.queue] > GREW_BY * self._first_count + 1
+        if not (early and many and self._first_count) or claim.swapping:
+            return False
+        settled = view.distance(claim.queue, claim.number) <= NEAR_M
+        return not settled and not claim.pushes(view.now_s)
+
+    def _resolve(self, view: View, claim: Claim, same: list[Heard], occupied: set[int]) -> bool:
+        """Move on from a number, or from a blocked one, if another has the better claim."""
+        taken = view.map.blocked_numbers(claim.queue, view.blocked)
+        lost = claim.number in taken or any(
+            self._loses_to(view, claim, other)
+            for other in same
+            if view.number_of(other) == claim.number
+        )
+        if not lost:
+            return False
+        count = view.counts[claim.queue]
+        if len(same) + 1 >= count > 0:
+            last = _nth_available(count, taken)
+            free = [k for k in range(1, last + 1) if k not in occupied and k not in taken]
+            if free:
+                self._claim(view, claim, min(free, key=lambda k: view.distance(claim.queue, k)))
+                return True
+        self._claim(view, claim, self._next(view, claim, taken))
+        claim.push_until_s = view.now_s + view.timing.push_s
+        return True
+
+    def _next(self, view: View, claim: Claim, taken: frozenset[int]) -> int:
+        """Return the next number up the queue; a closed queue begins again."""
+        number = _available(claim.number + 1, taken)
+        if view.map.closed[claim.queue] and number > view.extent(claim.queue):
+            return _available(1, taken)
+        return number
+
+    def _loses_to(self, view: View, claim: Claim, other: Heard) -> bool:
+        standing = other.standing
+        if standing is None:
+            return False
+        if standing.reservation is not None and standing.reservation.partner == self._own_id:
+            return False
+        if claim.reservation is not None and claim.reservation.partner == other.id:
+            return False
+        if standing.pushes != claim.pushes(view.now_s):
+            return standing.pushes
+        theirs = other.cost_m if other.cost_m is not None else inf
+        if abs(theirs - claim.cost_m) <= CONFLICT_M:
+            return other.id < self._own_id
+        return theirs < claim.cost_m
+
+    def _close_gap(self, view: View, claim: Claim, same: list[Heard], occupied: set[int]) -> bool:
+        """Move inwards where nobody is heard to stand below."""
+        queue, number, now_s = claim.queue, claim.number, view.now_s
+        taken = view.map.blocked_numbers(queue, view.blocked)
+        below = _below(number, taken)
+        if below < 1 or below in occupied or self._is_kept(view, queue, below):
+            return False
+        empty_s = now_s - max(self._seen_s.get((queue, below), 0.0), claim.since_s)
+        latency_s, count = view.timing.latency_s, view.counts[queue]
+        if len(same) + 1 >= count > 0:
+            if empty_s <= COMPLETE_GAP_S + latency_s:
+                return False
+            self._claim(view, claim, self._after_gaps(view, claim, occupied, taken))
+            return True
+        if view.home_of(queue) is not None and view.highest[queue] <= _nth_available(count, taken):
+            return False
+        near = view.distance(queue, number) < NEAR_M
+        lower = [k for k in occupied if k < number]
+        if not near and not (lower and empty_s > FAR_GAP_S + latency_s):
+            return False
+        if empty_s <= GAP_S + latency_s:
+            return False
+        self._claim(view, claim, _available(max(lower, default=0) + 1, taken))
+        return True
+
+    def _after_gaps(
+        self, view: View, claim: Claim, occupied: set[int], taken: frozenset[int]
+    ) -> int:
+        """Return the number after all gaps below are closed: by each agent above them alike."""
+        wait_s = COMPLETE_GAP_S + view.timing.latency_s
+        gaps = sum(
+            k not in occupied
+            and k not in taken
+            and view.now_s - self._seen_s.get((claim.queue, k), 0.0) > wait_s
+            for k in range(1, claim.number)
+        )
+        number = claim.number
+        for _ in range(max(1, gaps)):
+            number = _below(number, taken)
+        return max(number, _available(1, taken))
+
+    def _is_kept(self, view: View, queue: int, number: int) -> bool:
+        """Whether somebody heard keeps a number for its partner in a swap."""
+        place = view.map.place(queue, number)
+        return any(
+            h.standing is not None
+            and h.standing.reservation is not None
+            and h.standing.reservation.place == place
+            for h in view.heard
+        )
+
+    def _occupied(self, view: View, same: list[Heard]) -> set[int]:
+        return {number for other in same if (number := view.number_of(other)) > 0}
+
+    def _claim(self, view: View, claim: Claim, number: int) -> None:
+        claim.take(claim.queue, number, view.distance(claim.queue, number), view.now_s)
+
+
+def _available(number: int, taken: frozenset[int]) -> int:
+    """Return the first number from this one on that is not taken by a body."""
+    while number in taken:
+        number += 1
+    return number
+
+
+def _below(number: int, taken: frozenset[int]) -> int:
+    """Return the next lower number that is not taken by a body; 0 for none."""
+    number -= 1
+    while number in taken:
+        number -= 1
+    return number
+
+
+def _nth_available(n: int, taken: frozenset[int]) -> int:
+    """Return the n-th number that is not taken by a body."""
+    number = 0
+    for _ in range(n):
+        number = _available(number + 1, taken)
+    return number

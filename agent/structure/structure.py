@@ -1,0 +1,363 @@
+"""The Q-structure of one agent: what it says of itself, what it makes of what others say.
+
+Each tick it follows the trees of all vertices. At 10 Hz it decides on its queue, its number and the
+lead of a vertex. What is urgent goes into its beacons (:class:`~agent.messages.Standing`); what is
+slow goes into summaries on the multihop channel, sooner while there is news.
+"""
+
+from math import inf
+
+import msgspec
+
+from agent.config import AgentSetup
+from agent.controller import Heard, HeardSummary, Senses
+from agent.messages import (
+    DISTRESS,
+    MAX_PLACES,
+    MEMBER,
+    SUB_VERTEX,
+    VERTEX,
+    Branch,
+    LeaderSummary,
+    Place,
+    Standing,
+    Subtree,
+    Summary,
+    TreeReport,
+)
+from agent.places.occupied_slots import OccupiedSlots
+from agent.places.place_points import OwnTarget, PlacePoints
+from agent.structure.census import FIRST_QUEUE, FIRST_VERTEX, UNPLACED, Census
+from agent.structure.claim import NO_QUEUE, Claim
+from agent.structure.convergecast import ROUNDS, Convergecast, joined, own_part
+from agent.structure.direct_rule import DirectRule
+from agent.structure.election import Election
+from agent.structure.leader import Leader
+from agent.structure.link_timing import timing_of
+from agent.structure.numbers import Numbers
+from agent.structure.queue_choice import QueueChoice, likely_length
+from agent.structure.queue_map import QueueMap
+from agent.structure.swaps import Swaps
+from agent.structure.tree import Follower, Tree
+from agent.structure.view import View
+
+DECISION_HZ = 10.0
+FAR_M = 2.5
+"""Within this distance of its place an agent flies there even if it lies beyond the tail."""
+REPORTS = 6
+"""Most trees in one summary."""
+NEWS_SHARE = 0.25
+"""With news the next summary comes after this share of a round (as a Trickle timer, RFC 6206)."""
+
+
+class Structure:
+    """One agent's part in the structure of one mission."""
+
+    def __init__(self, setup: AgentSetup, formation: QueueMap, mission: int, now_s: float) -> None:
+        own_id = setup.id
+        self._own_id, self._mission, self._map = own_id, mission, formation
+        self._beacon_s = 1.0 / setup.comms.local_hz
+        self._round_s = 1.0 / setup.comms.multihop_hz if setup.comms.multihop_hz > 0.0 else inf
+        self.claim = Claim(now_s)
+        self.trees = [Tree(own_id, now_s) for _ in range(formation.vertices)]
+        self.census = Census(own_id, setup.ids)
+        self._collected = [Convergecast(own_id) for _ in self.trees]
+        self._summaries: list[LeaderSummary | None] = [None] * formation.vertices
+        self._queue_choice = QueueChoice(own_id)
+        self._election = Election(own_id, now_s)
+        self._numbers = Numbers(own_id, now_s)
+        self._swaps = Swaps(own_id)
+        self._direct = DirectRule(own_id, now_s)
+        points = PlacePoints(setup.control.spacing_m)
+        self._occupied = OccupiedSlots(points, "proximity" in setup.vehicle.sensors)
+        self._leader: Leader | None = None
+        self._followed = False
+        self._next_decision_s = self._next_round_s = self._sent_s = now_s
+        self._news = True
+        self._blocked: frozenset[Place] = frozenset()
+        self._view: View | None = None
+        self._turn = 0
+
+    @property
+    def blocked(self) -> tuple[Place, ...]:
+        """The places that the agent sees taken by an unidentified vehicle (E18)."""
+        return self._occupied.seen
+
+    def update(self, senses: Senses) -> OwnTarget | None:
+        """Return the own target now; None for an agent without a place."""
+        view = self._view = self._look(senses)
+        self._hear_summaries(view, senses.summaries)
+        view.summaries = self._summaries
+        self._follow_trees(view, senses)
+        if senses.now_s >= self._next_decision_s:
+            self._next_decision_s = senses.now_s + 1.0 / DECISION_HZ - 1e-9
+            self._decide(view, senses)
+        return self._target(view)
+
+    def _look(self, senses: Senses) -> View:
+        mission = senses.mission
+        heard = [
+            h for h in senses.neighbours if h.standing is not None and h.mission == mission.key
+        ]
+        view = View(senses.now_s, senses.position, heard, self._map, mission.frame)
+        view.timing = timing_of(senses.link, self._beacon_s)
+        view.blocked = self._blocked
+        return view
+
+    def _hear_summaries(self, view: View, summaries: tuple[HeardSummary, ...]) -> None:
+        """Take what comes up and down the trees, and the labels of the census."""
+        for sender, stamp_s, summary in summaries:
+            if summary.mission != self._mission:
+                continue
+            self.census.merge(summary, stamp_s, view.now_s)
+            for report in summary.trees:
+                if report.vertex < len(self.trees):
+                    self._hear_report(sender, stamp_s, report)
+
+    def _hear_report(self, sender: int, stamp_s: float, report: TreeReport) -> None:
+        v, tree = report.vertex, self.trees[report.vertex]
+        self._collected[v].hear(sender, report, stamp_s)
+        down = report.down
+        if down is None or down.root != tree.root or not 0 <= report.tier < tree.tier:
+            return
+        if len(down.counts) != len(self._map.homed[v]):
+            return
+        known = self._summaries[v]
+        if known is None or known.root != down.root or down.version > known.version:
+            self._news = self._news or known is None or _differ(known, down)
+            self._summaries[v] = down
+
+    def _follow_trees(self, view: View, senses: Senses) -> None:
+        for v, tree in enumerate(self.trees):
+            followers = [
+                Follower(h, branch) for h in view.heard if (branch := _branch(h, v)) is not None
+            ]
+            leading = self._election.key if self.claim.vertex == v else None
+            deposed = tree.follow_root(view.now_s, followers, leading, view.timing)
+            near = [each for each in followers if each.heard.age_s < view.timing.parent_s]
+            tree.choose_parent(view.here, near, senses.link.reach_m)
+            summary = self._summaries[v]
+            if summary is not None and summary.root != tree.root:
+                self._summaries[v] = None
+            if leading is not None and deposed:
+                self._step_down(view, v)
+
+    def _step_down(self, view: View, vertex: int) -> None:
+        """Make way for a leader that is nearer."""
+        queue = NO_QUEUE if self._map.is_common(vertex) else self.claim.queue
+        self.claim.give_up(queue, view.now_s)
+        self._election.key, self._leader, self._news = None, None, True
+
+    def _decide(self, view: View, senses: Senses) -> None:
+        self._count(view)
+        self._election.note(view)
+        self._update_blocked(view, senses)
+        self._direct.update(view, self.claim)
+        if self.claim.queue == NO_QUEUE and not self.claim.leads:
+            self._queue_choice.choose(view, self.claim)
+        if not self.claim.leads:
+            self._decide_as_member(view)
+        self._followed = any(
+            branch is not None and branch.parent == self._own_id
+            for h in view.heard
+            for branch in (h.standing.branches if h.standing is not None else ())
+        )
+        self._summarise(view)
+
+    def _decide_as_member(self, view: View) -> None:
+        claim = self.claim
+        if self._election.stand(view, claim, self.trees):
+            key = self._election.key
+            if key is not None:
+                self._leader = Leader(claim.vertex, key, view.now_s, self._round_s)
+            self._news = True
+        elif self._direct.applies:
+            self._direct.choose(view, claim)
+        elif self._queue_choice.obey(view, claim):
+            self._news = True
+        elif claim.number < 1:
+            self._numbers.take_first(view, claim)
+        elif not self._swaps.proceed(view, claim) and not self._numbers.keep_up(view, claim):
+            self._swaps.propose(view, claim)
+
+    def _count(self, view: View) -> None:
+        """Bring the census up to date with the members heard directly, and the own label."""
+        for heard in view.heard:
+            stamp_s = view.now_s - heard.age_s
+            self.census.hear(heard.id, stamp_s, self._code_of(heard))
+        self.census.hear(self._own_id, view.now_s, self._own_code())
+
+    def _code_of(self, heard: Heard) -> int:
+        standing = heard.standing
+        if standing is None:
+            return UNPLACED
+        return self._code(standing.leads, standing.queue, heard.place)
+
+    def _own_code(self) -> int:
+        claim = self.claim
+        place = self._map.place(claim.queue, claim.number) if claim.number > 0 else None
+        return self._code(claim.vertex, claim.queue, place)
+
+    def _code(self, vertex: int, queue: int, place: Place | None) -> int:
+        """Return a label's code; a leader that stands in its queue counts in its queue."""
+        in_queue = place is not None and place not in self._map.vertex_of
+        if 0 <= vertex < self._map.vertices and not in_queue:
+            return FIRST_VERTEX + vertex
+        return FIRST_QUEUE + queue if 0 <= queue < self._map.queues else UNPLACED
+
+    def _update_blocked(self, view: View, senses: Senses) -> None:
+        agents = view.total or len(view.heard) + 1
+        reported = {*senses.blocked}
+        for summary in view.summaries:
+            if summary is not None:
+                reported.update(Place(*place) for place in summary.blocked)
+        own = view.target(self.claim)
+        peers = [(h.place, h.position) for h in view.heard]
+        peers.append((own.place if own is not None else None, view.here))
+        self._blocked = view.blocked = self._occupied.update(
+            senses, peers, agents, frozenset(reported)
+        )
+
+    def _target(self, view: View) -> OwnTarget | None:
+        """Return where to fly. An agent without a claim waits by the nearest place of its queue."""
+        claim = self.claim
+        if claim.leads or claim.number > 0:
+            return self._shortened(view, view.target(claim))
+        if claim.queue == NO_QUEUE:
+            return None
+        number = view.nearest_number(claim.queue, likely_length(view))
+        slot = self._map.slot(claim.queue, number, view.extent(claim.queue, number))
+        return OwnTarget(None, slot, False) if slot is not None else None
+
+    def _shortened(self, view: View, own: OwnTarget | None) -> OwnTarget | None:
+        """Return the target for now: a push may lead past the tail, which is no place to fly to."""
+        claim = self.claim
+        count = view.counts[claim.queue] if claim.number > 0 else 0
+        if self._direct.applies or not 0 < count < claim.number:
+            return own
+        if view.distance(claim.queue, claim.number) <= FAR_M:
+            return own
+        slot = self._map.slot(claim.queue, count, view.extent(claim.queue, count))
+        return own._replace(slot=slot) if own is not None and slot is not None else own
+
+    def _summarise(self, view: View) -> None:
+        """Bring the own parts of all trees up to date; as a leader, the summary."""
+        leader = self._leader
+        if leader is None:
+            return
+        v = leader.vertex
+        subtree = self._subtree(view, v)
+        population = self.census.population(
+            view.now_s, view.timing.lost_s, self._map.queues, self._map.vertices
+        )
+        blocked = frozenset(Place(*p) for p in subtree.blocked) | self._blocked
+        summary = leader.summary(view, population, subtree, blocked)
+        known = self._summaries[v]
+        self._news = self._news or known is None or _differ(known, summary)
+        self._summaries[v] = summary
+
+    def _subtree(self, view: View, vertex: int) -> Subtree:
+        tree, claim = self.trees[vertex], self.claim
+        rounds_s = ROUNDS * min(self._round_s, 10.0) / (1.0 - view.timing.loss)
+        self._collected[vertex].forget(view.now_s - rounds_s - view.timing.latency_s)
+        parts = self._collected[vertex].followers() if tree.root is not None else []
+        homed = self._map.homed[vertex]
+        if claim.queue in homed and not (claim.leads and claim.number < 1):
+            candidate = None if self._direct.applies else self._queue_choice.candidate(view, claim)
+            away_m = view.to_vertex(vertex)
+            parts.append(own_part(homed, claim.queue, claim.number, away_m, candidate))
+        seen = [p for p in self.blocked if p.queue in homed or self._map.vertex_of.get(p) == vertex]
+        own = joined(parts, len(homed))
+        places = sorted({*own.blocked, *seen})[:MAX_PLACES]
+        return msgspec.structs.replace(own, blocked=tuple(places))
+
+    def summary(self, now_s: float) -> Summary | None:
+        """Return what is due on the multihop channel, None where nothing is."""
+        news = self._news or self.census.has_news
+        share = NEWS_SHARE if news else 1.0
+        if self._view is None or now_s - self._sent_s < share * self._round_s - 1e-6:
+            return None
+        regular = now_s >= self._next_round_s
+        self._sent_s, self._news = now_s, False
+        first, labels = 0, b""
+        if regular:
+            self._next_round_s = now_s + self._round_s - 1e-6
+            first, labels = self.census.wire(now_s)
+        return Summary(
+            mission=self._mission,
+            first=first,
+            labels=labels,
+            news=self.census.news(now_s),
+            trees=tuple(self._report(self._view, v) for v in self._reported()),
+        )
+
+    def _reported(self) -> list[int]:
+        """Return the vertices of one summary: as many as fit, other ones in each turn."""
+        known = [v for v, tree in enumerate(self.trees) if tree.tier >= 0]
+        if len(known) <= REPORTS:
+            return known
+        self._turn = (self._turn + REPORTS) % len(known)
+        return sorted((known + known)[self._turn : self._turn + REPORTS])
+
+    def _report(self, view: View, vertex: int) -> TreeReport:
+        tree = self.trees[vertex]
+        return TreeReport(
+            vertex=vertex,
+            tier=tree.tier,
+            parent=tree.parent,
+            down=self._summaries[vertex],
+            up=self._subtree(view, vertex) if tree.parent >= 0 else None,
+        )
+
+    @property
+    def tier(self) -> int:
+        """Tier in the tree of the own queue, -1 in distress."""
+        return self._own_tree.tier if self._own_tree is not None else -1
+
+    @property
+    def parent(self) -> int:
+        """The agent that it follows in the tree of its own queue, -1 for none."""
+        return self._own_tree.parent if self._own_tree is not None else -1
+
+    @property
+    def role(self) -> int:
+        """Index of ROLES."""
+        if self.claim.leads:
+            return VERTEX
+        if self.tier < 0:
+            return DISTRESS
+        return SUB_VERTEX if self._followed else MEMBER
+
+    @property
+    def _own_tree(self) -> Tree | None:
+        claim = self.claim
+        if claim.leads:
+            return self.trees[claim.vertex]
+        return self.trees[self._map.home[claim.queue]] if claim.queue != NO_QUEUE else None
+
+    def standing(self, now_s: float) -> Standing:
+        """Return what the beacon says of the structure."""
+        claim = self.claim
+        return Standing(
+            branches=tuple(tree.branch for tree in self.trees),
+            leads=claim.vertex,
+            queue=claim.queue,
+            heard=self._direct.heard,
+            pushes=claim.pushes(now_s),
+            proposal=claim.proposal,
+            reservation=claim.reservation,
+        )
+
+
+def _branch(heard: Heard, vertex: int) -> Branch | None:
+    standing = heard.standing
+    if standing is None or vertex >= len(standing.branches):
+        return None
+    return standing.branches[vertex]
+
+
+def _differ(a: LeaderSummary, b: LeaderSummary) -> bool:
+    """Whether two summaries differ in what agents act on at once."""
+    return (a.root, a.total, a.counts, a.go, a.order, a.blocked) != (
+        *(b.root, b.total, b.counts, b.go, b.order, b.blocked),
+    )

@@ -1,0 +1,130 @@
+"""The tree of one vertex: its root, and each agent's parent and tier (Algorithm 1, lines 1-11; E15).
+
+The vertex's leader is the root. It states its time in every beacon, and each agent passes on the
+latest time that it heard (the *version*). Of two roots the one with the lower key wins. A root whose
+version stands still is void, and stays so until its version has gone on by ``REVIVAL_S``: otherwise
+the last words of a dead root would go round for ever.
+
+A parent has the lowest tier among the agents heard of the same root, with a margin of range; the
+present parent is kept as long as it is as good. What comes from the root is taken only from agents
+of a lower tier, and what goes to it is sent to the parent.
+"""
+
+from collections.abc import Collection
+from math import dist
+from typing import NamedTuple
+
+from agent.controller import Heard
+from agent.messages import Branch, RootKey
+from agent.structure.link_timing import Timing
+
+VERSIONS_PER_S = 100.0
+REVIVAL_S = 1.0
+NEW_PARENT_WITHIN, PARENT_WITHIN = 0.8, 0.93
+"""Share of the range within which a new parent, and the present one, count as near."""
+MAX_TIER = 1000
+VOID_KEPT = 32
+
+
+class Follower(NamedTuple):
+    """An agent heard, with its branch in this tree."""
+
+    heard: Heard
+    branch: Branch
+
+
+def version_at(time_s: float) -> int:
+    """Return a root's version at a time [s]."""
+    return round(time_s * VERSIONS_PER_S)
+
+
+class Tree:
+    """One agent's view of one vertex's tree, with its own ``parent`` and ``tier``."""
+
+    def __init__(self, own_id: int, now_s: float) -> None:
+        self._own_id = own_id
+        self.root: RootKey | None = None
+        self.version = 0
+        self.parent, self.tier = -1, -1
+        self.advanced_s = now_s
+        """When the version last went on, or the root was last void [s]."""
+        self._void: dict[RootKey, int] = {}
+
+    @property
+    def branch(self) -> Branch | None:
+        """The own branch, for the beacon."""
+        if self.root is None:
+            return None
+        return Branch(self.root, self.version, self.tier, self.parent)
+
+    def take_root(self, key: RootKey, now_s: float) -> None:
+        """Become the root."""
+        if self.root is not None:
+            self._make_void(self.root)
+        self.root, self.version, self.advanced_s = key, version_at(now_s), now_s
+
+    def follow_root(
+        self, now_s: float, followers: Collection[Follower], leading: RootKey | None, timing: Timing
+    ) -> bool:
+        """Take the best root and its latest version; return whether the root is not the own one.
+
+        leading: the own key, if the own agent leads this vertex.
+        """
+        if leading is not None and self.root == leading:
+            self.version, self.advanced_s = version_at(now_s), now_s
+        elif self.root is not None and now_s - self.advanced_s > timing.root_s:
+            self._make_void(self.root)
+            self.root = None
+        latest = version_at(now_s + 1.0)
+        for _, branch in followers:
+            self._compare(branch, now_s, latest)
+        return self.root != leading
+
+    def _compare(self, branch: Branch, now_s: float, latest: int) -> None:
+        key = branch.root
+        if key == self.root:
+            if self.version < branch.version <= latest and key.id != self._own_id:
+                self.version, self.advanced_s = branch.version, now_s
+        elif (self.root is None or key < self.root) and key.id != self._own_id:
+            if self._void.get(key, -1) < branch.version <= latest:
+                self.root, self.version, self.advanced_s = key, branch.version, now_s
+
+    def _make_void(self, key: RootKey) -> None:
+        self._void.pop(key, None)
+        self._void[key] = self.version + version_at(REVIVAL_S)
+        while len(self._void) > VOID_KEPT:
+            del self._void[next(iter(self._void))]
+
+    def choose_parent(
+        self, here: tuple[float, float, float], followers: list[Follower], reach_m: float
+    ) -> None:
+        """Choose the parent. followers: agents heard lately enough to be one."""
+        if self.root is None or self.root.id == self._own_id:
+            self.parent, self.tier = -1, (-1 if self.root is None else 0)
+            return
+        position_of = {each.heard.id: each.heard.position for each in followers}
+
+        def order(each: Follower) -> tuple[int, bool, float, int]:
+            heard, branch = each
+            current = heard.id == self.parent
+            away_m = dist(here, heard.position)
+            near = NEW_PARENT_WITHIN * reach_m
+            if away_m < near or (current and away_m < PARENT_WITHIN * reach_m):
+                far = 0
+            else:
+                far = 1 if away_m < PARENT_WITHIN * reach_m else 2
+            deaf = 0 if heard.hears_me else 1
+            above = position_of.get(branch.parent)
+            to_its_parent = dist(heard.position, above) if above is not None else 0.0
+            return (branch.tier + far + deaf, not current, to_its_parent, heard.id)
+
+        eligible = [
+            each
+            for each in followers
+            if each.branch.root == self.root
+            and 0 <= each.branch.tier < MAX_TIER
+            and each.branch.parent != self._own_id
+        ]
+        best = min(eligible, key=order, default=None)
+        self.parent = best.heard.id if best is not None else -1
+        self.tier = best.branch.tier + 1 if best is not None else -1

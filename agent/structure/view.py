@@ -1,0 +1,145 @@
+"""What one agent knows of the structure at one time: those it hears, and what leaders said."""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from math import dist
+
+from agent.controller import Heard
+from agent.messages import LeaderSummary, Place, Vector
+from agent.places.place_points import OwnTarget
+from agent.qstructure.target_frame import Frame
+from agent.structure.claim import Claim
+from agent.structure.link_timing import Timing
+from agent.structure.queue_map import QueueMap
+
+
+class View:
+    """One agent's knowledge at one time.
+
+    heard: the members heard that fly the same mission. summaries: of each vertex's leader, None
+    where none was heard. blocked: places that are not available (E18).
+    """
+
+    def __init__(
+        self,
+        now_s: float,
+        here: Vector,
+        heard: Sequence[Heard],
+        formation: QueueMap,
+        frame: Frame,
+    ) -> None:
+        self.now_s, self.here, self.heard = now_s, here, heard
+        self.map, self.frame = formation, frame
+        self.timing: Timing
+        self.summaries: Sequence[LeaderSummary | None] = ()
+        self.blocked: frozenset[Place] = frozenset()
+        self.origin = frame.to_frame(here)
+
+    @cached_property
+    def by_id(self) -> Mapping[int, Heard]:
+        """The members heard, by id."""
+        return {each.id: each for each in self.heard}
+
+    @cached_property
+    def counts(self) -> list[int]:
+        """Members of each queue, as leaders count them."""
+        counts = [0] * self.map.queues
+        for v, summary in enumerate(self.summaries):
+            if summary is not None:
+                for j, count in zip(self.map.homed[v], summary.counts, strict=False):
+                    counts[j] = count
+        return counts
+
+    @cached_property
+    def highest(self) -> list[int]:
+        """Number of the last claimed place of each queue."""
+        highest = [0] * self.map.queues
+        for v, summary in enumerate(self.summaries):
+            if summary is not None:
+                for j, number in zip(self.map.homed[v], summary.highest, strict=False):
+                    highest[j] = number
+        return highest
+
+    @cached_property
+    def latest(self) -> LeaderSummary | None:
+        """The latest summary of a leader whose counts were steady."""
+        steady = [each for each in self.summaries if each is not None and each.go]
+        return max(steady, key=lambda each: each.version, default=None)
+
+    @property
+    def total(self) -> int:
+        """Members of the team, 0 if no leader has counted them."""
+        return self.latest.total if self.latest is not None else 0
+
+    @cached_property
+    def shares(self) -> tuple[int, ...]:
+        """Members that each queue should have besides those in vertices."""
+        return self.map.members(self.total, self.blocked)
+
+    def home_of(self, queue: int) -> LeaderSummary | None:
+        """The summary of the leader of a queue's first vertex."""
+        return self.summaries[self.map.home[queue]]
+
+    def same_queue(self, queue: int) -> list[Heard]:
+        """Return the members heard of a queue, besides those that lead a vertex."""
+        return [each for each in self.heard if queue_of(each) == queue and not leads(each)]
+
+    def number_of(self, heard: Heard) -> int:
+        """Return the number that a member claims, 0 for none."""
+        return max(0, self.map.number(heard.place)) if heard.place is not None else 0
+
+    def to_vertex(self, vertex: int, position: Vector | None = None) -> float:
+        """Return the distance of a position from a vertex [m]; the own one if left out."""
+        point = self.frame.to_world(self.map.vertex_points[vertex])
+        return dist(position if position is not None else self.here, point)
+
+    def point(self, queue: int, number: int) -> Vector | None:
+        """Return a member's place [m; world frame]; None where there is none."""
+        slot = self.map.slot(queue, number, self.extent(queue, number))
+        return self.frame.to_world(slot.point) if slot is not None else None
+
+    def extent(self, queue: int, number: int = 1) -> int:
+        """Return with how many members a queue's places are computed (a closed queue's shift)."""
+        members = self.shares[queue] if self.total else 0
+        taken = self.map.blocked_numbers(queue, self.blocked)
+        return max(members + len([each for each in taken if each <= members]), number, 1)
+
+    def distance(self, queue: int, number: int) -> float:
+        """Return the own distance from a member's place [m]; infinite where there is none."""
+        point = self.point(queue, number)
+        return dist(self.here, point) if point is not None else float("inf")
+
+    def nearest_number(self, queue: int, members: int) -> int:
+        """Return the number of a queue's nearest place among its first members."""
+        found = self.map.nearest(queue, self._length(queue, members), self.origin)
+        return found.number if found is not None else 1
+
+    def way_to(self, queue: int, members: int) -> float:
+        """Return the distance from the nearest of a queue's first places [m]."""
+        found = self.map.nearest(queue, self._length(queue, members), self.origin)
+        return found.away_m if found is not None else float("inf")
+
+    def _length(self, queue: int, members: int) -> int:
+        return self.extent(queue, members) if self.map.closed[queue] else members
+
+    def target(self, claim: Claim) -> OwnTarget | None:
+        """Return where the claim's holder flies; None where there is no such place."""
+        if claim.leads and self.map.vertex_places[claim.vertex] not in self.blocked:
+            slot = self.map.vertex_slot(claim.vertex)
+            place = self.map.vertex_places[claim.vertex]
+            return OwnTarget(place, slot, True) if slot is not None else None
+        if claim.number < 1:
+            return None
+        slot = self.map.slot(claim.queue, claim.number, self.extent(claim.queue, claim.number))
+        place = self.map.place(claim.queue, claim.number)
+        return OwnTarget(place, slot, claim.leads) if slot is not None else None
+
+
+def queue_of(heard: Heard) -> int:
+    """Return the queue that a member heard belongs to, -1 for none."""
+    return heard.standing.queue if heard.standing is not None else -1
+
+
+def leads(heard: Heard) -> bool:
+    """Whether a member heard leads a vertex."""
+    return heard.standing is not None and heard.standing.leads >= 0
