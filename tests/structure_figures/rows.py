@@ -37,7 +37,7 @@ WEDGE_S = {9: 60.0, 20: 60.0, 50: 90.0, 100: 140.0}
 """The time in which a wedge has to converge [s]."""
 BOX_M = (5.0, 5.0, 3.0)
 """The start of nine agents; larger fleets start at the same density."""
-NEWS_M = 6.0
+RANGE_M = 6.0
 PARTED_FROM_S = 20.0
 LINE, LINE_RANGE_M, LINE_NOISE_M = 30, 2.5, 0.12
 TURN_FROM_S, TURN_S = 20.0, 92.0
@@ -92,7 +92,7 @@ def changes(radio: str, *actions: str) -> Row:
     """Return a wedge of nine to which actions happen, each once the last is over."""
     apart_s = APART_S[radio]
     events = [f"at_s = {apart_s * (1 + index)}\n{each}" for index, each in enumerate(actions)]
-    return Row(partial(wedge, 9, radio, NEWS_M, apart_s * (2 + len(actions)), events))
+    return Row(partial(wedge, 9, radio, RANGE_M, apart_s * (2 + len(actions)), events))
 
 
 def partition(lasts_s: float, radio: str, *, by_sides: bool) -> Row:
@@ -101,7 +101,7 @@ def partition(lasts_s: float, radio: str, *, by_sides: bool) -> Row:
     def text(seed: int) -> str:
         group = sorted(random.Random(f"parted {seed}").sample(range(9), 4))
         event = f"at_s = {PARTED_FROM_S}\nfor_s = {lasts_s}\npartition = [{group}]"
-        return wedge(9, radio, NEWS_M, PARTED_FROM_S + lasts_s + 60.0, [event], seed)
+        return wedge(9, radio, RANGE_M, PARTED_FROM_S + lasts_s + 60.0, [event], seed)
 
     return Row(text, by_sides)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from tests.structure_figures.flights import SeedRow
 
-NAME_WIDTH, STAGE_WIDTH, FIGURES_WIDTH = 26, 14, 68
+NAME_WIDTH, STAGE_WIDTH, FIGURES_WIDTH = 28, 14, 68
 SHOWN = 8
 """Most seeds that are named."""
 HEADER = (
@@ -41,8 +41,9 @@ def stage_figures(rows: list[Stage], seeds: int) -> str:
     most = max(each["changes_most"] for each in rows)
     after = sum(each["changes_after"] for each in rows)
     away_s = max(each["away_s"] for each in rows)
+    exact = f"{len(times)}/{seeds}" if rows[0]["forms"] else "-"
     return (
-        f"{f'{len(times)}/{seeds}':>7} {spread(times):>17}"
+        f"{exact:>7} {spread(times):>17}"
         f" {f'{median(bounds):.1f}/{max(bounds):.1f}' if bounds else '-':>10}"
         f" {f'{changes:.2f}/{most}':>9} {after:>5} {away_s:>6.1f}"
     )
@@ -59,7 +60,8 @@ def has_failed(seed: SeedRow) -> bool:
     """Return whether a seed shows what must not be."""
     if "failure" in seed or seed["broken"]:
         return True
-    return any(each["converge_s"] is None or each["changes_after"] > 0 for each in seed["stages"])
+    stages = [each for each in seed["stages"] if each["forms"]]
+    return any(each["converge_s"] is None or each["changes_after"] > 0 for each in stages)
 
 
 def _by_stage(flights: list[SeedRow]) -> list[list[Stage]]:

@@ -44,7 +44,7 @@ from worldsim.scenario.target_frame import path_of
 QUIET_S = 60.0
 """For so long after its convergence a team is to keep its places [s]."""
 PARTED = "parted"
-"""The stage of a partition: no component is the whole team, so nothing is measured."""
+"""The stage of a partition: no component is the whole team, so only changes are measured."""
 
 
 @dataclass
@@ -70,6 +70,7 @@ class Stage:
         late = [time_s for time_s, _ in self.moves if after < time_s <= quiet_until_s]
         return {
             "stage": self.name,
+            "forms": self.name != PARTED,
             "from_s": self.from_s,
             "converge_s": None if at_s is None else round(at_s - self.from_s, 6),
             "bound_s": self.bound_s,
@@ -147,12 +148,11 @@ class Watcher:
         self.done = self._is_done(stage)
 
     def stages(self) -> list[dict[str, Any]]:
-        """Return the figures of each stage that is measured."""
+        """Return the figures of each stage."""
         ends = [stage.from_s for stage, _ in self._stages[1:]] + [self._time_s]
         return [
             stage.figures(until_s, agents, self._tick_s)
             for (stage, agents), until_s in zip(self._stages, ends, strict=True)
-            if stage.name != PARTED
         ]
 
     def _is_done(self, stage: Stage) -> bool:
