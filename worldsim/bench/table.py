@@ -7,9 +7,16 @@ from netem.link_parameters import Conditions
 from worldsim.bench.fleets import EIGHT_IN_RANGE_M, flight_cpu_s, wedge
 from worldsim.bench.part_costs import control_step_us, frame_us
 from worldsim.bench.recording_cost import recording_mb, recording_us
+from worldsim.bench.team_growth import AgentCost, agent_cost
 
 TICK_HZ = 20.0
 WEDGE_S = 20.0
+RADIO_SIZES = (9, 20, 50, 100, 200)
+"""Teams whose traffic is measured."""
+STEP_SIZES = (10, 100, 200)
+"""Teams whose steps are measured."""
+Measure = tuple[str, str, float | None, bool, Callable[[], float]]
+"""A row's name, unit, goal, whether more is better, and what measures it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,14 +26,17 @@ class Row:
     name: str
     unit: str
     """Of goal and measured."""
-    goal: float
+    goal: float | None
+    """None: the figure is there to be known."""
     measured: float
     more: bool
     """Whether a greater value is better; then the goal is the least value."""
 
     @property
     def reached(self) -> bool:
-        """Whether the goal is reached."""
+        """Whether the goal is reached, if there is one."""
+        if self.goal is None:
+            return True
         return self.measured >= self.goal if self.more else self.measured <= self.goal
 
 
@@ -39,7 +49,48 @@ def _steps_per_cpu_s(agents: int, duration_s: float) -> Callable[[], float]:
     return lambda: agents * TICK_HZ * duration_s / flight_cpu_s(scenario)
 
 
-MEASURES: tuple[tuple[str, str, float, bool, Callable[[], float]], ...] = (
+def _cost(
+    name: str, unit: str, agents: int, figure: Callable[[AgentCost], float], goal: float | None
+) -> Measure:
+    return f"{name}, N = {agents}", unit, goal, False, lambda: figure(agent_cost(agents))
+
+
+def _growth(
+    name: str, agents: int, least: int, figure: Callable[[AgentCost], float], goal: float
+) -> Measure:
+    def ratio() -> float:
+        return figure(agent_cost(agents)) / figure(agent_cost(least))
+
+    return f"{name}, N = {agents} against {least}", "x", goal, False, ratio
+
+
+def _radio_rows() -> Iterator[Measure]:
+    """Yield the size of a beacon and the traffic of an agent, by the team's size."""
+    for agents in RADIO_SIZES:
+        yield _cost("beacon, encoded", "B", agents, lambda cost: cost.beacon_b, None)
+    for agents in RADIO_SIZES:
+        yield _cost("local channel", "B/agent-s", agents, lambda cost: cost.local_bps, None)
+    for agents in RADIO_SIZES:
+        yield _cost("multihop channel", "B/agent-s", agents, lambda cost: cost.multihop_bps, None)
+    yield _cost("both channels", "B/agent-s", 100, lambda cost: cost.sent_bps, 5500.0)
+    for agents in RADIO_SIZES[1:]:
+        yield _growth("both channels", agents, RADIO_SIZES[0], lambda cost: cost.sent_bps, 1.1)
+
+
+def _step_rows() -> Iterator[Measure]:
+    """Yield the CPU time of an agent's step, by the team's size."""
+    least = STEP_SIZES[0]
+    for agents in STEP_SIZES:
+        yield _cost("agent step, mean", "us", agents, lambda cost: cost.step_us, None)
+        yield _cost("agent step, dearest 1 %", "us", agents, lambda cost: cost.dearest_us, None)
+        yield _cost("agent step, worst", "us", agents, lambda cost: cost.worst_us, None)
+        yield _cost("flight, for each agent step", "us", agents, lambda cost: cost.flight_us, None)
+    for agents in STEP_SIZES[1:]:
+        yield _growth("agent step, mean", agents, least, lambda cost: cost.step_us, 1.3)
+        yield _growth("agent step, dearest 1 %", agents, least, lambda cost: cost.dearest_us, 1.3)
+
+
+MEASURES: tuple[Measure, ...] = (
     ("control step, 8 neighbours, 4 obstacles", "us", 30.0, False, control_step_us),
     ("medium, a frame, N = 9, clean", "us", 15.0, False, lambda: frame_us(9)),
     ("medium, a frame, N = 100, clean", "us", 15.0, False, lambda: frame_us(100)),
@@ -55,6 +106,8 @@ MEASURES: tuple[tuple[str, str, float, bool, Callable[[], float]], ...] = (
     ("virtual time, N = 100", "agent-steps/CPU s", 20_000.0, True, _steps_per_cpu_s(100, 2.0)),
     ("recording, a tick, N = 200", "us", 500.0, False, lambda: recording_us(200)),
     ("recording, N = 200", "MB a minute", 25.0, False, lambda: recording_mb(200)),
+    *_radio_rows(),
+    *_step_rows(),
 )
 
 

@@ -3,12 +3,15 @@
 import os
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from worldsim.commands.options import examples
 from worldsim.results.exit_status import PASS
+
+if TYPE_CHECKING:
+    from worldsim.bench.table import Row
 
 commands = typer.Typer()
 
@@ -26,10 +29,10 @@ def bench(
         typer.Option("--json", metavar="FILE", help="Also write the figures as JSON."),
     ] = None,
 ) -> int:
-    """Measure the CPU cost of agents, radio and recording.
+    """Measure the cost of agents, radio and recording: CPU time, and bytes on the air.
 
-    The figures are CPU time of one core, not wall time, though a busy host still adds to them.
-    It takes about half a minute.
+    The CPU time is that of one core, not wall time, though a busy host still adds to it. Rows of
+    whole teams are measured once. It takes about two minutes.
     """
     from worldsim.bench.table import measured
     from worldsim.results.run_folder import write_json
@@ -42,9 +45,17 @@ def bench(
     rows = []
     for row in measured(repeats):
         rows.append({**asdict(row), "reached": row.reached})
-        goal = f"goal {'>=' if row.more else '<='} {row.goal:g}"
-        verdict = "" if row.reached else "  not reached"
-        print(f"{row.name:44} {row.measured:10.1f} {row.unit:18} {goal}{verdict}", flush=True)
+        print(_line(row), flush=True)
     if json is not None:
         write_json(json, {"rows": rows})
     return PASS
+
+
+def _line(row: "Row") -> str:
+    """Return a row as it is printed."""
+    figure = f"{row.measured:10.2f}" if row.unit == "x" else f"{row.measured:10.1f}"
+    line = f"{row.name:44} {figure} {row.unit}"
+    if row.goal is None:
+        return line
+    verdict = "" if row.reached else "  not reached"
+    return f"{line:73} goal {'>=' if row.more else '<='} {row.goal:g}{verdict}"
