@@ -152,8 +152,8 @@ class Control(Table, frozen=True):
 
     avoidance: what leads round obstacles before the safety filter has to stop the vehicle: the bent
     lines of Algorithm 3, a direct repulsion from each near point, or only the escape manoeuvre.
-    allocation: who takes which place: "structure" by leaders, trees and neighbours; "assignment" for
-    comparison: every agent knows all members and solves for all (E24).
+    allocation: who takes which place: "structure" by leaders, trees and neighbours; "assignment",
+    for comparison, by every agent alike, which knows all members (E24).
     clearance_m: distance from a vehicle's centre to an obstacle's surface that the safety filter
     keeps. ``cast_far_m`` left out follows from the range (Lemma 7, E20).
     """

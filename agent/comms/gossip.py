@@ -141,7 +141,8 @@ class RecordTable:
     def frames(self, now_s: float, own: Record | None, pieces: Sequence[Piece] = ()) -> list[bytes]:
         """Return the payloads of one round: the whole table, the own record first.
 
-        own: None where the table is not passed on. pieces: of a mission that a neighbour lacks; each travels in a frame of its own.
+        own: None where the table is not passed on. pieces: of a mission that a neighbour lacks;
+        each travels in a frame of its own.
         """
         frames = [
             Gossip(id=self._own_id, stamp_s=now_s, records=chunk, piece=None)

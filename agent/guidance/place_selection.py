@@ -25,7 +25,7 @@ class PlaceSelection(Protocol):
         """Return the own target now; None for an agent without one."""
 
     def words(self, now_s: float) -> Words:
-        """Return what the agent says of its part in the structure; once a tick, after ``select``."""
+        """Return what the agent says of its part; call it once a tick, after ``select``."""
 
 
 def place_selection(setup: AgentSetup) -> PlaceSelection:

@@ -49,7 +49,8 @@ class OccupiedSlots:
     ) -> frozenset[Place]:
         """Return the places that are not available, by own sight and by others' reports.
 
-        holders: the known members; agents: size of the team; reported: places that others see taken.
+        holders: the known members; agents: size of the team; reported: places that others see
+        taken.
         """
         if agents > self._agents:
             self._grown_s = senses.now_s

@@ -4,34 +4,40 @@ Each member has a label: the time at which it was last known to be there, and it
 labels of a member the later one holds, so labels may travel any way, any number of times. A member
 whose label has not become later for longer than its way here explains is gone.
 
-On the radio a label takes two bytes: its age in quanta of 0.25 s, and a code of its queue.
+On the radio a label takes two bytes: its age in quanta of 0.25 s, and a code of its queue. In
+memory it is the time in quanta times CODES, plus the code; a label on the radio is then its
+distance from the greatest label of the frame's time.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+import sys
+from array import array
+from collections import Counter
+from typing import NamedTuple
 
 from agent.messages import MAX_LABELS_B, Summary
 
 QUANTUM_S = 0.25
 """Resolution of a label's time [s]."""
-MAX_QUANTA = 254
-UNKNOWN_AGE = 255
-"""Age of a label of which nothing is known."""
 CODES = 256
+UNKNOWN = 0xFFFF
+"""The label on the radio of a member of which nothing is known."""
+MAX_QUANTA = 254
 UNPLACED = 1
 """Code of a member without a queue."""
 FIRST_QUEUE, FIRST_VERTEX = 2, 128
 """Codes of the members of queue j, and of the holder of vertex v, are these plus j or v."""
+WORTH_QUANTA = 2
+"""A repeated label is taken if it is so much later: to take each would cost time for nothing."""
 LAG_SMOOTHING = 0.25
 LAGS = 2.0
 """A label may stand still for so many of its usual lags, besides T_lost."""
+MAX_LABELLED = 2**14
+"""Ids from here on are not counted."""
 SHARED_LABELS = MAX_LABELS_B // 2
 NEWS = 48
 """Most news in one frame."""
-
-Labels = NDArray[np.int64]
 
 
 class Population(NamedTuple):
@@ -47,13 +53,18 @@ class Census:
 
     def __init__(self, own_id: int, ids: int) -> None:
         self._own = own_id
-        self._ids = ids
-        self._labels: Labels = np.zeros(0, np.int64)
-        """Time [quanta] * CODES + code; 0: nothing known."""
-        self._lag_s: NDArray[np.float64] = np.zeros(0)
-        self._told: Labels = np.zeros(0, np.int64)
-        """The codes that others were told last."""
+        self._ids = min(ids, MAX_LABELLED)
+        self._labels: list[int] = []
+        self._lag_s: list[float] = []
+        """How old labels are when they arrive, by member [s]."""
+        self._changed: set[int] = set()
+        """Members whose queue changed since others were told."""
         self._from = 0
+
+    @property
+    def has_news(self) -> bool:
+        """Whether a member's queue changed since others were told."""
+        return bool(self._changed)
 
     def hear(self, member: int, stamp_s: float, code: int) -> None:
         """Note a member heard directly, or the own agent."""
@@ -62,82 +73,101 @@ class Census:
         self._make_room(member + 1)
         label = int(stamp_s / QUANTUM_S) * CODES + code
         if label > self._labels[member]:
-            self._labels[member] = label
+            self._set(member, label)
             self._lag_s[member] *= 1.0 - LAG_SMOOTHING
 
     def merge(self, summary: Summary, stamp_s: float, now_s: float) -> None:
         """Take the labels of another agent, as they were at its stamp [s]."""
+        greatest = int(stamp_s / QUANTUM_S) * CODES + CODES - 1
+        for member, label in summary.news:
+            if member < self._ids and label != UNKNOWN:
+                self._make_room(member + 1)
+                if greatest - label > self._labels[member]:
+                    self._adopt(member, greatest - label, now_s)
         if summary.labels:
-            raw = np.frombuffer(summary.labels[: len(summary.labels) // 2 * 2], "<u2")
-            first = summary.first
-            raw = raw[: max(0, self._ids - first)]
-            self._adopt(np.arange(first, first + len(raw)), raw.astype(np.int64), stamp_s, now_s)
-        news = [(member, label) for member, label in summary.news if member < self._ids]
-        if news:
-            members, labels = zip(*news, strict=True)
-            self._adopt(np.array(members), np.array(labels, np.int64), stamp_s, now_s)
+            self._merge_run(summary.first, summary.labels, greatest, now_s)
 
-    def _adopt(
-        self, members: NDArray[np.int64], wire: Labels, stamp_s: float, now_s: float
-    ) -> None:
-        if not len(members):
+    def _merge_run(self, first: int, labels: bytes, greatest: int, now_s: float) -> None:
+        wire = _unpacked(labels)
+        end = min(first + len(wire), self._ids)
+        self._make_room(end)
+        limit = greatest - WORTH_QUANTA * CODES
+        known = self._labels[first:end]
+        later = [
+            k for k, (w, mine) in enumerate(zip(wire, known, strict=False)) if w + mine < limit
+        ]
+        for k in later:
+            if wire[k] != UNKNOWN:
+                self._adopt(first + k, greatest - wire[k], now_s)
+
+    def _adopt(self, member: int, label: int, now_s: float) -> None:
+        if member == self._own:
             return
-        self._make_room(int(members.max()) + 1)
-        age = wire // CODES
-        at = int(stamp_s / QUANTUM_S) - age
-        new = at * CODES + wire % CODES
-        later = (age < UNKNOWN_AGE) & (new > self._labels[members]) & (members != self._own)
-        if not later.any():
-            return
-        members, new, at = members[later], new[later], at[later]
-        moved = self._labels[members] // CODES < at
-        lag = np.maximum(now_s - at * QUANTUM_S, 0.0)
-        before = self._lag_s[members]
-        self._lag_s[members] = np.where(moved, before + LAG_SMOOTHING * (lag - before), before)
-        self._labels[members] = new
+        lag_s = max(now_s - label // CODES * QUANTUM_S, 0.0)
+        self._lag_s[member] += LAG_SMOOTHING * (lag_s - self._lag_s[member])
+        self._set(member, label)
+
+    def _set(self, member: int, label: int) -> None:
+        if label % CODES != self._labels[member] % CODES:
+            self._changed.add(member)
+        self._labels[member] = label
 
     def population(self, now_s: float, lost_s: float, queues: int, vertices: int) -> Population:
         """Return who is there now. lost_s: T_lost of a neighbour [s]."""
-        codes = self._labels[self._alive(now_s, lost_s)] % CODES
-        counts = np.bincount(codes, minlength=CODES)
+        codes = Counter(self._codes(now_s, lost_s))
         return Population(
-            total=len(codes),
-            members=tuple(counts[FIRST_QUEUE : FIRST_QUEUE + queues].tolist()),
-            holders=tuple(counts[FIRST_VERTEX : FIRST_VERTEX + vertices].tolist()),
+            total=codes.total(),
+            members=tuple([codes[FIRST_QUEUE + j] for j in range(queues)]),
+            holders=tuple([codes[FIRST_VERTEX + v] for v in range(vertices)]),
         )
 
-    def _alive(self, now_s: float, lost_s: float) -> NDArray[np.bool_]:
-        silent_s = now_s - (self._labels // CODES) * QUANTUM_S
-        return (self._labels > 0) & (silent_s <= lost_s + QUANTUM_S + LAGS * self._lag_s)
+    def _codes(self, now_s: float, lost_s: float) -> list[int]:
+        """Return the code of each member that is there."""
+        oldest_s = now_s - lost_s - QUANTUM_S
+        scale = QUANTUM_S / CODES
+        return [
+            label % CODES
+            for label, lag_s in zip(self._labels, self._lag_s, strict=True)
+            if label and label * scale >= oldest_s - LAGS * lag_s
+        ]
 
     def wire(self, now_s: float) -> tuple[int, bytes]:
         """Return the first id and the labels of one frame; of many ids other ones in each turn."""
         first = self._from if self._from < len(self._labels) else 0
         self._from = first + SHARED_LABELS
-        return first, self._encoded(self._labels[first : first + SHARED_LABELS], now_s).tobytes()
+        shared = self._labels[first : first + SHARED_LABELS]
+        return first, _packed([_on_the_radio(label, now_s) for label in shared])
 
     def news(self, now_s: float) -> tuple[tuple[int, int], ...]:
-        """Return members whose queue changed since others were told; calling it counts as that."""
-        changed = np.flatnonzero(self._labels % CODES != self._told)[:NEWS]
-        if not len(changed):
-            return ()
-        self._told[changed] = self._labels[changed] % CODES
-        wire = self._encoded(self._labels[changed], now_s)
-        return tuple(zip(changed.tolist(), wire.tolist(), strict=True))
-
-    @property
-    def has_news(self) -> bool:
-        """Whether a member's queue changed since others were told."""
-        return bool((self._labels % CODES != self._told).any())
-
-    def _encoded(self, labels: Labels, now_s: float) -> NDArray[np.uint16]:
-        age = np.clip(int(now_s / QUANTUM_S) - labels // CODES, 0, MAX_QUANTA)
-        age = np.where(labels > 0, age, UNKNOWN_AGE)
-        return (age * CODES + labels % CODES).astype("<u2")
+        """Return the labels of members whose queue changed; from then on others are told."""
+        told = sorted(self._changed)[:NEWS]
+        self._changed.difference_update(told)
+        return tuple([(member, _on_the_radio(self._labels[member], now_s)) for member in told])
 
     def _make_room(self, members: int) -> None:
         missing = members - len(self._labels)
         if missing > 0:
-            self._labels = np.pad(self._labels, (0, missing))
-            self._told = np.pad(self._told, (0, missing))
-            self._lag_s = np.pad(self._lag_s, (0, missing))
+            self._labels += [0] * missing
+            self._lag_s += [0.0] * missing
+
+
+def _on_the_radio(label: int, now_s: float) -> int:
+    """Return a label as it is sent at a time [s]."""
+    age = max(0, int(now_s / QUANTUM_S) - label // CODES)
+    if label == 0 or age > MAX_QUANTA:
+        return UNKNOWN
+    return age * CODES + CODES - 1 - label % CODES
+
+
+def _packed(labels: list[int]) -> bytes:
+    found = array("H", labels)
+    if sys.byteorder == "big":
+        found.byteswap()
+    return found.tobytes()
+
+
+def _unpacked(labels: bytes) -> array[int]:
+    found = array("H", labels[: len(labels) // 2 * 2])
+    if sys.byteorder == "big":
+        found.byteswap()
+    return found

@@ -126,7 +126,7 @@ def _offered(subtree: Subtree, index: int) -> Sequence[Candidate]:
 def _cheapest(
     given: dict[int, list[int]], spare: dict[int, int], offered: dict[int, Sequence[Candidate]]
 ) -> list[Order]:
-    """Return orders for the candidates with the least extra way, as many as queues give and take."""
+    """Return orders for the candidates with the least extra way, as many as are to move."""
     left = {j: list(takers) for j, takers in given.items()}
     shared = len({id(takers) for takers in given.values()}) == 1
     if shared:

@@ -36,7 +36,7 @@ class StructureMember:
         return self._structure.update(senses)
 
     def words(self, now_s: float) -> Words:
-        """Return what the agent says of its part in the structure; once a tick, after ``select``."""
+        """Return what the agent says of its part; call it once a tick, after ``select``."""
         own = self._structure
         if own is None:
             return NO_WORDS

@@ -178,9 +178,8 @@ class Numbers:
             return False
         near = view.distance(queue, number) < NEAR_M
         lower = [k for k in occupied if k < number]
-        if not near and not (lower and empty_s > FAR_GAP_S + latency_s):
-            return False
-        if empty_s <= GAP_S + latency_s:
+        wait_s = (GAP_S if near or not lower else FAR_GAP_S) + latency_s
+        if empty_s <= wait_s or not (near or lower):
             return False
         self._claim(view, claim, _available(max(lower, default=0) + 1, taken))
         return True

@@ -34,10 +34,8 @@ class Swaps:
             return True
         if claim.reservation is not None:
             self._release(view, claim, claim.reservation)
-        if claim.reservation is None and not claim.pushes(view.now_s):
-            if self._accept(view, claim):
-                return True
-        return claim.proposal is not None
+        free = claim.reservation is None and not claim.pushes(view.now_s)
+        return (free and self._accept(view, claim)) or claim.proposal is not None
 
     def _complete_for_partner(self, view: View, claim: Claim) -> bool:
         """Take the place that another keeps for the own agent, having taken its place."""
@@ -53,10 +51,10 @@ class Swaps:
         """Whether the partner has taken the own place; drops a proposal without an answer."""
         other = view.by_id.get(proposal.partner)
         kept = other.standing.reservation if other is not None and other.standing else None
-        if other is not None and kept is not None and kept.partner == self._own_id:
-            if kept.place == proposal.other and other.place == proposal.place:
-                self._take(view, claim, kept.place)
-                return True
+        agreed = kept == Swap(self._own_id, proposal.other, proposal.place)
+        if agreed and other is not None and other.place == proposal.place:
+            self._take(view, claim, proposal.other)
+            return True
         own = view.map.place(claim.queue, claim.number)
         stale = view.now_s - claim.proposed_s > view.timing.pending_s
         if other is None or other.place != proposal.other or own != proposal.place or stale:
@@ -83,10 +81,8 @@ class Swaps:
                 continue
             if other.place != asked.place or other.age_s > FRESH_S + 2.0 * view.timing.latency_s:
                 continue
-            if claim.proposal is not None:
-                mutual = claim.proposal.partner == other.id
-                if not (mutual and self._own_id > other.id):
-                    continue
+            if claim.proposal is not None and not self._yields(claim.proposal, other):
+                continue
             gain = self._gain(view, claim, other)
             if gain > ACCEPTED_SHARE * GAIN_M2 and (best is None or gain > best[0]):
                 best = gain, other
@@ -97,6 +93,10 @@ class Swaps:
         claim.reservation = Swap(best[1].id, own, taken)
         claim.reserved_s = view.now_s
         return True
+
+    def _yields(self, proposal: Swap, other: Heard) -> bool:
+        """Whether the own proposal gives way to the one of its partner."""
+        return proposal.partner == other.id and self._own_id > other.id
 
     def propose(self, view: View, claim: Claim) -> None:
         """Propose the swap that gains most, if any gains enough."""

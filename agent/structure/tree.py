@@ -1,9 +1,9 @@
-"""The tree of one vertex: its root, and each agent's parent and tier (Algorithm 1, lines 1-11; E15).
+"""The tree of one vertex: its root, each agent's parent and tier (Algorithm 1, lines 1-11; E15).
 
 The vertex's leader is the root. It states its time in every beacon, and each agent passes on the
-latest time that it heard (the *version*). Of two roots the one with the lower key wins. A root whose
-version stands still is void, and stays so until its version has gone on by ``REVIVAL_S``: otherwise
-the last words of a dead root would go round for ever.
+latest time that it heard (the *version*). Of two roots the one with the lower key wins. A root
+whose version stands still is void, and stays so until its version has gone on by ``REVIVAL_S``:
+otherwise the last words of a dead root would go round for ever.
 
 A parent has the lowest tier among the agents heard of the same root, with a margin of range; the
 present parent is kept as long as it is as good. What comes from the root is taken only from agents
@@ -82,12 +82,12 @@ class Tree:
 
     def _compare(self, branch: Branch, now_s: float, latest: int) -> None:
         key = branch.root
-        if key == self.root:
-            if self.version < branch.version <= latest and key.id != self._own_id:
-                self.version, self.advanced_s = branch.version, now_s
-        elif (self.root is None or key < self.root) and key.id != self._own_id:
-            if self._void.get(key, -1) < branch.version <= latest:
-                self.root, self.version, self.advanced_s = key, branch.version, now_s
+        if key.id == self._own_id or branch.version > latest:
+            return
+        known = self.version if key == self.root else self._void.get(key, -1)
+        wins = self.root is None or key <= self.root
+        if wins and branch.version > known:
+            self.root, self.version, self.advanced_s = key, branch.version, now_s
 
     def _make_void(self, key: RootKey) -> None:
         self._void.pop(key, None)

@@ -77,7 +77,7 @@ class View:
         return self.map.members(self.total, self.blocked)
 
     def home_of(self, queue: int) -> LeaderSummary | None:
-        """The summary of the leader of a queue's first vertex."""
+        """Return the summary of the leader of a queue's first vertex."""
         return self.summaries[self.map.home[queue]]
 
     def same_queue(self, queue: int) -> list[Heard]:
