@@ -265,6 +265,8 @@ class Candidate(NamedTuple):
     to: Index
 
 
+MAX_CANDIDATES = 8
+"""Most candidates of a queue in one report."""
 Orders = Annotated[tuple[Order, ...], Meta(max_length=64)]
 Histogram = Annotated[bytes, Meta(min_length=0, max_length=64)]
 """Agents by distance from the vertex, one byte a bin; see agent.structure.histogram."""
@@ -292,7 +294,8 @@ class Subtree(Message, frozen=True):
     highest: Counts
     histogram: Histogram
     candidates: Annotated[
-        tuple[Annotated[tuple[Candidate, ...], Meta(max_length=8)], ...], Meta(max_length=64)
+        tuple[Annotated[tuple[Candidate, ...], Meta(max_length=MAX_CANDIDATES)], ...],
+        Meta(max_length=64),
     ]
     blocked: Places
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from agent.messages import MAX_PLACES, Candidate, Place, Subtree, TreeReport
+from agent.messages import MAX_CANDIDATES, MAX_PLACES, Candidate, Place, Subtree, TreeReport
 from agent.structure import histogram
 from agent.structure.leader import CANDIDATES
 
@@ -50,19 +50,33 @@ def joined(parts: Iterable[Subtree], queues: int) -> Subtree:
     return Subtree(
         highest=tuple(highest),
         histogram=histogram.total(histograms),
-        candidates=tuple(tuple(sorted(each)[:CANDIDATES]) for each in candidates),
+        candidates=tuple(_cheapest(each) for each in candidates),
         blocked=tuple(sorted(blocked)[:MAX_PLACES]),
     )
 
 
+def _cheapest(candidates: set[Candidate]) -> tuple[Candidate, ...]:
+    """Return the candidates with the least extra way to each other queue."""
+    kept: dict[int, list[Candidate]] = {}
+    for each in sorted(candidates):
+        to_it = kept.setdefault(each.to, [])
+        if len(to_it) < CANDIDATES:
+            to_it.append(each)
+    return tuple(sorted(each for to_it in kept.values() for each in to_it)[:MAX_CANDIDATES])
+
+
 def own_part(
-    queues: Sequence[int], queue: int, number: int, away_m: float, candidate: Candidate | None
+    queues: Sequence[int],
+    queue: int,
+    number: int,
+    away_m: float,
+    candidates: tuple[Candidate, ...],
 ) -> Subtree:
     """Return one agent's own part. queues: those of the vertex; away_m: distance from it [m]."""
     mine = [queue == j for j in queues]
     return Subtree(
         highest=tuple(number if each else 0 for each in mine),
         histogram=histogram.of_one(away_m) if any(mine) else histogram.EMPTY,
-        candidates=tuple((candidate,) if each and candidate else () for each in mine),
+        candidates=tuple(candidates if each else () for each in mine),
         blocked=(),
     )

@@ -12,6 +12,8 @@ from agent.structure.claim import Claim
 from agent.structure.tree import Tree
 from agent.structure.view import View, leads, queue_of
 
+ALONE_S = 1.5
+"""Who hears no other agent listens so long before it leads: beacons may be on their way."""
 MAX_COST_CM = 2**31 - 1
 TURN_S, TURN_LATENCIES, TURN_STEP_S = 1.3, 4.0, 0.5
 """How much longer agents of other queues wait for a shared vertex than those of the queue that has
@@ -53,8 +55,8 @@ class Election:
     def _is_next(self, view: View, claim: Claim, tree: Tree, vertex: int) -> bool:
         now_s, timing = view.now_s, view.timing
         if claim.number < 1:
-            listened = now_s - self._started_s >= timing.listen_s
-            return listened and self._is_nearest(view, vertex)
+            listen_s = timing.listen_s if view.heard else ALONE_S
+            return now_s - self._started_s >= listen_s and self._is_nearest(view, vertex)
         wait_s = timing.lost_s + self._turn_s(view, claim, vertex)
         return now_s - tree.advanced_s > wait_s and self._is_first(view, claim, vertex)
 

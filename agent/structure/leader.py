@@ -16,7 +16,7 @@ from agent.structure.tree import version_at
 from agent.structure.view import View
 
 CANDIDATES = 4
-"""Most candidates of a queue that are passed on."""
+"""Most candidates of a queue for another one that are passed on."""
 MAX_ORDERS = 16
 FOLLOWED_S, FOLLOWED_LATENCIES = 2.5, 6.0
 """How long a leader waits for its orders to show in the counts."""
@@ -105,7 +105,9 @@ class Leader:
         spare = {j: counts[j] - shares[j] for j in own}
         offered = {j: _offered(subtree, homed.index(j)) for j in own}
         orders = _cheapest(own, spare, offered)
-        complete = all(len(offered[j]) >= min(CANDIDATES, spare[j]) for j in own)
+        complete = all(
+            len({each.agent for each in offered[j]}) >= min(CANDIDATES, spare[j]) for j in own
+        )
         wait_s = COLLECTED_S + COLLECTED_LATENCIES * view.timing.latency_s + self._round_s
         if orders and (complete or view.now_s - self._uneven_s > wait_s):
             self._issue(view, orders, counts)

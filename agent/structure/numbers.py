@@ -32,6 +32,8 @@ class Numbers:
         self._started_s = started_s
         self._seen_s: dict[tuple[int, int], float] = {}
         """When each number of a queue was last heard to be claimed [s]."""
+        self._holder: dict[tuple[int, int], int] = {}
+        """Who was last heard to claim it."""
         self._first_count, self._first_s = 0, 0.0
 
     def take_first(self, view: View, claim: Claim) -> None:
@@ -100,8 +102,8 @@ class Numbers:
             claim.ranked = False
             return True
         occupied = self._occupied(view, same)
-        for number in occupied:
-            self._seen_s[(claim.queue, number)] = view.now_s
+        for other in same:
+            self._note_holder(view, claim.queue, other)
         if view.now_s - claim.since_s <= view.timing.hold_s:
             return False
         return self._resolve(view, claim, same, occupied) or self._close_gap(
@@ -162,18 +164,15 @@ class Numbers:
 
     def _close_gap(self, view: View, claim: Claim, same: list[Heard], occupied: set[int]) -> bool:
         """Move inwards where nobody is heard to stand below."""
-        queue, number, now_s = claim.queue, claim.number, view.now_s
+        queue, number, count = claim.queue, claim.number, view.counts[claim.queue]
         taken = view.map.blocked_numbers(queue, view.blocked)
+        if len(same) + 1 >= count > 0:
+            return self._close_all_gaps(view, claim, occupied, taken)
         below = _below(number, taken)
         if below < 1 or below in occupied or self._is_kept(view, queue, below):
             return False
-        empty_s = now_s - max(self._seen_s.get((queue, below), 0.0), claim.since_s)
-        latency_s, count = view.timing.latency_s, view.counts[queue]
-        if len(same) + 1 >= count > 0:
-            if empty_s <= COMPLETE_GAP_S + latency_s:
-                return False
-            self._claim(view, claim, self._after_gaps(view, claim, occupied, taken))
-            return True
+        latency_s = view.timing.latency_s
+        empty_s = view.now_s - max(self._seen_s.get((queue, below), 0.0), claim.since_s)
         if view.home_of(queue) is not None and view.highest[queue] <= _nth_available(count, taken):
             return False
         near = view.distance(queue, number) < NEAR_M
@@ -184,21 +183,37 @@ class Numbers:
         self._claim(view, claim, _available(max(lower, default=0) + 1, taken))
         return True
 
-    def _after_gaps(
+    def _close_all_gaps(
         self, view: View, claim: Claim, occupied: set[int], taken: frozenset[int]
-    ) -> int:
-        """Return the number after all gaps below are closed: by each agent above them alike."""
-        wait_s = COMPLETE_GAP_S + view.timing.latency_s
-        gaps = sum(
-            k not in occupied
-            and k not in taken
-            and view.now_s - self._seen_s.get((claim.queue, k), 0.0) > wait_s
+    ) -> bool:
+        """Close all gaps below at once, as each agent above them does, where all are heard."""
+        gaps = [
+            k
             for k in range(1, claim.number)
-        )
+            if k not in occupied and k not in taken and self._is_free(view, claim, k)
+        ]
+        if not gaps:
+            return False
         number = claim.number
-        for _ in range(max(1, gaps)):
+        for _ in gaps:
             number = _below(number, taken)
-        return max(number, _available(1, taken))
+        self._claim(view, claim, max(number, _available(1, taken)))
+        return True
+
+    def _is_free(self, view: View, claim: Claim, number: int) -> bool:
+        """Whether a number has no holder: it was not heard for a while, or announces another."""
+        place = (claim.queue, number)
+        if self._is_kept(view, *place):
+            return False
+        if self._holder.get(place) in view.by_id:
+            return True
+        empty_s = view.now_s - max(self._seen_s.get(place, 0.0), claim.since_s)
+        return empty_s > COMPLETE_GAP_S + view.timing.latency_s
+
+    def _note_holder(self, view: View, queue: int, other: Heard) -> None:
+        place = (queue, view.number_of(other))
+        self._seen_s[place] = view.now_s
+        self._holder[place] = other.id
 
     def _is_kept(self, view: View, queue: int, number: int) -> bool:
         """Whether somebody heard keeps a number for its partner in a swap."""

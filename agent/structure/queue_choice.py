@@ -64,27 +64,26 @@ class QueueChoice:
         claim.take(order.to, number, view.distance(order.to, number), view.now_s)
         claim.push_until_s = view.now_s + view.timing.push_s
 
-    def candidate(self, view: View, claim: Claim) -> Candidate | None:
-        """Return the least extra way to a queue that the own one may give to."""
+    def candidates(self, view: View, claim: Claim) -> tuple[Candidate, ...]:
+        """Return the extra way to each queue that the own one may give to."""
         if claim.queue == NO_QUEUE or claim.leads or claim.swapping or claim.pushes(view.now_s):
-            return None
+            return ()
         takers = transfers(view.map, view.counts, view.shares).get(claim.queue)
-        if view.total == 0 or takers is None:
-            return None
+        if takers is None:
+            return ()
         own_m = (
             view.distance(claim.queue, claim.number)
             if claim.number > 0
             else view.way_to(claim.queue, view.counts[claim.queue])
         )
-        return min(
-            (
-                Candidate(
-                    round(10.0 * (view.way_to(j, view.counts[j] + 1) - own_m)), self._own_id, j
-                )
-                for j, number in enumerate(takers)
-                if number > 0
-            ),
-            default=None,
+        return tuple(
+            Candidate(
+                extra_dm=round(10.0 * (view.way_to(j, view.counts[j] + 1) - own_m)),
+                agent=self._own_id,
+                to=j,
+            )
+            for j, number in enumerate(takers)
+            if number > 0
         )
 
 

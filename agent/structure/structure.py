@@ -5,7 +5,7 @@ lead of a vertex. What is urgent goes into its beacons (:class:`~agent.messages.
 slow goes into summaries on the multihop channel, sooner while there is news.
 """
 
-from math import inf
+from math import ceil, inf, log
 
 import msgspec
 
@@ -42,6 +42,9 @@ from agent.structure.tree import Follower, Tree
 from agent.structure.view import View
 
 DECISION_HZ = 10.0
+NEWS_LOST, LEAST_LOSS = 0.2, 0.05
+"""News is repeated until a neighbour has missed it with less than this probability, if beacons are
+lost at all."""
 FAR_M = 2.5
 """Within this distance of its place an agent flies there even if it lies beyond the tail."""
 REPORTS = 6
@@ -74,6 +77,8 @@ class Structure:
         self._followed = False
         self._next_decision_s = self._next_round_s = self._sent_s = now_s
         self._news = True
+        self._repeats = 0
+        self._offered: list[set[tuple[int, int]]] = [set() for _ in self.trees]
         self._blocked: frozenset[Place] = frozenset()
         self._view: View | None = None
         self._turn = 0
@@ -157,6 +162,7 @@ class Structure:
             self._queue_choice.choose(view, self.claim)
         if not self.claim.leads:
             self._decide_as_member(view)
+        self._note_candidates(view)
         self._followed = any(
             branch is not None and branch.parent == self._own_id
             for h in view.heard
@@ -179,6 +185,17 @@ class Structure:
             self._numbers.take_first(view, claim)
         elif not self._swaps.proceed(view, claim) and not self._numbers.keep_up(view, claim):
             self._swaps.propose(view, claim)
+
+    def _note_candidates(self, view: View) -> None:
+        """Report soon which agents could leave their queue, when that has changed."""
+        offered = [
+            {(each.agent, each.to) for queue in self._subtree(view, v).candidates for each in queue}
+            if tree.parent >= 0
+            else set()
+            for v, tree in enumerate(self.trees)
+        ]
+        self._news = self._news or any(a - b for a, b in zip(offered, self._offered, strict=True))
+        self._offered = offered
 
     def _count(self, view: View) -> None:
         """Bring the census up to date with the members heard directly, and the own label."""
@@ -263,9 +280,9 @@ class Structure:
         parts = self._collected[vertex].followers() if tree.root is not None else []
         homed = self._map.homed[vertex]
         if claim.queue in homed and not (claim.leads and claim.number < 1):
-            candidate = None if self._direct.applies else self._queue_choice.candidate(view, claim)
+            offers = () if self._direct.applies else self._queue_choice.candidates(view, claim)
             away_m = view.to_vertex(vertex)
-            parts.append(own_part(homed, claim.queue, claim.number, away_m, candidate))
+            parts.append(own_part(homed, claim.queue, claim.number, away_m, offers))
         seen = [p for p in self.blocked if p.queue in homed or self._map.vertex_of.get(p) == vertex]
         own = joined(parts, len(homed))
         places = sorted({*own.blocked, *seen})[:MAX_PLACES]
@@ -273,12 +290,14 @@ class Structure:
 
     def summary(self, now_s: float) -> Summary | None:
         """Return what is due on the multihop channel, None where nothing is."""
-        news = self._news or self.census.has_news
-        share = NEWS_SHARE if news else 1.0
+        if self._news or self.census.has_news:
+            self._repeats = self._enough_repeats()
+        share = NEWS_SHARE if self._repeats > 0 else 1.0
         if self._view is None or now_s - self._sent_s < share * self._round_s - 1e-6:
             return None
         regular = now_s >= self._next_round_s
         self._sent_s, self._news = now_s, False
+        self._repeats = max(0, self._repeats - 1)
         first, labels = 0, b""
         if regular:
             self._next_round_s = now_s + self._round_s - 1e-6
@@ -290,6 +309,11 @@ class Structure:
             news=self.census.news(now_s),
             trees=tuple(self._report(self._view, v) for v in self._reported()),
         )
+
+    def _enough_repeats(self) -> int:
+        """Return in how many summaries news goes out sooner, so that most neighbours hear it."""
+        loss = self._view.timing.loss if self._view is not None else 0.0
+        return 1 if loss < LEAST_LOSS else 1 + ceil(log(NEWS_LOST) / log(loss))
 
     def _reported(self) -> list[int]:
         """Return the vertices of one summary: as many as fit, other ones in each turn."""

@@ -8,6 +8,7 @@ else with its place.
 from agent.controller import Heard
 from agent.messages import Swap
 from agent.structure.claim import Claim
+from agent.structure.transfers import transfers
 from agent.structure.view import View, leads
 
 GAIN_M2 = 0.5
@@ -99,10 +100,14 @@ class Swaps:
         return proposal.partner == other.id and self._own_id > other.id
 
     def propose(self, view: View, claim: Claim) -> None:
-        """Propose the swap that gains most, if any gains enough."""
+        """Propose the swap that gains most, if any gains enough.
+
+        In a queue that has members to give away, orders come first.
+        """
         now_s, timing = view.now_s, view.timing
         waits = now_s < claim.no_swap_before_s or now_s - claim.since_s <= timing.hold_s
-        if waits or claim.swapping or claim.pushes(now_s):
+        leaving = claim.queue in transfers(view.map, view.counts, view.shares)
+        if waits or leaving or claim.swapping or claim.pushes(now_s):
             return
         best: tuple[float, Heard] | None = None
         for other in view.heard:

@@ -68,13 +68,15 @@ class View:
 
     @property
     def total(self) -> int:
-        """Members of the team, 0 if no leader has counted them."""
+        """Members of the team, 0 if no leader's count of them was steady."""
         return self.latest.total if self.latest is not None else 0
 
     @cached_property
     def shares(self) -> tuple[int, ...]:
-        """Members that each queue should have besides those in vertices."""
-        return self.map.members(self.total, self.blocked)
+        """Members that each queue should have besides those in vertices, as counted so far."""
+        known = [each for each in self.summaries if each is not None]
+        latest = max(known, key=lambda each: each.version, default=None)
+        return self.map.members(latest.total if latest is not None else 0, self.blocked)
 
     def home_of(self, queue: int) -> LeaderSummary | None:
         """Return the summary of the leader of a queue's first vertex."""
