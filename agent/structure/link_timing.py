@@ -48,6 +48,6 @@ def timing_of(link: Link, beacon_period_s: float) -> Timing:
         hold_s=0.1 + 2.0 * latency,
         pending_s=0.6 + 3.0 * latency,
         push_s=1.0 + 3.0 * latency,
-        settle_s=0.25 + 2.0 * hop_s,
+        settle_s=0.25 + hop_s,
         resettle_s=1.0 + 4.0 * latency,
     )

@@ -42,7 +42,8 @@ class Numbers:
         if home is None or not home.go or view.now_s - self._started_s < view.timing.listen_s:
             return
         same = view.same_queue(claim.queue)
-        self._first_count = view.counts[claim.queue] or len(same) + 1
+        known = (view.counts[claim.queue], view.shares[claim.queue], len(same) + 1)
+        self._first_count = max(known)
         first = self._first_s == 0.0
         self._first_s = self._first_s or view.now_s
         late_s = LATE_S + LATE_LATENCIES * view.timing.latency_s
