@@ -62,7 +62,11 @@ class QueueMap:
     def blocked_numbers(self, queue: int, blocked: Iterable[Place]) -> frozenset[int]:
         """Return the numbers of a queue's members whose places are blocked."""
         return frozenset(
-            [number for place in blocked if place.queue == queue and (number := self.number(place))]
+            [
+                number
+                for place in blocked
+                if place.queue == queue and (number := self.number(place)) > 0
+            ]
         )
 
     def vertex_slot(self, vertex: int) -> Slot | None:
@@ -110,7 +114,7 @@ class QueueMap:
 
     def _measured_between(self, queue: int, members: int) -> list[Slot]:
         geometry = self.formation.queues[queue]
-        members = max(1, min(members, geometry.room or 0))
+        members = min(max(1, members), geometry.room or 0)
         slots = [self.formation.slot_at(queue, s) for s in geometry.members(members)]
         return [slot for slot in slots if slot is not None]
 

@@ -103,8 +103,9 @@ class View:
     def extent(self, queue: int, number: int = 1) -> int:
         """Return with how many members a queue's places are computed (a closed queue's shift)."""
         members = self.shares[queue] if self.total else 0
-        taken = self.map.blocked_numbers(queue, self.blocked)
-        return max(members + len([each for each in taken if each <= members]), number, 1)
+        for taken in sorted(self.map.blocked_numbers(queue, self.blocked)):
+            members += taken <= members
+        return max(members, number, 1)
 
     def distance(self, queue: int, number: int) -> float:
         """Return the own distance from a member's place [m]; infinite where there is none."""
