@@ -175,6 +175,8 @@ class Agent:
         gossip = self._decode_gossip(payload)
         if gossip.id != source:
             raise RejectedError("spoofed", f"gossip of agent {source} with the id {gossip.id}")
+        if gossip.stamp_s > now_s + self._slack_s:
+            raise RejectedError("future", f"the stamp is {gossip.stamp_s - now_s:.3f} s ahead")
         self._table.adopt(gossip, now_s, self._slack_s)
         if gossip.summary is not None and len(self._summaries) < MAX_SUMMARIES:
             self._summaries.append(HeardSummary(source, gossip.stamp_s, gossip.summary))

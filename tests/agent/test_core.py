@@ -39,7 +39,7 @@ WEDGE = msgspec.convert(
 )
 
 
-def agent(agent_id=0, sensors=("proximity",), incarnation=0):
+def agent(agent_id=0, sensors=("proximity",), incarnation=0, allocation="structure"):
     return Agent(
         AgentSetup(
             id=agent_id,
@@ -49,7 +49,7 @@ def agent(agent_id=0, sensors=("proximity",), incarnation=0):
             command_ticks=2,
             vehicle=Vehicle(sensors=sensors),
             fleet_max_speed_mps=0.5,
-            control=Control(),
+            control=Control(allocation=allocation),
             comms=Comms(),
             formation=WEDGE,
         )
@@ -128,6 +128,7 @@ CASES = {
     "spoofed by gossip": (gossip(2, 1.0, [record(2, 1, 1.0)]), 3),
     "spoofed own": (beacon(0, 1, 1.0), 0),
     "future": (beacon(2, 1, 1.2), 2),
+    "future by gossip": (gossip(2, 1.2), 2),
     "old": (beacon(2, 1, 20.0), 2),
     "speed": (beacon(2, 1, 1.0, velocity=(1.5, -1.5, 0.5)), 2),
 }
@@ -255,11 +256,18 @@ def test_two_agents_that_hear_each_other_take_different_places():
     assert len({command.telemetry.place for command in commands}) == 2
 
 
-def test_a_silent_neighbour_is_forgotten_and_its_place_is_free():
-    core = agent()
+@pytest.mark.parametrize("allocation", ["structure", "assignment"])
+def test_a_silent_neighbour_is_forgotten_and_its_place_is_free(allocation):
+    core, other = agent(allocation=allocation), agent(1, allocation=allocation)
+    ways = ((core, (2.0, 1.0, 0.5)), (other, (0.5, -0.5, -0.5)))
+    said = ((), ())
     for tick in range(40):
-        deliver(core, beacon(1, tick, tick * TICK_S, at=(0.5, -0.5, -0.5)), tick * TICK_S)
-        held = core.step(observation(tick)).command.telemetry
+        for me, (receiver, _) in enumerate(ways):
+            for channel, payload in said[1 - me]:
+                receiver.receive(1 - me, channel, payload, tick * TICK_S)
+        outboxes = [each.step(observation(tick, at)) for each, at in ways]
+        said = tuple(outbox.frames for outbox in outboxes)
+    held = outboxes[0].command.telemetry
     assert held.heard == (1,)
     assert held.place != (0, 0)
     for tick in range(40, 40 + 60):
