@@ -18,7 +18,13 @@ class Convergecast:
         self._reports: dict[int, tuple[float, TreeReport]] = {}
 
     def hear(self, sender: int, report: TreeReport, stamp_s: float) -> None:
-        """Take an agent's report; one that names another parent ends what it told before."""
+        """Take an agent's report; one that names another parent ends what it told before.
+
+        A report that was overtaken on its way counts for nothing.
+        """
+        known = self._reports.get(sender)
+        if known is not None and known[0] > stamp_s:
+            return
         if report.parent == self._own_id and report.up is not None:
             self._reports[sender] = (stamp_s, report)
         else:
