@@ -43,7 +43,9 @@ class Swaps:
         own = view.map.place(claim.queue, claim.number)
         for other in view.heard:
             kept = other.standing.reservation if other.standing is not None else None
-            if kept is not None and kept.partner == self._own_id and other.place == own:
+            if kept is None or kept.partner != self._own_id or other.place != own:
+                continue
+            if view.point(kept.place[0], view.map.number(kept.place)) is not None:
                 self._take(view, claim, kept.place)
                 return True
         return False
