@@ -1,7 +1,8 @@
 """The direct rule: where the whole team hears the whole team, the assignment is over neighbours.
 
 It is a team's rule, not an agent's own: an agent decides directly only if every member that it
-hears also hears all. Otherwise agents of two minds take each other's places. Leaders stay.
+hears also hears all. Otherwise agents of two minds take each other's places. Leaders stay. While a
+vertex has no leader the rule does not apply, for the others may have to order somebody there.
 """
 
 from agent.assignment.allocation import own_place
@@ -39,7 +40,7 @@ class DirectRule:
         if ids != self._ids:
             self._ids, self._same_since_s = ids, now_s
         self.heard = len(ids) + 1
-        short = view.total == 0 or self.heard < view.total
+        short = view.total == 0 or self.heard < view.total or not _all_led(view)
         short = short or any(
             h.standing is not None and h.standing.heard < view.total for h in members
         )
@@ -83,8 +84,11 @@ class DirectRule:
         places = [place for place in layout.places if place not in held]
         if any(place in view.map.vertex_of for place in places):
             return  # a vertex without a leader: the election comes first
+        team = self._team(view, claim)
+        if len(places) > len(team):
+            return  # two lead one vertex: one of them will make way
         points = [view.frame.to_world(layout.slots[place].point) for place in places]
-        place = own_place(self._own_id, self._team(view, claim), places, points)
+        place = own_place(self._own_id, team, places, points)
         if place is not None:
             self._take(view, claim, place)
 
@@ -98,3 +102,11 @@ class DirectRule:
         queue, number = place.queue, view.map.number(place)
         if (queue, number) != (claim.queue, claim.number):
             claim.take(queue, number, view.distance(queue, number), view.now_s)
+
+
+def _all_led(view: View) -> bool:
+    """Whether each vertex that is available has a leader."""
+    return all(
+        summary is not None or place in view.blocked
+        for summary, place in zip(view.summaries, view.map.vertex_places, strict=True)
+    )
