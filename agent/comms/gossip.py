@@ -27,7 +27,7 @@ LAG_SMOOTHING = 0.25
 LEAST_RELAYED_SILENCE_S = 2.5
 NONE_LOST: Mapping[int, float] = MappingProxyType({})
 MAX_FRAME_B = MAX_PAYLOAD_B - CHECKSUM_B
-FRAME_HEAD_B = 17
+FRAME_HEAD_B = 18
 """Longest encoding of a Gossip without records [B]."""
 
 

@@ -43,7 +43,7 @@ def adopted(known, *records, now_s=1.0):
 
 def content(known, now_s=1.0):
     """Return what a table passes on, without the own record, by subject."""
-    payloads = known.frames(record(OWN, 1, now_s))
+    payloads = known.frames(now_s, record(OWN, 1, now_s))
     records = [each for payload in payloads for each in decode_gossip(payload).records]
     assert records[0].id == OWN
     return {each.id: each for each in records[1:]}
@@ -183,7 +183,7 @@ def test_a_team_that_relays_records_forgets_a_departed_agent():
         now_s = index * ROUND_S
         for own, known in enumerate(team, start=1):
             known.forget_silent(now_s, range(1, 8))
-            for payload in known.frames(record(own, index, now_s)):
+            for payload in known.frames(now_s, record(own, index, now_s)):
                 for other in team:
                     if other is not known and random.random() < 0.5:
                         other.adopt(decode_gossip(payload), now_s, SLACK_S)
@@ -191,7 +191,7 @@ def test_a_team_that_relays_records_forgets_a_departed_agent():
         assert knowing == 0 or now_s <= OLDEST_S
     newcomer = table(own=50)
     for own, known in enumerate(team, start=1):
-        for payload in known.frames(record(own, 99, 30.0)):
+        for payload in known.frames(30.0, record(own, 99, 30.0)):
             newcomer.adopt(decode_gossip(payload), 30.0, SLACK_S)
     assert [each.id for each in newcomer.team(peer(50))] == [*range(1, 8), 50]
 
@@ -206,7 +206,7 @@ def test_the_head_has_its_longest_encoding():
 def test_the_whole_table_fits_with_the_greatest_numbers(known):
     records = [greatest_record(2**16 - 1 - k) for k in range(known)]
     full = adopted(table(), *records, now_s=LATE_S)
-    payloads = full.frames(greatest_record(OWN))
+    payloads = full.frames(LATE_S, greatest_record(OWN))
     assert max(map(len, payloads)) <= MAX_PAYLOAD_B
     assert len(payloads) < MAX_OUTGOING
     sent = [each for payload in payloads for each in decode_gossip(payload).records]
@@ -234,7 +234,7 @@ def play_line(line, rounds, loss, seed=3):
         now_s = index * ROUND_S
         for known in line:
             known.forget_silent(now_s, ())
-        sent = [known.frames(record(own, index, now_s)) for own, known in enumerate(line)]
+        sent = [known.frames(now_s, record(own, index, now_s)) for own, known in enumerate(line)]
         for own, payloads in enumerate(sent):
             for neighbour in sorted({max(own - 1, 0), min(own + 1, end)} - {own}):
                 if random.random() >= loss:
