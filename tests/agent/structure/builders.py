@@ -1,0 +1,112 @@
+"""Builders for the Q-structure's tests: a test names only the fields that matter to it."""
+
+import msgspec
+
+from agent.controller import Heard, Link
+from agent.messages import ZERO, LeaderSummary, RootKey, Standing, Subtree
+from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
+from agent.qstructure.shape import Ray
+from agent.qstructure.target_frame import Frame
+from agent.structure.link_timing import timing_of
+from agent.structure.queue_map import QueueMap
+from agent.structure.view import View
+from worldsim.scenario.file import formation_tables
+from worldsim.scenario.library import FORMATIONS
+
+LIBRARY = sorted(FORMATIONS.glob("*.toml"))
+BEACON_S = 0.05
+
+
+def rays(*directions, capacities=None):
+    """Return the map of open queues that begin at one vertex in the origin."""
+    capacities = capacities or [1.0 / len(directions)] * len(directions)
+    queues = tuple(
+        QueueSpec(f"Q{j}", ("V",), Ray(direction), capacity)
+        for j, (direction, capacity) in enumerate(zip(directions, capacities, strict=True))
+    )
+    return QueueMap(Formation(FormationSpec("rays", {"V": ZERO}, queues), 1.0))
+
+
+def lines(*vertices):
+    """Return the map of open queues along -x, each from a vertex of its own [m]."""
+    share = 1.0 / len(vertices)
+    queues = tuple(
+        QueueSpec(f"Q{j}", (f"V{j}",), Ray((-1.0, 0.0, 0.0)), share) for j in range(len(vertices))
+    )
+    points = {f"V{j}": point for j, point in enumerate(vertices)}
+    return QueueMap(Formation(FormationSpec("lines", points, queues), 1.0))
+
+
+LINE = lines(ZERO)
+TWO = rays((-1.0, 1.0, 0.0), (-1.0, -1.0, 0.0))
+
+
+def library(path):
+    """Return the map of a formation of the library."""
+    spec = msgspec.convert(formation_tables(path), FormationSpec)
+    return QueueMap(Formation(spec, 1.0))
+
+
+def standing(**fields):
+    """Return a standing; by default of a member of the first queue that knows no root."""
+    defaults = {
+        "branches": (),
+        "leads": -1,
+        "queue": 0,
+        "heard": 1,
+        "pushes": False,
+        "proposal": None,
+        "reservation": None,
+    }
+    return Standing(**{**defaults, **fields})
+
+
+def heard(agent, at=ZERO, place=None, *, age_s=0.0, cost_m=0.0, hears_me=True, **fields):
+    """Return a neighbour; the other fields are those of its standing."""
+    return Heard(
+        id=agent,
+        age_s=age_s,
+        position=at,
+        velocity=ZERO,
+        target=at,
+        place=place,
+        cost_m=cost_m,
+        standing=standing(**fields),
+        hears_me=hears_me,
+    )
+
+
+def leader_summary(**fields):
+    """Return a leader's summary; by default of a steady team of nobody."""
+    defaults = {
+        "root": RootKey(0, 0),
+        "version": 0,
+        "total": 0,
+        "counts": (),
+        "highest": (),
+        "histogram": b"",
+        "go": True,
+        "order": 0,
+        "orders": (),
+        "blocked": (),
+    }
+    return LeaderSummary(**{**defaults, **fields})
+
+
+def subtree(**fields):
+    """Return what came up the tiers; by default of nobody."""
+    return Subtree(**{"highest": (), "histogram": b"", "candidates": (), "blocked": (), **fields})
+
+
+def view(formation, now_s, neighbours=(), *, at=ZERO, link=None, summaries=None, blocked=()):
+    """Return an agent's view. link: of a radio without loss or latency if left out."""
+    made = View(now_s, at, sorted(neighbours), formation, Frame())
+    made.timing = timing_of(link or Link(0.0, 0.0, 100.0), BEACON_S)
+    made.summaries = summaries if summaries is not None else [None] * formation.vertices
+    made.blocked = frozenset(blocked)
+    return made
+
+
+def replace(struct, **fields):
+    """Return a copy of a message with other values of some fields."""
+    return msgspec.structs.replace(struct, **fields)
