@@ -25,7 +25,7 @@ from agent.codec import (
     encode,
     strip_checksum,
 )
-from agent.core import Agent
+from agent.core import Agent, Outbox
 from agent.messages import Observation
 from netem.fault_queue import FaultQueue
 from netem.messages import SlotInput, SlotResult, Truth, unpack_slot_input, unpack_slot_result
@@ -50,6 +50,7 @@ from worldsim.scenario.file import load
 
 WEDGE = Path(__file__).parents[1] / "deploy/scenarios/wedge-9.toml"
 WARM_SLOTS = 200
+TICKS = 20
 STEP_EVERY = 500
 REFUSALS = (RejectedError, WireError, RequestError)
 ORDERS = b'{"slot":3,"orders":[{"type":"jam","number":1,"jam":{"centre_m":[0,0,0],"radius_m":2}}]}'
@@ -129,7 +130,7 @@ def _targets(
     positions: tuple[Any, ...],
     core: Agent,
 ) -> list[Target]:
-    outboxes = [fleet._agents[agent].step(observation) for agent, observation in observations]
+    outboxes = _said(fleet, observations)
     frames = [frame for outbox in outboxes for frame in outbox.frames]
     beacons, gossips = ([data for channel, data in frames if channel == c] for c in (0, 1))
     sent = Transmission(3, 0, tuple(Outgoing(*frame) for frame in frames))
@@ -158,6 +159,17 @@ def _targets(
         Target("orders", lambda data: FaultQueue().put(data), [ORDERS]),
         Target("request", _request, [REQUEST]),
     ]
+
+
+def _said(fleet: VirtualFleet, observations: list[tuple[int, Observation]]) -> list[Outbox]:
+    """Return what all agents say in a second: each channel has its own rate."""
+    outboxes = []
+    for tick in range(TICKS):
+        for agent, seen in observations:
+            slot = seen.slot + 4 * tick
+            later = msgspec.structs.replace(seen, slot=slot, time_s=slot / 80.0)
+            outboxes.append(fleet._agents[agent].step(later))
+    return outboxes
 
 
 def _radio(channel: int) -> Callable[[bytes], msgspec.Struct]:

@@ -25,18 +25,29 @@ from agent.messages import (
     CAUSES,
     FRAME_M,
     LEAST_SPEED_MPS,
+    MAX_VERTICES,
     Beacon,
+    Branch,
+    Candidate,
     Command,
     Drift,
     FramePath,
     Gossip,
+    LeaderSummary,
     Mission,
     Observation,
+    Order,
     Piece,
     Pose,
     Record,
+    RootKey,
     Scan,
+    Standing,
+    Subtree,
+    Summary,
+    Swap,
     Telemetry,
+    TreeReport,
 )
 from netem.wire.channels import MAX_PAYLOAD_B
 
@@ -71,6 +82,47 @@ RECORD = Record(
     cost_mm=0,
     mission=7,
     blocked=((0, 0),),
+)
+ROOT = RootKey(cost_cm=250, id=3)
+STANDING = Standing(
+    branches=(Branch(ROOT, version=150, tier=1, parent=3), None),
+    leads=-1,
+    queue=1,
+    heard=4,
+    pushes=False,
+    proposal=Swap(partner=2, place=(1, 2), other=(1, 3)),
+    reservation=None,
+)
+SUMMARY = Summary(
+    mission=7,
+    first=2,
+    labels=bytes(8),
+    news=((3, 700),),
+    trees=(
+        TreeReport(
+            vertex=0,
+            tier=1,
+            parent=3,
+            down=LeaderSummary(
+                root=ROOT,
+                version=149,
+                total=9,
+                counts=(2, 2),
+                highest=(2, 3),
+                histogram=bytes(16),
+                go=True,
+                order=140,
+                orders=(Order(agent=5, queue=0, to=1),),
+                blocked=((0, 2),),
+            ),
+            up=Subtree(
+                highest=(2, 0),
+                histogram=bytes(16),
+                candidates=((Candidate(extra_dm=-7, agent=5, to=1),), ()),
+                blocked=(),
+            ),
+        ),
+    ),
 )
 GOOD = {
     Observation: Observation(
@@ -110,16 +162,15 @@ GOOD = {
         frame_key=7,
         frame=POSE,
         drift=DRIFT,
-        tier=1,
-        parent=4,
-        root=900,
         blocked=((0, 0),),
+        standing=STANDING,
     ),
     Gossip: Gossip(
         id=3,
         stamp_s=1.5,
         records=(RECORD,) * 3,
         piece=Piece(key=7, index=0, count=1, data=b"x"),
+        summary=SUMMARY,
     ),
 }
 DECODE = {
@@ -186,6 +237,58 @@ records = st.builds(
     mission=counts,
     blocked=blocked,
 )
+places = st.tuples(indices, indices)
+member_counts = st.lists(st.integers(0, 2**16 - 1), max_size=6).map(tuple)
+roots = st.builds(RootKey, cost_cm=costs, id=ids)
+branches = st.builds(Branch, root=roots, version=counts, tier=indices, parent=parents)
+swaps = st.builds(Swap, partner=ids, place=places, other=places)
+standings = st.builds(
+    Standing,
+    branches=st.lists(st.none() | branches, max_size=4).map(tuple),
+    leads=indices,
+    queue=indices,
+    heard=st.integers(0, 2**16 - 1),
+    pushes=st.booleans(),
+    proposal=st.none() | swaps,
+    reservation=st.none() | swaps,
+)
+leader_summaries = st.builds(
+    LeaderSummary,
+    root=roots,
+    version=counts,
+    total=st.integers(0, 2**16 - 1),
+    counts=member_counts,
+    highest=member_counts,
+    histogram=st.binary(max_size=64),
+    go=st.booleans(),
+    order=counts,
+    orders=st.lists(st.builds(Order, agent=ids, queue=indices, to=indices), max_size=3).map(tuple),
+    blocked=blocked,
+)
+candidates = st.builds(Candidate, extra_dm=st.integers(-(2**31), 2**31 - 1), agent=ids, to=indices)
+subtrees = st.builds(
+    Subtree,
+    highest=member_counts,
+    histogram=st.binary(max_size=64),
+    candidates=st.lists(st.lists(candidates, max_size=3).map(tuple), max_size=3).map(tuple),
+    blocked=blocked,
+)
+reports = st.builds(
+    TreeReport,
+    vertex=st.integers(0, MAX_VERTICES - 1),
+    tier=indices,
+    parent=parents,
+    down=st.none() | leader_summaries,
+    up=st.none() | subtrees,
+)
+summaries = st.builds(
+    Summary,
+    mission=counts,
+    first=ids,
+    labels=st.binary(max_size=64),
+    news=st.lists(st.tuples(ids, st.integers(0, 2**16 - 1)), max_size=6).map(tuple),
+    trees=st.lists(reports, max_size=2).map(tuple),
+)
 telemetries = st.builds(
     Telemetry,
     wanted=velocities,
@@ -240,10 +343,8 @@ messages = st.one_of(
         frame_key=counts,
         frame=poses,
         drift=st.none() | drifts,
-        tier=indices,
-        parent=parents,
-        root=counts,
         blocked=blocked,
+        standing=st.none() | standings,
     ),
     st.builds(
         Gossip,
@@ -253,6 +354,14 @@ messages = st.one_of(
         piece=st.none(),
     ),
     st.builds(Gossip, id=ids, stamp_s=seconds, records=st.just(()), piece=pieces),
+    st.builds(
+        Gossip,
+        id=ids,
+        stamp_s=seconds,
+        records=st.just(()),
+        piece=st.none(),
+        summary=summaries,
+    ),
 )
 
 
@@ -401,7 +510,7 @@ WRONG = {
 def test_a_wrong_value_is_rejected_in_any_field(kind, wrong):
     good = structure(kind)
     for path, value in leaves(good):
-        if isinstance(value, bytes) and isinstance(wrong, bytes):
+        if isinstance(value, bytes | bool) and isinstance(wrong, type(value)):
             continue
         cause = rejection_cause(kind, msgpack.packb(replaced(good, path, wrong)))
         assert cause == "invalid"
@@ -421,7 +530,17 @@ def test_a_float_for_a_whole_number_is_rejected(kind):
 @KINDS
 def test_a_missing_or_extra_field_is_rejected(kind):
     good = structure(kind)
-    for other in (good[:-1], (*good, 0), (*good, None), {}, dict.fromkeys("abc", 0), (), None, 1):
+    required = sum(field.required for field in msgspec.structs.fields(kind))
+    for other in (
+        good[: required - 1],
+        (*good, 0),
+        (*good, None),
+        {},
+        dict.fromkeys("abc", 0),
+        (),
+        None,
+        1,
+    ):
         assert rejection_cause(kind, msgpack.packb(other)) == "invalid"
 
 

@@ -1,7 +1,7 @@
 """The Q-structure with fixed places: each agent takes the place of its id, and keeps it."""
 
 from agent.config import AgentSetup
-from agent.controller import Senses
+from agent.controller import NO_WORDS, Senses, Words
 from agent.guidance.q_structure import QStructure
 from agent.places.place_points import OwnTarget
 
@@ -20,10 +20,14 @@ class ByNumber:
         place = layout.places[self._own_id]
         return OwnTarget(place, layout.slots[place], vertex=True)
 
+    def words(self, _now_s: float) -> Words:
+        """Say nothing of a structure: there is none."""
+        return NO_WORDS
+
 
 class Swapping(QStructure):
     """Flies to the place of its id."""
 
     def __init__(self, setup: AgentSetup) -> None:
         super().__init__(setup)
-        self._slot_selection = ByNumber(setup.id)  # type: ignore[assignment]
+        self._places = ByNumber(setup.id)  # type: ignore[assignment]

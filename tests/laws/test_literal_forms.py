@@ -9,6 +9,7 @@ from agent.guidance import movement
 from agent.guidance.potential import Potential
 from agent.qstructure.formation import Formation
 from agent.qstructure.queue import Queue
+from agent.structure.tree import Tree
 from tests.laws import literal
 from tests.laws.laws import LAWS
 
@@ -49,6 +50,7 @@ LITERAL = {
     "E11 Lemma 9": ("Lemma 9", bobber_room, {"bobber": literal.bobber_never_head_on}),
     "E13": ("E13", Queue, {"members": literal.members_by_chord}),
     "E14": ("E14", RecordTable, {"adopt": literal.adopt_nothing}),
+    "E14 tree": ("E14", Tree, {"_compare": literal.adopt_nothing}),
     "E16": ("E16", Formation, {"_holders": literal.holders_queue_by_queue}),
     "E17": ("E17", allocation, {"allocate": literal.allot_by_distance}),
 }

@@ -11,7 +11,7 @@ LATE_S = 999_999_999.9
 
 
 def beacon(sender, sequence, stamp_s, *, at=ORIGIN, echoes=(), **fields):
-    """Return a beacon; by default of an agent at rest at the origin without a place or a parent."""
+    """Return a beacon; by default of an agent at rest at the origin without a place or a standing."""
     defaults = {
         "incarnation": 0,
         "velocity": AT_REST,
@@ -24,10 +24,8 @@ def beacon(sender, sequence, stamp_s, *, at=ORIGIN, echoes=(), **fields):
         "frame_key": 0,
         "frame": HOME,
         "drift": None,
-        "tier": -1,
-        "parent": -1,
-        "root": 0,
         "blocked": (),
+        "standing": None,
     }
     return Beacon(
         id=sender,
@@ -71,9 +69,9 @@ def greatest_record(subject):
     )
 
 
-def gossip(sender, stamp_s, records=(), piece=None):
+def gossip(sender, stamp_s, records=(), piece=None, summary=None):
     """Return a frame of the multihop channel."""
-    return Gossip(id=sender, stamp_s=stamp_s, records=tuple(records), piece=piece)
+    return Gossip(id=sender, stamp_s=stamp_s, records=tuple(records), piece=piece, summary=summary)
 
 
 def peer(agent_id, at=ORIGIN, place=None):

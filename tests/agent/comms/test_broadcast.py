@@ -6,11 +6,22 @@ from math import inf
 import msgspec
 import pytest
 
-from agent.codec import add_checksum, decode_beacon, decode_gossip, encode
-from agent.comms.broadcast import Broadcast, OwnState, most_echoes
+from agent.codec import decode_beacon, decode_gossip
+from agent.comms.broadcast import MAX_ECHOES, Broadcast, OwnState
 from agent.comms.gossip import RecordTable
-from agent.comms.hierarchy import HierarchyState
-from agent.messages import FRAME_M, MAX_PLACES, Drift, Place, Pose
+from agent.messages import (
+    FRAME_M,
+    MAX_PLACES,
+    MAX_VERTICES,
+    Branch,
+    Drift,
+    Place,
+    Pose,
+    RootKey,
+    Standing,
+    Summary,
+    Swap,
+)
 from netem.wire.channels import LOCAL, MAX_PAYLOAD_B, MULTIHOP
 from tests.agent.comms.builders import (
     FAR,
@@ -24,6 +35,14 @@ from tests.agent.comms.builders import (
 
 STILL = OwnState(position=ORIGIN, velocity=ORIGIN, heading_for=ORIGIN, place=None, speed_cap=0.5)
 FARTHEST = Place(2**15 - 1, 2**15 - 1)
+SWAP = Swap(partner=2**16 - 1, place=FARTHEST, other=FARTHEST)
+BRANCH = Branch(
+    root=RootKey(cost_cm=2**31 - 1, id=2**16 - 1),
+    version=GREATEST,
+    tier=2**15 - 1,
+    parent=2**16 - 1,
+)
+SUMMARY = Summary(mission=1, first=0, labels=bytes(4), news=(), trees=())
 EXTREME = OwnState(
     position=(FAR,) * 3,
     velocity=(-99.9,) * 3,
@@ -34,14 +53,22 @@ EXTREME = OwnState(
     frame_key=GREATEST,
     frame=Pose(x=FRAME_M, y=FRAME_M, z=FRAME_M, yaw=99.9),
     drift=Drift(stamp_s=LATE_S, x=99.9, y=99.9, z=99.9, yaw_rate=99.9),
-    hierarchy=HierarchyState(tier=2**15 - 1, parent=2**16 - 1, root=GREATEST, role=3),
     blocked=(FARTHEST,) * MAX_PLACES,
     cost_mm=2**31 - 1,
+    standing=Standing(
+        branches=(BRANCH,) * MAX_VERTICES,
+        leads=2**15 - 1,
+        queue=2**15 - 1,
+        heard=2**16 - 1,
+        pushes=True,
+        proposal=SWAP,
+        reservation=SWAP,
+    ),
 )
 
 
-def broadcast(beacon_s=0.05, round_s=0.5, incarnation=0):
-    return Broadcast(3, incarnation, beacon_s, round_s)
+def broadcast(beacon_s=0.05, round_s=0.5, incarnation=0, relays=True, own_id=3):
+    return Broadcast(own_id, incarnation, beacon_s, round_s, relays)
 
 
 def table_with(own_id, records):
@@ -84,37 +111,31 @@ def test_beacons_are_numbered_and_the_last_sending_times_are_kept():
     assert len(sender.sent_s) == 200
 
 
-@pytest.mark.parametrize("neighbours", [0, 1, 68, 69, 129, 500])
-def test_a_beacon_fits_its_frame_with_any_number_of_neighbours(neighbours):
-    sender, table = broadcast(incarnation=GREATEST), RecordTable(3, 2.0)
+@pytest.mark.parametrize("neighbours", [0, 1, 7, 8, 9, 15, 16, 17, 129, 500])
+def test_a_beacon_of_the_greatest_numbers_fits_its_frame(neighbours):
+    sender, table = broadcast(incarnation=GREATEST, own_id=2**16 - 1), RecordTable(3, 2.0)
+    sender.sequence = GREATEST - 200
     echoes = tuple((2**16 - 1 - k, GREATEST) for k in range(neighbours))
-    echoed = set()
     for tick in range(12):
         payload = sender.frames(LATE_S - 60.0 + tick, EXTREME, echoes, table)[0][1]
         assert len(payload) <= MAX_PAYLOAD_B
         sent = decode_beacon(payload)
-        assert len(sent.echoes) == min(neighbours, most_echoes(MAX_PLACES))
-        echoed.update(sent.echoes)
-    assert echoed == set(echoes), "every neighbour is echoed in some beacon"
+        assert sent.standing == EXTREME.standing
+        assert len(sent.echoes) == min(neighbours, MAX_ECHOES)
 
 
-def greatest_beacon_b(places, echoes):
-    """Return the size of a beacon of the greatest numbers [B]."""
-    echoed = tuple((2**16 - 1 - k, GREATEST) for k in range(echoes))
-    own = msgspec.structs.replace(EXTREME, blocked=(FARTHEST,) * places)
-    frames = broadcast(incarnation=GREATEST).frames(LATE_S, own, echoed, RecordTable(3, 2.0))
-    sent = decode_beacon(frames[0][1])
-    extreme = msgspec.structs.replace(sent, id=2**16 - 1, sequence=GREATEST, echoes=echoed)
-    return len(add_checksum(encode(extreme)))
-
-
-@pytest.mark.parametrize("places", range(MAX_PLACES + 1))
-def test_the_echoes_fit_beside_the_greatest_numbers(places):
-    assert greatest_beacon_b(places, most_echoes(places)) <= MAX_PAYLOAD_B
-
-
-def test_as_many_echoes_as_possible_fit_beside_eight_places():
-    assert greatest_beacon_b(8, most_echoes(8) + 1) > MAX_PAYLOAD_B
+@pytest.mark.parametrize("neighbours", [1, 8, 9, 12, 16, 23, 24, 40, 64, 65, 255])
+def test_every_neighbour_is_echoed_in_its_turn(neighbours):
+    """Who is echoed more seldom than every ECHO_LASTS_S counts as deaf: no parent."""
+    sender, table = broadcast(), RecordTable(3, 2.0)
+    echoes = tuple((100 + k, k) for k in range(neighbours))
+    sent = [
+        {k for _, k in decode_beacon(sender.frames(tick * 0.05, STILL, echoes, table)[0][1]).echoes}
+        for tick in range(4 * neighbours)
+    ]
+    turns = -(-neighbours // MAX_ECHOES) + 1
+    for first in range(len(sent) - turns):
+        assert set.union(*sent[first : first + turns]) == set(range(neighbours))
 
 
 def test_each_round_sends_the_whole_table():
@@ -136,3 +157,24 @@ def test_the_own_record_agrees_with_the_beacon():
         assert getattr(own_record, name) == getattr(sent, name)
     assert own_record.version == sent.sequence
     assert (sent.queue, sent.rank) == (1, 4)
+
+
+def test_who_relays_nothing_sends_no_record():
+    sender, table = broadcast(relays=False), table_with(3, [record(4, 9)])
+    assert [channel for channel, _ in sender.frames(7.0, STILL, (), table)] == [LOCAL]
+
+
+@pytest.mark.parametrize("relays", [False, True])
+def test_a_summary_goes_out_at_once_in_a_frame_of_its_own(relays):
+    sender, table = broadcast(relays=relays), RecordTable(3, 2.0)
+    sender.frames(7.0, STILL, (), table)
+    own = msgspec.structs.replace(STILL, summary=SUMMARY)
+    ((_, payload),) = [each for each in sender.frames(7.1, own, (), table) if each[0] == MULTIHOP]
+    sent = decode_gossip(payload)
+    assert (sent.id, sent.stamp_s, sent.records, sent.summary) == (3, 7.1, (), SUMMARY)
+
+
+def test_no_summary_goes_out_with_the_multihop_channel_off():
+    sender, own = broadcast(round_s=inf), msgspec.structs.replace(STILL, summary=SUMMARY)
+    for tick in range(40):
+        assert [c for c, _ in sender.frames(tick * 0.05, own, (), RecordTable(3, 2.0))] == [LOCAL]

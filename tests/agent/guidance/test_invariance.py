@@ -92,7 +92,7 @@ def setup(own_id):
         command_ticks=1,
         vehicle=Vehicle(),
         fleet_max_speed_mps=0.5,
-        control=Control(),
+        control=Control(allocation="assignment"),
         comms=Comms(),
         formation=WEDGE,
     )

@@ -2,7 +2,7 @@
 
 import pytest
 
-from agent.controller import Flown, Peer, Senses
+from agent.controller import Flown, Senses
 from agent.messages import MAX_PLACES, Place
 from agent.places.occupied_slots import FREED_S, GROWN_S, OccupiedSlots
 from agent.places.place_points import PlacePoints
@@ -20,12 +20,12 @@ LINE = Formation(
 )
 MISSION = Flown(key=0, formation=LINE, frame=Frame())
 SECOND, THIRD = Place(0, 1), Place(0, 2)
-ME = Peer(0, (0.0, 0.0, 0.0), Place(0, 0))
-FAR = Peer(1, (-5.0, 0.0, 0.0), THIRD)
+ME = Place(0, 0), (0.0, 0.0, 0.0)
+FAR = THIRD, (-5.0, 0.0, 0.0)
 START_S = 10.0
 
 
-def senses(now_s, unidentified=(), vehicles=(), reported=frozenset(), at=ME.position):
+def senses(now_s, unidentified=(), vehicles=(), at=ME[1]):
     return Senses(
         now_s=now_s,
         position=at,
@@ -36,68 +36,72 @@ def senses(now_s, unidentified=(), vehicles=(), reported=frozenset(), at=ME.posi
         team=tuple,
         mission=MISSION,
         silent=tuple(unidentified),
-        blocked=frozenset(reported),
     )
+
+
+def update(occupied, near, team=(ME, FAR), reported=frozenset()):
+    """Return the places that are not available. team: place and position of each member."""
+    return occupied.update(near, team, len(team), frozenset(reported))
 
 
 @pytest.fixture
 def occupied():
     made = OccupiedSlots(PlacePoints(1.0), senses_vehicles=True)
-    assert made.update(senses(START_S - GROWN_S), (ME, FAR)) == frozenset()
+    assert update(made, senses(START_S - GROWN_S)) == frozenset()
     return made
 
 
 def test_a_vehicle_near_a_place_takes_it(occupied):
-    assert occupied.update(senses(START_S, unidentified=[(-1.1, 0.3, 0.0)]), (ME, FAR)) == {SECOND}
+    assert update(occupied, senses(START_S, unidentified=[(-1.1, 0.3, 0.0)])) == {SECOND}
     assert occupied.seen == (SECOND,)
 
 
 def test_places_beyond_those_that_others_report_are_examined_too(occupied):
     """The team of two fills the first and the third place, once the second is reported."""
     vehicles = [(-1.0, 0.0, 0.0), (-2.0, 0.0, 0.0)]
-    near = senses(START_S, [vehicles[1]], vehicles, reported={SECOND})
-    assert occupied.update(near, (ME, FAR)) == {SECOND, THIRD}
+    near = senses(START_S, [vehicles[1]], vehicles)
+    assert update(occupied, near, reported={SECOND}) == {SECOND, THIRD}
     assert occupied.seen == (THIRD,)
 
 
 def test_all_seen_places_count_and_the_first_to_fill_are_reported():
     made = OccupiedSlots(PlacePoints(1.0), senses_vehicles=True)
-    team = (Peer(0, (9.0, 0.0, 0.0), None),)
-    made.update(senses(START_S - GROWN_S), team)
+    team = ((None, (9.0, 0.0, 0.0)),)
+    update(made, senses(START_S - GROWN_S), team)
     line = [(-float(rank), 0.0, 0.0) for rank in range(MAX_PLACES + 3)]
     for at in ((9.0, 0.0, 0.0), (-30.0, 0.0, 0.0)):
-        found = made.update(senses(START_S, unidentified=line, at=at), team)
+        found = update(made, senses(START_S, unidentified=line, at=at), team)
         assert found == {Place(0, rank) for rank in range(MAX_PLACES + 3)}
         assert made.seen == tuple(Place(0, rank) for rank in range(MAX_PLACES))
 
 
 def test_an_agent_that_stands_in_its_place_keeps_it(occupied):
-    holder = Peer(1, (-1.05, 0.0, 0.0), SECOND)
-    near = senses(START_S, unidentified=[(-1.2, 0.3, 0.0)], reported={SECOND})
-    assert occupied.update(near, (ME, holder)) == frozenset()
+    holder = SECOND, (-1.05, 0.0, 0.0)
+    near = senses(START_S, unidentified=[(-1.2, 0.3, 0.0)])
+    assert update(occupied, near, (ME, holder), {SECOND}) == frozenset()
     assert occupied.seen == ()
 
 
 def test_a_place_that_a_vehicle_has_left_is_not_free_at_once(occupied):
-    occupied.update(senses(START_S, unidentified=[(-1.0, 0.0, 0.0)]), (ME, FAR))
-    assert occupied.update(senses(START_S + 0.9 * FREED_S), (ME, FAR)) == {SECOND}
+    update(occupied, senses(START_S, unidentified=[(-1.0, 0.0, 0.0)]))
+    assert update(occupied, senses(START_S + 0.9 * FREED_S)) == {SECOND}
     assert occupied.seen == ()
-    assert occupied.update(senses(START_S + 1.1 * FREED_S), (ME, FAR)) == frozenset()
+    assert update(occupied, senses(START_S + 1.1 * FREED_S)) == frozenset()
 
 
 def test_a_place_is_not_free_while_an_unknown_vehicle_is_near(occupied):
-    occupied.update(senses(START_S, unidentified=[(-1.0, 0.0, 0.0)]), (ME, FAR))
+    update(occupied, senses(START_S, unidentified=[(-1.0, 0.0, 0.0)]))
     for step in range(1, 5):
         coming = senses(START_S + 0.5 * step * FREED_S, vehicles=[(-1.4, 0.0, 0.0)])
-        assert occupied.update(coming, (ME, FAR)) == {SECOND}
+        assert update(occupied, coming) == {SECOND}
         assert occupied.seen == (SECOND,)
 
 
 def test_a_vehicle_that_turns_out_to_be_a_member_blocks_nothing(occupied):
-    occupied.update(senses(START_S, unidentified=[(-1.0, 0.0, 0.0)]), (ME, FAR))
-    grown = (ME, FAR, Peer(2, (-1.0, 0.0, 0.0), None))
-    assert occupied.update(senses(START_S + 0.2), grown) == frozenset()
+    update(occupied, senses(START_S, unidentified=[(-1.0, 0.0, 0.0)]))
+    grown = (ME, FAR, (None, (-1.0, 0.0, 0.0)))
+    assert update(occupied, senses(START_S + 0.2), grown) == frozenset()
 
 
 def test_a_reported_vehicle_is_believed_unless_the_agent_sees_the_place_empty(occupied):
-    assert occupied.update(senses(START_S, reported={SECOND, THIRD}), (ME, FAR)) == {THIRD}
+    assert update(occupied, senses(START_S), reported={SECOND, THIRD}) == {THIRD}
