@@ -14,9 +14,8 @@ from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Polyline, Ray
 from tests.laws import approach, energy, radio
-from tests.laws.energy import Other, random_point
+from tests.laws.energy import D_OB, Other, random_point
 
-D_OB = 0.25
 WEDGE = FormationSpec(
     "wedge",
     {"V1": (0.0, 0.0, 0.0)},
