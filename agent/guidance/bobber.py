@@ -8,6 +8,7 @@ lies in the cone, else to a point on the cone's edge on the target's side.
 from math import cos, hypot, sin, sqrt
 from typing import NamedTuple
 
+from agent.config import DEFAULT_CAST_FAR_M, Control
 from agent.guidance.cone import Cone, azimuth_error
 from agent.messages import Vector
 
@@ -17,6 +18,9 @@ INSIDE_EDGE = 0.95
 """A bobber on the cone's edge stands at this share of the half angle, so that a neighbour's push
 does not ask for a turn."""
 
+MIN_CAST_RATIO = 2.0
+"""The least ratio of d_c2 to d_c1."""
+
 
 class CastZone(NamedTuple):
     """The zone in which a bobber may be cast."""
@@ -24,6 +28,27 @@ class CastZone(NamedTuple):
     cone: Cone
     reach: float  # d_c2 [m]
     turning_radius: float  # R of E7 [m]
+
+
+def lemma_7_bound_m(range_m: float, spacing_m: float) -> float:
+    """Return the largest d_c2 [m] for a radio range d_c [m] and a spacing d_ir [m] (Lemma 7, E20).
+
+    Agents that are out of range at the start of a cycle then stay d_ir apart throughout it.
+    """
+    return 0.25 * (range_m - spacing_m)
+
+
+def cast_reach(control: Control, range_m: float | None) -> float:
+    """Return d_c2 [m]: ``cast_far_m``, or where it is left out what the radio's range allows (E20).
+
+    range_m: d_c [m]; None: without a limit, or not known.
+    """
+    if control.cast_far_m is not None:
+        return control.cast_far_m
+    if range_m is None:
+        return DEFAULT_CAST_FAR_M
+    allowed = min(DEFAULT_CAST_FAR_M, lemma_7_bound_m(range_m, control.spacing_m))
+    return max(allowed, MIN_CAST_RATIO * control.cast_near_m)
 
 
 def cast_zone(cone: Cone, reach: float, max_speed: float, max_yaw_rate: float) -> CastZone:

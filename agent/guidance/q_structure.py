@@ -6,9 +6,9 @@ potentials (18)-(28), then move or turn. All numbers are plain floats.
 
 from math import dist, hypot, pi, radians, sqrt
 
-from agent.config import DEFAULT_CAST_FAR_M, AgentSetup
+from agent.config import AgentSetup
 from agent.controller import Intent, Senses
-from agent.guidance.bobber import bobber, cast_zone
+from agent.guidance.bobber import CastZone, bobber, cast_reach, cast_zone
 from agent.guidance.cone import azimuth_error, cone_of
 from agent.guidance.constellation import avoidance_of
 from agent.guidance.deadlock_escape import DeadlockEscape
@@ -29,15 +29,12 @@ class QStructure:
 
     def __init__(self, setup: AgentSetup) -> None:
         vehicle, control = setup.vehicle, setup.control
+        self._control = control
         self._max_speed = vehicle.max_speed_mps
         self._max_climb = vehicle.max_climb_mps
         self._cone = cone_of(vehicle)
-        self._zone = cast_zone(
-            self._cone,
-            control.cast_far_m or DEFAULT_CAST_FAR_M,
-            vehicle.max_speed_mps,
-            radians(vehicle.max_yaw_rate_dps),
-        )
+        self._max_yaw_rate = radians(vehicle.max_yaw_rate_dps)
+        self._zone = self._zone_within(None)
         self._potential = Potential(control.separation_m)
         self._places = place_selection(setup)
         self._avoidance = avoidance_of(control.avoidance, control.safety_m)
@@ -74,6 +71,11 @@ class QStructure:
             blocked=self._places.blocked,
             words=self._places.words(senses.now_s),
         )
+
+    def _zone_within(self, range_m: float | None) -> CastZone:
+        """Return the cast-zone for a radio that reaches so far [m]; None: not known (E20)."""
+        reach = cast_reach(self._control, range_m)
+        return cast_zone(self._cone, reach, self._max_speed, self._max_yaw_rate)
 
     def _obstacle_term(self, senses: Senses) -> Vector:
         """Return the term that near surfaces add to Omega [m; world axes]."""

@@ -13,7 +13,7 @@ from agent.guidance import potential as potential_room
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Polyline, Ray
-from tests.laws import approach, energy, radio
+from tests.laws import approach, energy, far_agents, radio
 from tests.laws.energy import D_OB, Other, random_point
 
 WEDGE = FormationSpec(
@@ -165,4 +165,5 @@ LAWS = {
     **energy.LAWS,
     **approach.LAWS,
     **radio.LAWS,
+    **far_agents.LAWS,
 }

@@ -118,6 +118,11 @@ def bobber_never_head_on(q, yaw, q_toq, zone):
     return (q[0] + step * cos(heading), q[1] + step * sin(heading), q[2] + climb)
 
 
+def cast_reach_given(control, range_m):
+    """Algorithm 2, line 1: d_c2 is given, whatever the range; here 2 m."""
+    return 2.0
+
+
 def steer_in_a_pyramid(wanted, yaw, cone):
     """(4), (5): the cone in azimuth and, theta_3,4 = 45 degrees, in elevation."""
     heading = atan2(wanted[1], wanted[0])

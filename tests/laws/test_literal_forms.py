@@ -54,6 +54,8 @@ LITERAL = {
     "E14": ("E14", RecordTable, {"adopt": literal.adopt_nothing}),
     "E14 tree": ("E14", Tree, {"_compare": literal.adopt_nothing}),
     "E16": ("E16", Formation, {"_holders": literal.holders_queue_by_queue}),
+    "E20": ("Lemma 7 far", bobber_room, {"cast_reach": literal.cast_reach_given}),
+    "E20 pair": ("Lemma 7 pair", bobber_room, {"cast_reach": literal.cast_reach_given}),
     "E17": ("E17", allocation, {"allocate": literal.allot_by_distance}),
 }
 

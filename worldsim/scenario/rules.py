@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import assert_never
 
 from agent.config import LEAST
+from agent.guidance.bobber import MIN_CAST_RATIO
 from agent.messages import FLIGHT_M, Position
 from agent.qstructure.formation import Formation, formation_of
 from agent.qstructure.frame_path import tip_speed
@@ -18,7 +19,7 @@ from worldsim.scenario.obstacle_tables import obstacle_problem
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.safety_checks import SAFETY_WARNINGS
 from worldsim.scenario.start import BoxStart, ListStart
-from worldsim.scenario.tables import CONVERGED_S, MIN_CAST_RATIO, SLOTS_PER_TICK, Scenario
+from worldsim.scenario.tables import CONVERGED_S, SLOTS_PER_TICK, Scenario
 from worldsim.scenario.target_frame import frame_problem, path_of
 from worldsim.scenario.toml import ScenarioError
 

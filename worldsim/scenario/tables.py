@@ -11,7 +11,6 @@ import msgspec
 from msgspec import Meta
 
 from agent.config import (
-    DEFAULT_CAST_FAR_M,
     LEAST,
     AgentSetup,
     Comms,
@@ -22,6 +21,7 @@ from agent.config import (
     Table,
     Vehicle,
 )
+from agent.guidance.bobber import cast_reach, lemma_7_bound_m
 from agent.guidance.potential import TARGET_FLOOR_M
 from agent.messages import AgentId
 from agent.qstructure.formation import FormationSpec
@@ -34,8 +34,6 @@ from worldsim.scenario.target_frame import FrameTable, path_of
 
 SLOTS_PER_TICK = 4
 MAX_AGENTS = 1000
-MIN_CAST_RATIO = 2.0
-"""The least ratio of d_c2 to d_c1."""
 CONVERGED_M = 0.12
 """An agent within this distance of its slot [m] is in place."""
 CONVERGED_S = 2.0
@@ -170,7 +168,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
     def lemma_7_bound_m(self) -> float | None:
         """The largest d_c2 that keeps neighbours in range [m], Lemma 7; None without a limit."""
         range_m = self.local_range_m
-        return None if range_m is None else 0.25 * (range_m - self.control.spacing_m)
+        return None if range_m is None else lemma_7_bound_m(range_m, self.control.spacing_m)
 
     @property
     def vehicles(self) -> list[Vehicle]:
@@ -199,6 +197,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
 
     def agent_setup(self, agent: int, incarnation: int, command_ticks: int) -> AgentSetup:
         """Return the setup of one agent; ``command_ticks``: for how many a command is valid."""
+        cast_far_m = cast_reach(self.control, self.local_range_m)
         return AgentSetup(
             id=agent,
             incarnation=incarnation,
@@ -207,7 +206,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
             command_ticks=command_ticks,
             vehicle=self.vehicle_of(agent),
             fleet_max_speed_mps=max(vehicle.max_speed_mps for vehicle in self.vehicles),
-            control=self._resolved_control(),
+            control=msgspec.structs.replace(self.control, cast_far_m=cast_far_m),
             comms=self.comms,
             sensor=self.sensor,
             formation=self.formation,
@@ -226,12 +225,3 @@ class Scenario(Table, frozen=True, omit_defaults=False):
         """
         blind = any("proximity" not in vehicle.sensors for vehicle in self.vehicles)
         return blind or self.control.allocation == "assignment"
-
-    def _resolved_control(self) -> Control:
-        """Return [control] with a cast_far_m that the radio's range allows (Lemma 7, E20)."""
-        if self.control.cast_far_m is not None:
-            return self.control
-        bound_m = self.lemma_7_bound_m
-        far_m = DEFAULT_CAST_FAR_M if bound_m is None else min(DEFAULT_CAST_FAR_M, bound_m)
-        far_m = max(far_m, MIN_CAST_RATIO * self.control.cast_near_m)
-        return msgspec.structs.replace(self.control, cast_far_m=far_m)
