@@ -4,7 +4,7 @@ It is a cone in azimuth only, for vehicles climb and descend freely (E10).
 """
 
 from math import atan2, radians, remainder, tau
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 from agent.config import Vehicle
 
@@ -30,6 +30,19 @@ def cone_of(vehicle: Vehicle) -> Cone:
         radians(vehicle.max_turn_deg if left is None else left),
         radians(vehicle.max_turn_deg if right is None else right),
     )
+
+
+def flight_cone_of(vehicle: Vehicle) -> Cone:
+    """Return the cone of directions in which a vehicle can fly on while it keeps its heading.
+
+    A forward vehicle flies only where it points.
+    """
+    match vehicle.kind:
+        case "kinematic" | "accelerating":
+            return cone_of(vehicle)
+        case "forward":
+            return Cone(0.0, 0.0)
+    assert_never(vehicle.kind)
 
 
 def azimuth_error(x: float, y: float, yaw: float) -> float:

@@ -4,24 +4,23 @@ Target-on-queue (Algorithm 1, at 5 Hz), bobber (Algorithm 2), constellation-agen
 potentials (18)-(28), then move or turn. All numbers are plain floats.
 """
 
-from math import dist, hypot, pi, radians, sqrt
+from math import pi, radians, sqrt
 
 from agent.config import AgentSetup
 from agent.controller import Intent, Senses
 from agent.guidance.bobber import CastZone, bobber, cast_reach, cast_zone
-from agent.guidance.cone import azimuth_error, cone_of
+from agent.guidance.cone import cone_of
 from agent.guidance.constellation import avoidance_of
 from agent.guidance.deadlock_escape import DeadlockEscape
-from agent.guidance.movement import DEAD_BAND_MPS, saturated, steer
+from agent.guidance.movement import saturated, steer
 from agent.guidance.place_selection import place_selection
 from agent.guidance.potential import Potential
+from agent.guidance.slot_attitude import AttitudeAtSlot
 from agent.messages import ZERO, Vector
 from agent.qstructure.target_frame import Frame
 
 GAIN = 2.0
 """c of (28) [1/s]."""
-AT_SLOT_M = 0.02
-"""Within this distance of its slot an agent takes up the queue's orientation."""
 
 
 class QStructure:
@@ -35,6 +34,7 @@ class QStructure:
         self._cone = cone_of(vehicle)
         self._max_yaw_rate = radians(vehicle.max_yaw_rate_dps)
         self._zone = self._zone_within(None)
+        self._attitude = AttitudeAtSlot(vehicle)
         self._potential = Potential(control.separation_m)
         self._places = place_selection(setup)
         self._avoidance = avoidance_of(control.avoidance, control.safety_m)
@@ -50,13 +50,13 @@ class QStructure:
         if senses.obstacles and not self._escape.rounds_obstacle:
             a, b, c = self._obstacle_term(senses)
             x, y, z = x + a, y + b, z + c
+        attitude = self._attitude.wanted(q, own.slot if own is not None else None, frame)
         wanted = self._wanted((-GAIN * x, -GAIN * y, -GAIN * z), escape)
+        wanted = self._attitude.approach(wanted, attitude)
         velocity, yaw = steer(wanted, senses.yaw, self._cone)
         tilt = (0.0, 0.0)
-        if own is not None and dist(q, q_toq) < AT_SLOT_M and velocity == wanted:
-            attitude = own.slot.attitude
-            yaw = self._heading_at_slot(yaw, attitude.yaw, velocity, frame)
-            tilt = (attitude.pitch or 0.0, attitude.roll or 0.0)
+        if velocity == wanted:
+            yaw, tilt = self._attitude.heading(yaw, velocity, attitude), attitude.tilt
         return Intent(
             wanted=wanted,
             velocity=velocity,
@@ -82,17 +82,6 @@ class QStructure:
         if self._avoidance is None:
             return ZERO
         return self._avoidance.omega(senses.yaw, senses.obstacles)
-
-    def _heading_at_slot(
-        self, yaw: float, wanted_yaw: float | None, velocity: Vector, frame: Frame
-    ) -> float:
-        """Return the heading at the slot [rad]: the queue's, if the velocity stays in its cone."""
-        if wanted_yaw is None:
-            return yaw
-        u, v, _ = velocity
-        error = azimuth_error(u, v, wanted_yaw + frame.yaw)
-        in_cone = hypot(u, v) <= DEAD_BAND_MPS or self._cone.holds(error)
-        return wanted_yaw + frame.yaw if in_cone else yaw
 
     def _wanted(self, u: Vector, escape: Vector | None) -> Vector:
         """Return u of (28) within the vehicle's limits, plus the escape manoeuvre (E23) [m/s]."""

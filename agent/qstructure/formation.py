@@ -72,6 +72,7 @@ class Formation:
 
     def __init__(self, spec: FormationSpec, spacing: float) -> None:
         self.name = spec.name
+        self.oriented = spec.oriented
         check_names(spec)
         self.vertices = dict(spec.vertices)
         self.capacities = capacities_of(spec)

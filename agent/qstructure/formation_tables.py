@@ -55,6 +55,11 @@ class FormationSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omi
     ]
     queue: Annotated[tuple[QueueSpec, ...], Meta(min_length=1, max_length=64)]
 
+    @property
+    def oriented(self) -> bool:
+        """Whether any queue sets an angle."""
+        return any(queue.orientation not in (None, OrientationSpec()) for queue in self.queue)
+
 
 def queues_of(spec: FormationSpec, spacing: float) -> tuple[Queue, ...]:
     """Return every queue's geometry, with an equal share of the work that measuring may take."""

@@ -54,6 +54,16 @@ class Track:
             return self._first
         return self._segments[bisect_right(self._from_s, time_s) - 1].at(time_s)
 
+    def stretches(self) -> list[tuple[float, float, Frame]]:
+        """Return the path's parts with constant velocities in order, without the final rest.
+
+        Each with its start and its end [s], and the frame at its start.
+        """
+        return [
+            (each.from_s, until_s, each.at(each.from_s))
+            for each, until_s in zip(self._segments, self._from_s[1:], strict=False)
+        ]
+
 
 def _segments(path: FramePath) -> list[_Segment]:
     """Return the path's segments in order of time; in the last one the frame rests for good."""

@@ -80,6 +80,14 @@ def test_the_viewer_is_named_where_there_is_a_recording(summary: Summary) -> Non
             "  -        formation after a team change: not tested, the team never changed"
             " (limit 10 s)",
         ),
+        (
+            row("attitude_within_deg", 5.0, 41.26, False),
+            "  NOT MET  largest attitude error at the slots: 41.3 degrees (required <= 5)",
+        ),
+        (
+            row("attitude_within_deg", 5.0, None, True),
+            "  -        largest attitude error at the slots: not measured (required <= 5)",
+        ),
         (row("added_later", 1, 2, True), "  met      added_later: 2 (required 1)"),
     ],
 )

@@ -40,6 +40,7 @@ IDLE = {
         "obstacle": "[{ shape = 'sphere', centre_m = [9, 9, 9], radius_m = 1, from_s = 2 }]"
     },
     "expect.converge_within_s": {"expect.converge": "false", "expect.converge_within_s": "2"},
+    "expect.attitude_within_deg": {"expect.attitude_within_deg": "5"},
     "expect.min_obstacle_distance_m": {"expect.min_obstacle_distance_m": "0.5"},
 }
 USED = {

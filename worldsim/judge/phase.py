@@ -101,15 +101,27 @@ class Phase:
 
         Angles that a queue leaves free do not count; None where all are free.
         """
-        frame = self.frame(tick.time_s)
-        angles = [
-            (wanted + (frame.yaw if axis == 0 else 0.0), float(tick.attitude[row, axis]))
-            for row, slot in self._own_slots(tick).items()
-            for axis, wanted in enumerate(slot.attitude)
-            if wanted is not None and tick.alive[row]
-        ]
-        errors = [abs(remainder(wanted - flown, tau)) for wanted, flown in angles]
-        return degrees(max(errors)) if errors else None
+        return max(self.attitude_errors_deg(tick).values(), default=None)
+
+    def attitude_errors_deg(self, tick: Tick) -> dict[int, float]:
+        """Return for each row the difference between the agent's attitude and its slot's [deg].
+
+        It is the largest of the angles that the queue does not leave free; without any such angle,
+        or without a valid slot, a row is left out.
+        """
+        turned = (self.frame(tick.time_s).yaw, 0.0, 0.0)
+        found: dict[int, float] = {}
+        for row, slot in self._own_slots(tick).items():
+            errors = [
+                abs(remainder(wanted + turn - float(flown), tau))
+                for wanted, turn, flown in zip(
+                    slot.attitude, turned, tick.attitude[row], strict=True
+                )
+                if wanted is not None
+            ]
+            if errors and tick.alive[row]:
+                found[row] = degrees(max(errors))
+        return found
 
     def claims(self, tick: Tick) -> list[tuple[int, int]]:
         """Return each agent's claim in this phase, queue and rank; NO_CLAIM without one."""

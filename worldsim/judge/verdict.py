@@ -13,6 +13,7 @@ import numpy as np
 
 from agent.guidance.cone import cone_of
 from agent.qstructure.formation import formation_of
+from worldsim.judge.held_attitudes import HeldAttitudes
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.invariants import Invariants, InvariantTally
 from worldsim.judge.metrics import Separation, conserved, keeps
@@ -103,6 +104,8 @@ class Judge:
         self.min_separation_m: float | None = None
         """The least separation so far [m]; None before two vehicles were in the world."""
         self.clearance = ObstacleClearance(scenario)
+        bounded = scenario.expect.attitude_within_deg is not None
+        self._attitudes = HeldAttitudes(scenario) if bounded else None
         self._safety = InvariantTally()
         self._conservation = InvariantTally()
         cones = np.degrees([cone_of(vehicle) for vehicle in scenario.vehicles])
@@ -152,6 +155,8 @@ class Judge:
         team = np.flatnonzero(tick.alive).tolist()
         error = phase.slot_error(tick, self._hovering.occupied_places(tick, phase, team))
         in_place = phase.see(tick.time_s, np.where(tick.alive, error, np.nan))
+        if self._attitudes is not None:
+            self._attitudes.see(tick, phase, error)
         self._recoveries.see(tick, phase, in_place)
         if self._allocation is not None:
             self._allocation.see(tick, phase, in_place)
@@ -193,6 +198,8 @@ class Judge:
             rows += [self._converged(phase) for phase in self.phases]
         if expect.reform_within_s is not None:
             rows.append(self._reformed(expect.reform_within_s))
+        if self._attitudes is not None:
+            rows.append(self._oriented(self._attitudes, expect.attitude_within_deg))
         return [*rows, *map(_started, self._without_room)]
 
     def invariants(self) -> dict[str, InvariantTally]:
@@ -220,6 +227,8 @@ class Judge:
         formation = formation_of(event.tables, self._scenario.control.spacing_m)
         self.phases.append(Phase(formation, event.t_s, event.path, event.mission))
         self.queues.append(QueueConvergence(self.phases[-1]))
+        if self._attitudes is not None:
+            self._attitudes.open_phase()
 
     def _separated(self) -> Expectation:
         wanted_m = self._scenario.separation_bound_m
@@ -249,6 +258,15 @@ class Judge:
         worst_s = max(known_s) if known_s and complete else None
         held = complete and all(time_s <= within_s for time_s in known_s)
         return Expectation(name="reform_within_s", wanted=within_s, got=worst_s, held=held)
+
+    def _oriented(self, attitudes: HeldAttitudes, within_deg: float | None) -> Expectation:
+        worst_deg = attitudes.worst_deg
+        if worst_deg is None or within_deg is None:
+            held = not any(phase.formation.oriented for phase in self.phases)
+        else:
+            held = worst_deg <= within_deg
+        name = "attitude_within_deg"
+        return Expectation(name=name, wanted=within_deg, got=worst_deg, held=held)
 
     def _check_packets(self, packets: Packets) -> None:
         if "addressed" in packets:

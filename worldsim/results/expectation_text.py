@@ -120,6 +120,9 @@ def _other(row: ExpectationRow, run: Circumstances) -> str:
             return f"{what}: {measured} (required >= {wanted:g} m)"
         case "reform_within_s":
             return _reform(row, run)
+        case "attitude_within_deg":
+            measured = "not measured" if got is None else figure(got, "degrees", 1)
+            return f"largest attitude error at the slots: {measured} (required <= {wanted:g})"
     if wanted is None and name.startswith(STARTS):
         return f"{name}: there was no room, so no agent started"
     return f"{name}: {got} (required {wanted})"

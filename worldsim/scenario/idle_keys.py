@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from agent.config import SCANNERS, Control, Sensors, Vehicle
+from agent.qstructure.formation import FormationSpec
 from netem.link_parameters import Conditions, LinkKeys
 from worldsim.scenario.obstacle_tables import Movable
 from worldsim.scenario.problem import Problem
@@ -154,6 +155,18 @@ def _of_expectations(scenario: Scenario) -> Iterator[Problem]:
         yield Problem("expect.converge_within_s", "no effect: expect.converge is false")
     if not scenario.obstacle and expect.min_obstacle_distance_m is not None:
         yield Problem("expect.min_obstacle_distance_m", "no effect: there is no obstacle")
+    if expect.attitude_within_deg is not None and not any(
+        each.oriented for each in _specs(scenario)
+    ):
+        yield Problem("expect.attitude_within_deg", "no effect: no queue has an orientation")
+
+
+def _specs(scenario: Scenario) -> Iterator[FormationSpec]:
+    """Yield every formation of a scenario."""
+    yield scenario.formation
+    for event in scenario.event:
+        if event.formation is not None:
+            yield event.formation
 
 
 def _is_set(table: Any, default: Any, key: str) -> bool:

@@ -16,6 +16,7 @@ from agent.qstructure.formation import Formation, formation_of
 from agent.qstructure.frame_path import tip_speed
 from worldsim.scenario.idle_keys import idle_keys
 from worldsim.scenario.obstacle_tables import obstacle_problem
+from worldsim.scenario.orientation_checks import yaws_not_held
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.safety_checks import SAFETY_WARNINGS
 from worldsim.scenario.start import BoxStart, ListStart
@@ -39,7 +40,8 @@ def check_rules(scenario: Scenario, file: str | Path) -> None:
 def warnings_for(scenario: Scenario) -> list[Problem]:
     """Return what a scenario is allowed to ask for but should not."""
     found = (warning(scenario) for warning in WARNINGS)
-    return [*(problem for problem in found if problem is not None), *idle_keys(scenario)]
+    single = [problem for problem in found if problem is not None]
+    return [*single, *yaws_not_held(scenario), *idle_keys(scenario)]
 
 
 def speed_problem(scenario: Scenario, command_ticks: int) -> Problem | None:

@@ -92,7 +92,8 @@ class Expectations(Table, frozen=True):
     until it has re-formed the whole formation. converge: false where no formation is to be formed,
     as with a controller that knows none. min_separation_m: between centres; left out:
     control.separation_m. min_obstacle_distance_m: from a vehicle's centre to a surface; left out:
-    control.clearance_m.
+    control.clearance_m. attitude_within_deg: how far an agent's attitude may be from its queue's
+    orientation, at the end and from the formation's convergence on.
     """
 
     converge_within_s: Positive | None = None
@@ -100,6 +101,7 @@ class Expectations(Table, frozen=True):
     converge: bool = True
     min_separation_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
     min_obstacle_distance_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
+    attitude_within_deg: Annotated[float, Meta(ge=LEAST, le=180)] | None = None
 
 
 class Scenario(Table, frozen=True, omit_defaults=False):

@@ -53,6 +53,7 @@ EXAMPLES: Given = {
     "expect.reform_within_s": 10.0,
     "expect.min_separation_m": 0.25,
     "expect.min_obstacle_distance_m": 0.4,
+    "expect.attitude_within_deg": 10.0,
     "event.frame.yaw_deg": 90.0,
     "formation.queue.capacity": 0.5,
     "formation.queue.orientation.yaw_deg": "10*d",
