@@ -3,7 +3,7 @@
 import numpy as np
 
 from netem.messages import MediumCounters
-from worldsim.engine.counters import DirectLinks, RadioUse
+from worldsim.engine.counters import Links, RadioUse
 
 COUNTERS = MediumCounters(
     slot=0,
@@ -21,13 +21,17 @@ def radio_use() -> RadioUse:
     use = RadioUse(3, tick_hz=20.0)
     for tick in range(40):
         use.count_tick(np.array([True, tick < 20, False]))
-        use.count_step(0, 2 if tick < 10 else 1)
-    use.count_step(1, 1)
+        use.count_step(0, 2 if tick < 10 else 1, 1 if tick < 30 else None)
+    use.count_step(1, 1, None)
     return use
 
 
 def test_direct_links_are_the_mean_and_the_most_over_an_agents_steps() -> None:
-    assert radio_use().links() == DirectLinks(mean=[1.25, 1.0, None], most=[2, 1, None])
+    assert radio_use().heard() == Links(mean=[1.25, 1.0, None], most=[2, 1, None])
+
+
+def test_needed_links_are_counted_over_the_steps_with_a_place() -> None:
+    assert radio_use().needed() == Links(mean=[1.0, None, None], most=[1, None, None])
 
 
 def test_bytes_count_per_second_in_which_an_agent_was_running() -> None:

@@ -25,6 +25,7 @@ KEYS = {
     *("schema", "scenario", "seed", "mode", "agents", "duration_s", "outcome", "expectations"),
     *("min_separation_m", "min_obstacle_distance_m", "phases", "turns_over_limit_fraction"),
     *("packets", "invariants", "late_tick_fraction", "real_time_factor", "trace_sha256"),
+    *("direct_links", "needed_links", "bytes_per_s"),
     *("version", "commit", "commit_dirty", "python", "packages", "host"),
 }
 SCENARIO = parse(SMALL, overrides={"netem.loss_percent": "30"})

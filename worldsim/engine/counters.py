@@ -1,6 +1,6 @@
-"""Counters of a run for each agent: direct links, bytes sent, messages rejected by cause.
+"""Counters of a run for each agent: links, bytes sent, messages rejected by cause.
 
-Direct links are the paper's N_c,i (Sec. 3.4): they need not grow with the team.
+A direct link is an agent that is heard. Those that an agent needs are the paper's N_c,i (Sec. 3.4).
 """
 
 from collections import Counter
@@ -14,12 +14,35 @@ from netem.messages import MediumCounters
 from netem.wire.channels import CHANNELS
 
 
-class DirectLinks(msgspec.Struct, frozen=True):
-    """Number of neighbours that each agent hears directly; row i = agent i, None without a step."""
+class Links(msgspec.Struct, frozen=True):
+    """Number of links of each agent; row i = agent i, None without a step that counts."""
 
     mean: list[float | None]
     """Over the agent's steps."""
     most: list[int | None]
+
+
+class LinkCounter:
+    """Counts each agent's links over its steps."""
+
+    def __init__(self, rows: int) -> None:
+        self._steps = [0] * rows
+        self._total = [0] * rows
+        self._most = [0] * rows
+
+    def count(self, agent: int, links: int) -> None:
+        """Count one step of an agent that has so many links."""
+        self._steps[agent] += 1
+        self._total[agent] += links
+        self._most[agent] = max(self._most[agent], links)
+
+    def links(self) -> Links:
+        """Return each agent's links so far."""
+        rows = list(zip(self._steps, self._total, self._most, strict=True))
+        return Links(
+            mean=[total / steps if steps else None for steps, total, _ in rows],
+            most=[most if steps else None for steps, _, most in rows],
+        )
 
 
 class RadioUse:
@@ -28,27 +51,29 @@ class RadioUse:
     def __init__(self, rows: int, tick_hz: float) -> None:
         self._tick_hz = tick_hz
         self._running_ticks = np.zeros(rows, dtype=np.int64)
-        self._steps = [0] * rows
-        self._links = [0] * rows
-        self._most = [0] * rows
+        self._heard = LinkCounter(rows)
+        self._needed = LinkCounter(rows)
 
-    def count_step(self, agent: int, neighbours: int) -> None:
-        """Count one step of an agent that hears this many neighbours directly."""
-        self._steps[agent] += 1
-        self._links[agent] += neighbours
-        self._most[agent] = max(self._most[agent], neighbours)
+    def count_step(self, agent: int, heard: int, needed: int | None) -> None:
+        """Count one step of an agent that hears so many others directly, and needs so many of them.
+
+        needed: None for a step without a place in the formation; it does not count.
+        """
+        self._heard.count(agent, heard)
+        if needed is not None:
+            self._needed.count(agent, needed)
 
     def count_tick(self, running: NDArray[np.bool_]) -> None:
         """Count one tick for the agents that are running (N,)."""
         self._running_ticks += running
 
-    def links(self) -> DirectLinks:
+    def heard(self) -> Links:
         """Return each agent's direct links."""
-        rows = list(zip(self._steps, self._links, self._most, strict=True))
-        return DirectLinks(
-            mean=[links / steps if steps else None for steps, links, _ in rows],
-            most=[most if steps else None for steps, _, most in rows],
-        )
+        return self._heard.links()
+
+    def needed(self) -> Links:
+        """Return those of each agent's direct links that it needs, N_c,i."""
+        return self._needed.links()
 
     def bytes_per_s(self, counters: MediumCounters | None) -> dict[str, list[float | None]] | None:
         """Return for each channel the payload that each agent sent [bytes/s] while it was running.

@@ -15,6 +15,7 @@ import numpy as np
 from agent.messages import Command, Mission, Observation, Vector
 from worldsim.engine.counters import RadioUse, RejectionCounters
 from worldsim.engine.operations import Operation, StartProcesses
+from worldsim.engine.queue_neighbours import QueueNeighbours
 from worldsim.engine.telemetry import FleetTelemetry
 from worldsim.engine.timeline_effects import TimelineEffects
 from worldsim.engine.trace import Trace
@@ -101,6 +102,7 @@ class SlotLoop:
         self.members = self.effects.members
         self.network = self.effects.network
         self.radio_use = RadioUse(scenario.rows, scenario.fleet.tick_hz)
+        self._queue_neighbours = QueueNeighbours(scenario.rows, self.judge.phases)
         self.rejections = RejectionCounters()
         self._recorder = recorder
         self._records_ticks = recorder is not None and recorder.records_ticks
@@ -148,7 +150,8 @@ class SlotLoop:
             self.trace.command(agent, encoded)
             telemetry = command.telemetry
             self._telemetry.update(agent, telemetry, self._headings[agent])
-            self.radio_use.count_step(agent, len(telemetry.heard))
+            needed = self._queue_neighbours.count(agent, telemetry)
+            self.radio_use.count_step(agent, len(telemetry.heard), needed)
             self.effects.missions.report(agent, telemetry.mission, self.world.time_s)
             self._report_place(agent, telemetry.place)
             if telemetry.rejected:

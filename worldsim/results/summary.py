@@ -11,6 +11,7 @@ from typing import Any, Literal, TypedDict
 import msgspec
 
 from netem.messages import MediumCounters
+from worldsim.engine.counters import Links
 from worldsim.engine.step import SlotLoop
 from worldsim.judge.verdict import Expectation, Judge
 from worldsim.results.expectation_text import (
@@ -93,8 +94,8 @@ class PhaseRow(TypedDict):
     queues_converge_s: dict[str, float | None]  # by queue name
 
 
-class DirectLinksRow(TypedDict):
-    """Number of neighbours that each agent hears directly; row i = agent i."""
+class LinksRow(TypedDict):
+    """Number of links of each agent; row i = agent i."""
 
     mean: list[float | None]
     most: list[int | None]
@@ -143,7 +144,8 @@ class Summary(Provenance):
     turns_over_limit_fraction: float | None  # of moving steps
     packets: dict[str, int | None]  # by fate
     rejected_by_cause: dict[str, dict[str, int]]  # messages, by component and cause
-    direct_links: DirectLinksRow
+    direct_links: LinksRow  # agents heard
+    needed_links: LinksRow  # those of them that are of the own queue: N_c,i
     bytes_per_s: dict[str, list[float | None]] | None  # by channel, of each agent
     invariants: dict[str, InvariantRow]
     delivery: DeliveryRow | None
@@ -159,7 +161,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
     rejected = _rejected(run)
     expectations = [_expectation_row(expectation) for expectation in judge.expectations()]
     invariants = judge.invariants()
-    links = run.loop.radio_use.links()
+    use = run.loop.radio_use
     outcome, reason = _outcome(run, expectations)
     summary: Summary = {
         "schema": SCHEMA,
@@ -180,8 +182,9 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "packets": _packets(counters, rejected),
         "rejected_by_cause": rejected,
-        "direct_links": {"mean": links.mean, "most": links.most},
-        "bytes_per_s": run.loop.radio_use.bytes_per_s(counters),
+        "direct_links": _links_row(use.heard()),
+        "needed_links": _links_row(use.needed()),
+        "bytes_per_s": use.bytes_per_s(counters),
         "invariants": {
             name: {"ticks": tally.ticks, "violations": tally.violations}
             for name, tally in invariants.items()
@@ -267,6 +270,10 @@ def _packets(
     counted = counters.packets()
     total = sum(count for causes in rejected.values() for count in causes.values())
     return {**{name: counted.get(name, 0) for name in names}, "rejected": total}
+
+
+def _links_row(links: Links) -> LinksRow:
+    return {"mean": links.mean, "most": links.most}
 
 
 def _delivery_late_ms(counters: MediumCounters | None) -> dict[str, float] | None:
