@@ -144,7 +144,7 @@ class Sensors(Table, frozen=True):
 
 
 DEFAULT_CAST_FAR_M = 0.5
-"""d_c2 [m] where neither the scenario nor the radio's range sets another (Lemma 7, E20)."""
+"""d_c2 [m] where neither the scenario nor the range heard sets another (Lemma 7, E20)."""
 
 
 class Control(Table, frozen=True):
@@ -155,7 +155,7 @@ class Control(Table, frozen=True):
     allocation: who takes which place: "structure" by leaders, trees and neighbours; "assignment",
     for comparison, by every agent alike, which knows all members (E24).
     clearance_m: distance from a vehicle's centre to an obstacle's surface that the safety filter
-    keeps. ``cast_far_m`` left out follows from the range (Lemma 7, E20).
+    keeps. ``cast_far_m`` left out follows from the range heard (E20).
     """
 
     controller: Annotated[str, Meta(min_length=1, max_length=200)] = "q_structure"

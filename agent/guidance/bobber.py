@@ -38,17 +38,17 @@ def lemma_7_bound_m(range_m: float, spacing_m: float) -> float:
     return 0.25 * (range_m - spacing_m)
 
 
-def cast_reach(control: Control, range_m: float | None) -> float:
+def cast_reach(control: Control, range_m: float, full_speed_m: float = 0.0) -> float:
     """Return d_c2 [m]: ``cast_far_m``, or where it is left out what the radio's range allows (E20).
 
-    range_m: d_c [m]; None: without a limit, or not known.
+    range_m: d_c [m], infinite where it is not known. full_speed_m: d_c2 at which the vehicle flies
+    at its full speed [m]; given where the range is only the distance from which others were heard.
+    The radio may reach farther than anybody is away, so that much is kept.
     """
     if control.cast_far_m is not None:
         return control.cast_far_m
-    if range_m is None:
-        return DEFAULT_CAST_FAR_M
-    allowed = min(DEFAULT_CAST_FAR_M, lemma_7_bound_m(range_m, control.spacing_m))
-    return max(allowed, MIN_CAST_RATIO * control.cast_near_m)
+    allowed = max(lemma_7_bound_m(range_m, control.spacing_m), full_speed_m)
+    return max(min(DEFAULT_CAST_FAR_M, allowed), MIN_CAST_RATIO * control.cast_near_m)
 
 
 def cast_zone(cone: Cone, reach: float, max_speed: float, max_yaw_rate: float) -> CastZone:

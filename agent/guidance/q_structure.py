@@ -33,7 +33,6 @@ class QStructure:
         self._max_climb = vehicle.max_climb_mps
         self._cone = cone_of(vehicle)
         self._max_yaw_rate = radians(vehicle.max_yaw_rate_dps)
-        self._zone = self._zone_within(None)
         self._attitude = AttitudeAtSlot(vehicle)
         self._potential = Potential(control.separation_m)
         self._places = place_selection(setup)
@@ -44,7 +43,8 @@ class QStructure:
         """Return the intent; an agent without a place stays where it is and gives way."""
         q, own, frame = senses.position, self._places.select(senses), senses.mission.frame
         q_toq = frame.to_world(own.slot.point) if own is not None else q
-        q_tg = bobber(q, senses.yaw, _aim_point(q_toq, frame), self._zone)
+        zone = self._zone_within(senses.link.reach_m)
+        q_tg = bobber(q, senses.yaw, _aim_point(q_toq, frame), zone)
         x, y, z = self._potential.omega(q, q_tg, senses.neighbours)
         escape = self._escape.direction(senses, q_toq)
         if senses.obstacles and not self._escape.rounds_obstacle:
@@ -72,9 +72,9 @@ class QStructure:
             words=self._places.words(senses.now_s),
         )
 
-    def _zone_within(self, range_m: float | None) -> CastZone:
-        """Return the cast-zone for a radio that reaches so far [m]; None: not known (E20)."""
-        reach = cast_reach(self._control, range_m)
+    def _zone_within(self, heard_m: float) -> CastZone:
+        """Return the cast-zone where others were heard from so far at most [m] (E20)."""
+        reach = cast_reach(self._control, heard_m, self._max_speed / GAIN)
         return cast_zone(self._cone, reach, self._max_speed, self._max_yaw_rate)
 
     def _obstacle_term(self, senses: Senses) -> Vector:

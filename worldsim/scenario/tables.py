@@ -21,7 +21,7 @@ from agent.config import (
     Table,
     Vehicle,
 )
-from agent.guidance.bobber import cast_reach, lemma_7_bound_m
+from agent.guidance.bobber import lemma_7_bound_m
 from agent.guidance.potential import TARGET_FLOOR_M
 from agent.messages import AgentId
 from agent.qstructure.formation import FormationSpec
@@ -199,7 +199,6 @@ class Scenario(Table, frozen=True, omit_defaults=False):
 
     def agent_setup(self, agent: int, incarnation: int, command_ticks: int) -> AgentSetup:
         """Return the setup of one agent; ``command_ticks``: for how many a command is valid."""
-        cast_far_m = cast_reach(self.control, self.local_range_m)
         return AgentSetup(
             id=agent,
             incarnation=incarnation,
@@ -208,7 +207,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
             command_ticks=command_ticks,
             vehicle=self.vehicle_of(agent),
             fleet_max_speed_mps=max(vehicle.max_speed_mps for vehicle in self.vehicles),
-            control=msgspec.structs.replace(self.control, cast_far_m=cast_far_m),
+            control=self.control,
             comms=self.comms,
             sensor=self.sensor,
             formation=self.formation,
