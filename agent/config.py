@@ -189,9 +189,10 @@ class AgentSetup(Table, frozen=True):
     fleet_max_speed_mps: Positive  # limit of the fleet's fastest vehicle
     control: Control
     comms: Comms
-    formation: FormationSpec
+    formation: FormationSpec | None = None
+    """The formation of the mission that it was briefed with; None: it has to hear one by radio."""
     sensor: Sensors = Sensors()
-    frame: FramePath = AT_HOME  # path of the target's frame until a mission sets another
+    frame: FramePath = AT_HOME  # path of the target's frame in that mission
     team: Annotated[int, Meta(ge=0, le=AGENT_IDS)] = 0
     """Number of agents that the fleet started with; their ids are 0 to ``team`` - 1."""
     ids: Annotated[int, Meta(ge=1, le=AGENT_IDS)] = AGENT_IDS

@@ -95,7 +95,7 @@ class Senses(msgspec.Struct, frozen=True, gc=False):
     """Vehicles within the proximity sensor's range, relative to the own centre [m; world axes]."""
     neighbours: tuple[Heard, ...]  # sorted by id
     team: Callable[[], tuple[Peer, ...]]  # all known members, sorted by id; gathered when called
-    mission: Flown
+    mission: Flown | None  # None: not briefed, and none heard yet
     silent: tuple[Vector, ...] = ()  # unidentified vehicles [m; world frame] (E18)
     blocked: frozenset[Place] = frozenset()
     """Places that others see taken by an unidentified vehicle (E18)."""

@@ -122,7 +122,7 @@ class Agent:
         for mission in observation.orders:
             self._accept_order(mission)
         senses = self._senses(observation)
-        intent = self._intent = self._controller.decide(senses)
+        intent = self._intent = self._decide(senses)
         velocity = self._safety_monitor.safe_velocity(intent.velocity, senses)
         if not self._perception.sensor_health.update(observation):
             velocity = ZERO
@@ -133,6 +133,13 @@ class Agent:
         frames = self._broadcast.frames(senses.now_s, own, echoes, self._table, pieces)
         return Outbox(command=command, frames=frames)
 
+    def _decide(self, senses: Senses) -> Intent:
+        """Return the controller's intent; without a mission there is no place to claim."""
+        intent = self._controller.decide(senses)
+        if senses.mission is None and (intent.place is not None or intent.blocked):
+            return msgspec.structs.replace(intent, place=None, vertex=False, blocked=())
+        return intent
+
     def _own_state(self, senses: Senses, velocity: Vector, intent: Intent) -> OwnState:
         missions = self._missions
         frame, drift = missions.frame_report(senses.now_s)
@@ -142,7 +149,7 @@ class Agent:
             heading_for=intent.heading_for,
             place=intent.place,
             speed_cap=self._safety_monitor.speed_cap,
-            mission=missions.flown.key,
+            mission=missions.key,
             frame_key=missions.frame_key,
             frame=frame,
             drift=drift,
@@ -185,7 +192,7 @@ class Agent:
 
     def _senses(self, observation: Observation) -> Senses:
         now_s = observation.time_s
-        mission = self._missions.flown_at(now_s)
+        mission, key = self._missions.flown_at(now_s), self._missions.key
         if now_s >= self._housekeeping_at_s:
             self._housekeeping_at_s = now_s + HOUSEKEEPING_S
             self._do_housekeeping(observation)
@@ -199,8 +206,8 @@ class Agent:
             velocity=observation.velocity,
             yaw=observation.yaw,
             vehicles=observation.vehicles,
-            neighbours=self._neighbours.heard(now_s, mission.key),
-            team=lambda: self._table.team(own, mission.key),
+            neighbours=self._neighbours.heard(now_s, key),
+            team=lambda: self._table.team(own, key),
             mission=mission,
             silent=self._unidentified,
             blocked=self._blocked,
@@ -237,8 +244,8 @@ class Agent:
         )
         self._safety_monitor.relay(self._table.newest())
         self._perception.sensor_health.compare(observation, beacons)
-        self._neighbour_lacks_mission = self._neighbours.any_behind(self._missions.flown.key)
-        self._blocked = self._table.blocked(self._missions.flown.key)
+        self._neighbour_lacks_mission = self._neighbours.any_behind(self._missions.key)
+        self._blocked = self._table.blocked(self._missions.key)
         self._link = self._neighbours.link(observation.position)
 
     def _reports_vehicle(self, agents: int) -> ReportsVehicle:
@@ -250,7 +257,9 @@ class Agent:
         mission = self._missions.flown
 
         def reports_vehicle(witness: Beacon, vehicle: Vector) -> bool:
-            if witness.mission != mission.key or len(witness.blocked) >= MAX_PLACES:
+            if mission is None or witness.mission != mission.key:
+                return True
+            if len(witness.blocked) >= MAX_PLACES:
                 return True
             slots = [mission.formation.slot(Place(*place), agents) for place in witness.blocked]
             return any(
@@ -270,7 +279,7 @@ class Agent:
             place=intent.place,
             heard=self._neighbours.sorted_ids[:MAX_HEARD],
             rejected=tuple(rejected),
-            mission=self._missions.flown.key,
+            mission=self._missions.key,
             tier=intent.words.tier,
             parent=intent.words.parent,
             role=intent.words.role,

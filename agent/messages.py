@@ -41,6 +41,10 @@ Count = Annotated[int, Meta(ge=0, lt=2**53)]
 AgentId = Annotated[int, Meta(ge=0, lt=AGENT_IDS)]
 ParentId = Annotated[int, Meta(ge=-1, lt=AGENT_IDS)]
 """An agent id, or -1 for no parent."""
+NO_MISSION = -1
+MissionKey = Annotated[int, Meta(ge=NO_MISSION, lt=2**53)]
+"""Key of the mission that an agent flies: 0 for the one it was briefed with at the start, more for
+later ones, NO_MISSION for none. Keys are ordered, so a team's first mission is newer than none."""
 Index = Annotated[int, Meta(ge=-1, lt=2**15)]
 """A queue, a rank or a tier; -1 for none."""
 
@@ -192,7 +196,7 @@ class Telemetry(Message, frozen=True):
     place: tuple[Index, Index] | None  # (queue, rank) that it claims
     heard: Annotated[tuple[AgentId, ...], Meta(max_length=MAX_HEARD)]  # ids heard directly
     rejected: Rejections  # (index of CAUSES, number of messages) since the start
-    mission: Count  # key of the mission that it flies
+    mission: MissionKey  # of the mission that it flies
     tier: Index  # see Beacon
     parent: ParentId  # see Beacon
     role: Annotated[int, Meta(ge=0, lt=len(ROLES))]  # index of ROLES
@@ -341,11 +345,11 @@ class Beacon(Message, frozen=True):
     """The sender promises to stay below this speed for the next 3 s [m/s]."""
     echoes: Annotated[tuple[tuple[AgentId, Count], ...], Meta(max_length=128)]
     """(id, last sequence heard) of each neighbour."""
-    mission: Count  # key of the mission that the sender flies
-    frame_key: Count
+    mission: MissionKey  # of the mission that the sender flies
+    frame_key: MissionKey
     """Key of the mission that ``frame`` belongs to; it may be newer than ``mission``, which then is
     still on its way."""
-    frame: Pose  # of the target's frame
+    frame: Pose  # of the target's frame; without meaning where ``frame_key`` is NO_MISSION
     drift: Drift | None  # velocity of the target's frame; None where it rests for good
     blocked: Places  # places that the sender sees taken by an unidentified vehicle (E18)
     standing: Standing | None  # in the Q-structure; None where the sender uses none
@@ -365,7 +369,7 @@ class Record(Message, frozen=True):
     queue: Index  # see Beacon
     rank: Index  # see Beacon
     cost_mm: Cost  # see Beacon [mm]
-    mission: Count  # key of the mission in which (queue, rank) is a place
+    mission: MissionKey  # of the mission in which (queue, rank) is a place
     blocked: Places  # see Beacon
 
 

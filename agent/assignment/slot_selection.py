@@ -10,7 +10,7 @@ from math import dist
 
 from agent.assignment.target_on_queue import TargetOnQueue
 from agent.config import AgentSetup
-from agent.controller import Heard, Peer, Senses, Words
+from agent.controller import Flown, Heard, Peer, Senses, Words
 from agent.messages import DISTRESS, MEMBER, VERTEX, Place
 from agent.places.occupied_slots import OccupiedSlots
 from agent.places.place_points import OwnTarget, PlacePoints
@@ -60,20 +60,26 @@ class SlotSelection:
         return Words(role=role)
 
     def select(self, senses: Senses) -> OwnTarget | None:
-        """Return the own target; chosen anew at 5 Hz (Algorithm 1), at once in a new mission."""
-        new = senses.mission.key != self._mission_key
+        """Return the own target; chosen anew at 5 Hz (Algorithm 1), at once in a new mission.
+
+        None where all queues are full, and without a mission.
+        """
+        mission = senses.mission
+        if mission is None:
+            return None
+        new = mission.key != self._mission_key
         if senses.now_s >= self._next_choice_s or new:
             team = senses.team()
             holders = [(peer.place, peer.position) for peer in team]
-            blocked = self._occupied.update(senses, holders, len(team), senses.blocked)
+            blocked = self._occupied.update(senses, mission, holders, len(team), senses.blocked)
             if not self._is_listening(senses.now_s, team, blocked):
-                self._choose(senses, team, blocked, new)
+                self._choose(senses, mission, team, blocked)
         return self._own
 
     def _choose(
-        self, senses: Senses, team: Sequence[Peer], blocked: frozenset[Place], new: bool
+        self, senses: Senses, mission: Flown, team: Sequence[Peer], blocked: frozenset[Place]
     ) -> None:
-        mission, now_s = senses.mission, senses.now_s
+        new, now_s = mission.key != self._mission_key, senses.now_s
         self._next_choice_s = now_s + 1.0 / CHOICE_HZ - 1e-9
         self._mission_key = mission.key
         before = self._own.place if self._own is not None else None

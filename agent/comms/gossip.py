@@ -17,7 +17,7 @@ from agent.codec import CHECKSUM_B, add_checksum, encode
 from agent.comms.neighbours import NEVER_HEARD, Version
 from agent.comms.unidentified_vehicles import DepartedMember, MemberPosition
 from agent.controller import Peer
-from agent.messages import AGENT_IDS, MAX_TEAM, Beacon, Gossip, Piece, Place, Record
+from agent.messages import AGENT_IDS, MAX_TEAM, NO_MISSION, Beacon, Gossip, Piece, Place, Record
 from netem.wire.channels import MAX_PAYLOAD_B
 
 RELAYED_SILENCE_ROUNDS = 12
@@ -110,7 +110,7 @@ class RecordTable:
         """
         peers = [own]
         for subject, newest in self._newest.items():
-            placed = newest.queue >= 0 and newest.mission == mission
+            placed = newest.queue >= 0 and newest.mission == mission != NO_MISSION
             place = Place(newest.queue, newest.rank) if placed else None
             cost_m = newest.cost_mm / 1000.0
             peers.append(Peer(id=subject, position=newest.position, place=place, cost_m=cost_m))
@@ -134,7 +134,9 @@ class RecordTable:
         mission: key of the mission in which these are places.
         """
         reports = [
-            each for each in self._newest.values() if each.blocked and each.mission == mission
+            each
+            for each in self._newest.values()
+            if each.blocked and each.mission == mission != NO_MISSION
         ]
         return frozenset(Place(*place) for newest in reports for place in newest.blocked)
 

@@ -1,14 +1,17 @@
 """Missions: the formation that the team forms, and the path of its frame. The highest key wins.
 
-An operator gives a mission to one agent; it spreads from there. A key is version * KEYS_PER_VERSION
+Who is briefed flies the mission of key 0 from the start. Everybody else flies none until it has
+heard one: it knows neither formation nor frame. An operator gives a mission to one agent; it
+spreads from there. A key is version * KEYS_PER_VERSION
 + origin, the id of the agent that numbered it (the world's origin is 0), so two missions of one
 version are ordered alike in all agents. Every beacon says which mission its sender flies, and where
 the frame is. The mission itself follows in pieces on the multihop channel, as long as a neighbour
-flies an older one.
+flies an older one or none.
 
 An agent that has the mission computes the frame from its path, and reports the frame at the time of
-each beacon. An agent that has only heard of the frame passes on the report unchanged, with its
-stamp, down the tiers. The newest stamp wins, and each agent extrapolates the frame from there.
+each beacon. An agent of an older mission that has only heard of the frame passes on the report
+unchanged, with its stamp, down the tiers. The newest stamp wins, and each agent extrapolates the
+frame from there. To an agent without a mission a frame means nothing.
 
 A key heard by radio may not run ahead of the time (``is_plausible``), so whatever key a member
 invents, the operator's next mission has a higher one. Every mission passes the one check of
@@ -25,7 +28,9 @@ from agent.controller import Flown
 from agent.messages import (
     AGENT_IDS,
     AT_HOME,
+    HOME,
     MAX_TEAM,
+    NO_MISSION,
     PIECE_B,
     Beacon,
     Drift,
@@ -103,13 +108,14 @@ class ReportedFrame:
 class Missions:
     """The mission that one agent flies, and those that it is receiving.
 
-    spacing: d_ir of the formation [m]; path: of the frame at the start; ids: number of agent ids.
+    formation, path: of the frame, both as briefed; without a formation it flies none until it hears
+    one. spacing: d_ir of the formation [m]; ids: number of agent ids.
     """
 
     def __init__(
         self,
         own_id: int,
-        formation: FormationSpec,
+        formation: FormationSpec | None,
         spacing: float,
         path: FramePath = AT_HOME,
         ids: int = MAX_TEAM,
@@ -119,32 +125,41 @@ class Missions:
         self._team = min(ids, MAX_TEAM)
         self._deaf_until_s: dict[int, float] = {}
         """Until when the pieces of each sender are ignored [s]."""
-        self._encoded = encode_formation(formation)
+        self._encoded = encode_formation(formation) if formation is not None else b""
         self._pieces: dict[int, _Pieces] = {}
         """What has arrived from each sender."""
         self._path = path
         self._frame: Track | ReportedFrame = Track(path)
         self._resting: tuple[Frame, Pose] | None = None
-        self.frame_key = 0
-        self.flown = Flown(
-            key=0, formation=formation_of(formation, spacing), frame=self._frame.at(0.0)
-        )
+        self.frame_key = NO_MISSION
+        self.flown: Flown | None = None
+        if formation is not None:
+            self.frame_key = 0
+            self.flown = Flown(0, formation_of(formation, spacing), self._frame.at(0.0))
 
-    def flown_at(self, time_s: float) -> Flown:
+    @property
+    def key(self) -> int:
+        """The key of the mission flown; NO_MISSION for none."""
+        return self.flown.key if self.flown is not None else NO_MISSION
+
+    def flown_at(self, time_s: float) -> Flown | None:
         """Return the mission flown, with its frame at a time [s; Observation time]."""
-        if not self._frame.rests:
+        if self.flown is not None and not self._frame.rests:
             self.flown = self.flown._replace(frame=self._frame.at(time_s))
         return self.flown
 
     def accept_order(self, mission: Mission) -> None:
         """Take an operator's order; raise RejectedError for an old key or an invalid formation."""
-        version = self.flown.key // KEYS_PER_VERSION + 1
+        version = max(self.key, 0) // KEYS_PER_VERSION + 1
         key = mission.key or version * KEYS_PER_VERSION + self._own_id
-        self._adopt(key, mission.frame, mission.formation or self._encoded)
+        encoded = mission.formation or self._encoded
+        if not encoded:
+            raise RejectedError("mission", "a frame alone, for an agent without a formation")
+        self._adopt(key, mission.frame, encoded)
 
     def receive(self, piece: Piece, sender: int, now_s: float) -> None:
         """Take a piece of a mission; with the sender's last piece, fly it. Raises RejectedError."""
-        if piece.key <= self.flown.key or piece.index >= piece.count:
+        if piece.key <= self.key or piece.index >= piece.count:
             return
         if now_s < self._deaf_until_s.get(sender, 0.0):
             return
@@ -163,21 +178,22 @@ class Missions:
             self._deaf_until_s[sender] = now_s + DEAF_S
 
     def pieces(self) -> list[Piece]:
-        """Return the present mission in pieces, for neighbours that fly an older one."""
+        """Return the present mission in pieces, for neighbours that fly an older one or none."""
         data = encode(_MissionData(frame=self._path, formation=self._encoded))
         parts = [data[at : at + PIECE_B] for at in range(0, len(data), PIECE_B)]
         return [
-            Piece(key=self.flown.key, index=index, count=len(parts), data=part)
+            Piece(key=self.key, index=index, count=len(parts), data=part)
             for index, part in enumerate(parts)
         ]
 
     def receive_frame(self, beacon: Beacon) -> None:
         """Take the frame from a beacon if it is newer, before its mission has arrived.
 
-        So a moving frame spreads down the tiers at the local channel's rate. Raises RejectedError
-        for a frame with a stamp later than the beacon's, or of an impossible mission.
+        So a moving frame spreads down the tiers at the local channel's rate. An agent without a
+        mission has nothing to fly in it, and ignores it. Raises RejectedError for a frame with a
+        stamp later than the beacon's, or of an impossible mission.
         """
-        if not self._is_newer(beacon):
+        if self.flown is None or not self._is_newer(beacon):
             return
         if beacon.drift is not None and beacon.drift.stamp_s > beacon.stamp_s:
             raise RejectedError("future", "the frame's stamp is later than the beacon's")
@@ -187,7 +203,7 @@ class Missions:
             raise RejectedError("mission", detail)
         self._check_drift(self.flown.formation, beacon.drift)
         self.frame_key = beacon.frame_key
-        self._set_frame(ReportedFrame(beacon.frame, beacon.drift), beacon.stamp_s)
+        self._set_frame(self.flown, ReportedFrame(beacon.frame, beacon.drift), beacon.stamp_s)
 
     def _is_newer(self, beacon: Beacon) -> bool:
         """Whether a beacon's frame is of a newer mission, or of the same one with a newer stamp."""
@@ -205,6 +221,8 @@ class Missions:
 
     def frame_report(self, now_s: float) -> tuple[Pose, Drift | None]:
         """Return the frame as a beacon reports it now."""
+        if self.flown is None:
+            return HOME, None
         match self._frame:
             case ReportedFrame(pose=pose, drift=drift):
                 return pose, drift
@@ -224,11 +242,11 @@ class Missions:
         return self._resting[1]
 
     def _adopt(self, key: int, path: FramePath, encoded: bytes) -> None:
-        if key <= self.flown.key:
-            raise RejectedError("mission", f"key {key} is not newer than {self.flown.key}")
-        formation = self.flown.formation
-        if encoded != self._encoded:
-            formation = self._formation(encoded)
+        if key <= self.key:
+            raise RejectedError("mission", f"key {key} is not newer than {self.key}")
+        flown = self.flown
+        known = flown is not None and encoded == self._encoded
+        formation = flown.formation if flown is not None and known else self._formation(encoded)
         try:
             check_mission(formation, path, self._team)
         except MissionError as error:
@@ -236,17 +254,18 @@ class Missions:
         if key < self.frame_key and isinstance(self._frame, ReportedFrame):
             self._check_drift(formation, self._frame.drift)
         self._encoded, self._path = encoded, path
-        self.flown = Flown(key=key, formation=formation, frame=self.flown.frame)
+        frame = flown.frame if flown is not None else Track(path).at(path.start_s)
+        self.flown = Flown(key=key, formation=formation, frame=frame)
         if key >= self.frame_key:
             self.frame_key = key
-            self._set_frame(Track(path), path.start_s)
+            self._set_frame(self.flown, Track(path), path.start_s)
 
-    def _set_frame(self, frame: Track | ReportedFrame, time_s: float) -> None:
+    def _set_frame(self, flown: Flown, frame: Track | ReportedFrame, time_s: float) -> None:
         """Fly by another frame from now on; a resting frame that is equal stays the same object."""
         self._frame = frame
-        here, now = self.flown.frame, frame.at(time_s)
+        here, now = flown.frame, frame.at(time_s)
         if here.moves or now.moves or (here.origin, here.yaw) != (now.origin, now.yaw):
-            self.flown = self.flown._replace(frame=now)
+            self.flown = flown._replace(frame=now)
 
     def _check_drift(self, formation: Formation, drift: Drift | None) -> None:
         try:

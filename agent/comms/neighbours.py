@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from agent.codec import RejectedError
 from agent.controller import UNHEARD, Heard, Link
-from agent.messages import Beacon, Place, Vector
+from agent.messages import NO_MISSION, Beacon, Place, Vector
 
 MAX_AGE_S = 5.0
 """An older beacon is rejected."""
@@ -245,7 +245,7 @@ class Neighbours:
         return tuple(heard)
 
     def any_behind(self, mission: int) -> bool:
-        """Whether any neighbour flies an older mission than the one with this key."""
+        """Whether any neighbour flies an older mission than the one with this key, or none."""
         return any(known.beacon.mission < mission for known in self._in_order)
 
     def beacons(self) -> list[Beacon]:
@@ -266,4 +266,5 @@ def _version_of(beacon: Beacon) -> Version:
 
 
 def _claimed_place(beacon: Beacon) -> Place | None:
-    return Place(beacon.queue, beacon.rank) if beacon.queue >= 0 and beacon.rank >= 0 else None
+    claims = beacon.queue >= 0 and beacon.rank >= 0 and beacon.mission != NO_MISSION
+    return Place(beacon.queue, beacon.rank) if claims else None

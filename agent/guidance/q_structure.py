@@ -22,6 +22,8 @@ from agent.qstructure.target_frame import Frame
 GAIN = 2.0
 """c of (28) [1/s]."""
 
+AT_REST = Frame()
+
 
 class QStructure:
     """Flies one agent to its slot in the formation."""
@@ -41,7 +43,8 @@ class QStructure:
 
     def decide(self, senses: Senses) -> Intent:
         """Return the intent; an agent without a place stays where it is and gives way."""
-        q, own, frame = senses.position, self._places.select(senses), senses.mission.frame
+        q, own, mission = senses.position, self._places.select(senses), senses.mission
+        frame = mission.frame if mission is not None else AT_REST
         q_toq = frame.to_world(own.slot.point) if own is not None else q
         zone = self._zone_within(senses.link.reach_m)
         q_tg = bobber(q, senses.yaw, _aim_point(q_toq, frame), zone)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from math import dist
 
 from agent.comms.unidentified_vehicles import SAME_MEMBER_M
-from agent.controller import Senses
+from agent.controller import Flown, Senses
 from agent.messages import MAX_PLACES, Place, Vector
 from agent.places.place_points import PlacePoints
 from agent.qstructure.formation import NO_PLACES
@@ -43,6 +43,7 @@ class OccupiedSlots:
     def update(
         self,
         senses: Senses,
+        mission: Flown,
         holders: Sequence[Holder],
         agents: int,
         reported: frozenset[Place],
@@ -55,22 +56,24 @@ class OccupiedSlots:
         if agents > self._agents:
             self._grown_s = senses.now_s
         self._agents = agents
-        seen = self._points.taken_by(senses.mission, agents, senses.silent, reported)
+        seen = self._points.taken_by(mission, agents, senses.silent, reported)
         if not (seen or reported or self._recent):
             self.seen = ()
             return NO_PLACES
-        return self._with_recent(senses.now_s, self._occupied(senses, holders, reported, seen))
+        occupied = self._occupied(senses, mission, holders, reported, seen)
+        return self._with_recent(senses.now_s, occupied)
 
     def _occupied(
         self,
         senses: Senses,
+        mission: Flown,
         holders: Sequence[Holder],
         reported: frozenset[Place],
         silent: frozenset[Place],
     ) -> frozenset[Place]:
         """Return the places that are occupied now; silent: by unidentified vehicles."""
-        mission, agents = senses.mission, self._agents
-        held = self._held(senses, holders)
+        agents = self._agents
+        held = self._held(mission, holders)
         seen = {*silent}
         if self._senses_vehicles:
             recent = [place for place in self._recent if place not in seen]
@@ -81,12 +84,12 @@ class OccupiedSlots:
         self.seen = _first_to_fill(seen - held)
         return (reported - held).union(seen - held)
 
-    def _held(self, senses: Senses, holders: Sequence[Holder]) -> set[Place]:
+    def _held(self, mission: Flown, holders: Sequence[Holder]) -> set[Place]:
         """Return the places in which the agents that claim them stand."""
         held = set()
         for place, position in holders:
             if place is not None:
-                point = self._points.point(senses.mission, self._agents, place)
+                point = self._points.point(mission, self._agents, place)
                 if point is not None and dist(point, position) < HELD_M:
                     held.add(place)
         return held

@@ -1,8 +1,8 @@
 """A member of the Q-structure: the structure of the mission that it flies, begun anew with each."""
 
 from agent.config import AgentSetup
-from agent.controller import NO_WORDS, Senses, Words
-from agent.messages import Place
+from agent.controller import Senses, Words
+from agent.messages import DISTRESS, Place
 from agent.places.place_points import OwnTarget
 from agent.structure.queue_map import map_of
 from agent.structure.structure import Structure
@@ -29,15 +29,17 @@ class StructureMember:
     def select(self, senses: Senses) -> OwnTarget | None:
         """Return the own target now; None for an agent without one."""
         mission = senses.mission
+        if mission is None:
+            return None
         if self._structure is None or mission.key != self._mission:
             self._mission = mission.key
             formation = map_of(mission.formation)
             self._structure = Structure(self._setup, formation, mission.key, senses.now_s)
-        return self._structure.update(senses)
+        return self._structure.update(senses, mission)
 
     def words(self, now_s: float) -> Words:
         """Return what the agent says of its part; call it once a tick, after ``select``."""
         own = self._structure
         if own is None:
-            return NO_WORDS
+            return Words(role=DISTRESS)
         return Words(own.standing(now_s), own.summary(now_s), own.tier, own.parent, own.role)

@@ -10,7 +10,7 @@ from math import ceil, inf, log
 import msgspec
 
 from agent.config import AgentSetup
-from agent.controller import Heard, HeardSummary, Senses
+from agent.controller import Flown, Heard, HeardSummary, Senses
 from agent.messages import (
     DISTRESS,
     MAX_PLACES,
@@ -88,19 +88,18 @@ class Structure:
         """The places that the agent sees taken by an unidentified vehicle (E18)."""
         return self._occupied.seen
 
-    def update(self, senses: Senses) -> OwnTarget | None:
+    def update(self, senses: Senses, mission: Flown) -> OwnTarget | None:
         """Return the own target now; None for an agent without a place."""
-        view = self._view = self._look(senses)
+        view = self._view = self._look(senses, mission)
         self._hear_summaries(view, senses.summaries)
         view.summaries = self._summaries
         self._follow_trees(view, senses)
         if senses.now_s >= self._next_decision_s:
             self._next_decision_s = senses.now_s + 1.0 / DECISION_HZ - 1e-9
-            self._decide(view, senses)
+            self._decide(view, senses, mission)
         return self._target(view)
 
-    def _look(self, senses: Senses) -> View:
-        mission = senses.mission
+    def _look(self, senses: Senses, mission: Flown) -> View:
         heard = [
             h for h in senses.neighbours if h.standing is not None and h.mission == mission.key
         ]
@@ -153,10 +152,10 @@ class Structure:
         self.claim.give_up(queue, view.now_s)
         self._election.key, self._leader, self._news = None, None, True
 
-    def _decide(self, view: View, senses: Senses) -> None:
+    def _decide(self, view: View, senses: Senses, mission: Flown) -> None:
         self._count(view)
         self._election.note(view)
-        self._update_blocked(view, senses)
+        self._update_blocked(view, senses, mission)
         self._direct.update(view, self.claim)
         if self.claim.queue == NO_QUEUE and not self.claim.leads:
             self._queue_choice.choose(view, self.claim)
@@ -222,7 +221,7 @@ class Structure:
             return FIRST_VERTEX + vertex
         return FIRST_QUEUE + queue if 0 <= queue < self._map.queues else UNPLACED
 
-    def _update_blocked(self, view: View, senses: Senses) -> None:
+    def _update_blocked(self, view: View, senses: Senses, mission: Flown) -> None:
         agents = view.total or len(view.heard) + 1
         reported = {*senses.blocked}
         for summary in view.summaries:
@@ -232,7 +231,7 @@ class Structure:
         peers = [(h.place, h.position) for h in view.heard]
         peers.append((own.place if own is not None else None, view.here))
         self._blocked = view.blocked = self._occupied.update(
-            senses, peers, agents, frozenset(reported)
+            senses, mission, peers, agents, frozenset(reported)
         )
 
     def _target(self, view: View) -> OwnTarget | None:

@@ -3,6 +3,7 @@
 import pytest
 
 from agent.comms.mission import KEYS_PER_VERSION
+from agent.messages import NO_MISSION
 from tests.scenario.test_timeline import LINE, scenario
 from worldsim.engine.virtual import VirtualFleet
 
@@ -44,9 +45,9 @@ def test_a_mission_is_not_lost_with_the_agent_that_could_not_pass_it_on() -> Non
 
 def test_a_mission_spreads_by_radio_only_as_long_as_any_agent_flies_it() -> None:
     events = (GIVEN, f"at_s = 4\n{APART}", "at_s = 5\nkill = [2, 3]\nfor_s = 1")
-    assert missions(8.5, *events) == [MISSION, MISSION, 0, 0]
+    assert missions(8.5, *events) == [MISSION, MISSION, NO_MISSION, NO_MISSION]
     assert missions(12.0, *events) == [MISSION] * 4
 
 
-def test_without_a_mission_none_is_given() -> None:
-    assert missions(8.0, "at_s = 4\nkill = ['all']\nfor_s = 1") == [0] * 4
+def test_what_nobody_knows_any_more_and_no_operator_gave_is_not_given() -> None:
+    assert missions(8.0, "at_s = 4\nkill = ['all']\nfor_s = 1") == [NO_MISSION] * 4

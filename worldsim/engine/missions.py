@@ -5,7 +5,7 @@ from typing import Literal, assert_never
 
 from agent.codec import encode_formation
 from agent.comms.mission import KEYS_PER_VERSION, is_plausible
-from agent.messages import Mission
+from agent.messages import NO_MISSION, Mission
 from agent.qstructure.formation import FormationSpec
 from worldsim.engine.operations import GiveMission
 from worldsim.scenario.faults import MissionChange
@@ -29,8 +29,8 @@ class Missions:
         """The newest mission issued here."""
         self._issued = 0
         """The version of the newest mission issued here."""
-        self._flown = [0] * scenario.rows
-        """The key of the mission that each agent flies; row i = agent i."""
+        self._flown = [NO_MISSION] * scenario.rows
+        """The key of the mission that each agent flies, as reported; row i = agent i."""
 
     @property
     def newest(self) -> int:
@@ -58,7 +58,7 @@ class Missions:
         return key
 
     def report(self, agent: int, key: int, time_s: float) -> None:
-        """Record the key of the mission that an agent flies at a time [s]; 0 where it starts.
+        """Record the key of the mission that an agent flies at a time [s]; NO_MISSION at its start.
 
         A key that no team can have reached by then is invented, and ignored.
         """

@@ -5,7 +5,7 @@ from math import atan2, degrees, hypot, nan, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from agent.messages import Telemetry, Vector
+from agent.messages import NO_MISSION, Telemetry, Vector
 from worldsim.judge.tick import HierarchyRows, Packets, Tick
 from worldsim.truth.world import World
 
@@ -21,7 +21,7 @@ NO_TELEMETRY = Telemetry(
     place=None,
     heard=(),
     rejected=(),
-    mission=0,
+    mission=NO_MISSION,
     tier=-1,
     parent=-1,
     role=-1,

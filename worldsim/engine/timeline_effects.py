@@ -7,6 +7,7 @@ Then it is applied here: to the members, the radio's conditions, the sensors and
 from collections.abc import Callable, Iterator
 from typing import Literal, assert_never
 
+from agent.messages import NO_MISSION
 from agent.qstructure.formation import FormationSpec, formation_of
 from netem.conditions import NetworkConditions
 from netem.faults import FaultOrder, RadioEvent, RadioFault
@@ -186,7 +187,7 @@ class TimelineEffects:
         event = _start_event(operation.kind)
         for agent, incarnation in operation.incarnations.items():
             self.places[agent] = None
-            self.missions.report(agent, 0, self._world.time_s)
+            self.missions.report(agent, NO_MISSION, self._world.time_s)
             self._emit(
                 event(t_s=self._t_s, agent=agent, planned=True, by=by, incarnation=incarnation)
             )

@@ -49,7 +49,7 @@ class Tick:
     turn_deg: Floats  # (N,) desired azimuth minus heading [deg], NaN for a step without motion
     alive: NDArray[np.bool_]  # (N,) whether the process takes part, and is not paused
     links: NDArray[np.int32]  # (L, 2) hearer and heard
-    mission: NDArray[np.int64]  # (N,) key of the mission that the agent flies
+    mission: NDArray[np.int64]  # (N,) key of the mission that the agent flies, or NO_MISSION
     packets: Packets = field(default_factory=dict)
     """The newest counters; empty before the first come."""
     hierarchy: HierarchyRows | None = None

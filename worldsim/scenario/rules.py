@@ -14,6 +14,7 @@ from agent.guidance.bobber import MIN_CAST_RATIO
 from agent.messages import FLIGHT_M, Position
 from agent.qstructure.formation import Formation, formation_of
 from agent.qstructure.frame_path import tip_speed
+from worldsim.scenario.events import EventTable
 from worldsim.scenario.idle_keys import idle_keys
 from worldsim.scenario.obstacle_tables import obstacle_problem
 from worldsim.scenario.orientation_checks import yaws_not_held
@@ -179,6 +180,15 @@ def _known_agents(scenario: Scenario) -> Problem | None:
     return None
 
 
+def _known_briefed(scenario: Scenario) -> Problem | None:
+    agents, briefed = scenario.fleet.agents, scenario.fleet.briefed
+    for index, agent in enumerate(briefed if briefed != "all" else ()):
+        if agent >= agents:
+            detail = f"no agent {agent} at the start; 0 to {agents - 1}"
+            return Problem(f"fleet.briefed[{index}]", detail)
+    return None
+
+
 def _known_links(scenario: Scenario) -> Problem | None:
     seen: set[tuple[int, int]] = set()
     for index, link in enumerate(scenario.netem.link):
@@ -292,6 +302,37 @@ def _formation_radius_m(scenario: Scenario) -> float:
     return max(hypot(slot.point[0], slot.point[1]) for slot in slots)
 
 
+def _someone_knows_the_mission(scenario: Scenario) -> Problem | None:
+    given = any(event.formation or event.frame for event in scenario.event)
+    if scenario.fleet.briefed or given:
+        return None
+    detail = (
+        "nobody knows the mission, and no event gives one; brief an agent, or add an event with"
+        " formation or frame"
+    )
+    return Problem("fleet.briefed", detail)
+
+
+def _mission_can_spread(scenario: Scenario) -> Problem | None:
+    """Warn where an agent has to learn the mission by a channel that is off."""
+    if scenario.comms.multihop_hz > 0.0 or not scenario.expect.converge:
+        return None
+    unbriefed = [i for i in range(scenario.fleet.agents) if not scenario.is_briefed(i, 0)]
+    if not unbriefed and not any(map(_starts_agents, scenario.event)):
+        return None
+    return Problem(
+        "comms.multihop_hz",
+        "the mission spreads on this channel, which is off: an agent that is not briefed, joins or"
+        " restarts never learns it",
+    )
+
+
+def _starts_agents(event: EventTable) -> bool:
+    """Return whether an event starts processes."""
+    ended = event.kill or event.leave
+    return bool(event.joiners or event.restart or (ended and event.for_s is not None))
+
+
 def _laser_rings_apart(scenario: Scenario) -> Problem | None:
     laser = scenario.sensor.laser
     if laser.rings == 1 or laser.elevation_deg >= LEAST:
@@ -311,6 +352,7 @@ RULES = (
     _starts_inside,
     _starts_separated,
     _known_agents,
+    _known_briefed,
     _known_links,
     _cast_zone_not_empty,
     _rates_up_to_tick_rate,
@@ -323,5 +365,7 @@ WARNINGS = (
     _neighbours_within_range,
     _long_enough_to_converge,
     _frame_slow_enough,
+    _someone_knows_the_mission,
+    _mission_can_spread,
     *SAFETY_WARNINGS,
 )

@@ -5,7 +5,7 @@ world frame. The docstrings explain the keys to users: they become the comments 
 and the descriptions of the JSON Schema. The conditions between keys are in ``rules``.
 """
 
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, Literal, get_type_hints
 
 import msgspec
 from msgspec import Meta
@@ -23,7 +23,7 @@ from agent.config import (
 )
 from agent.guidance.bobber import lemma_7_bound_m
 from agent.guidance.potential import TARGET_FLOOR_M
-from agent.messages import AgentId
+from agent.messages import AT_HOME, AgentId
 from agent.qstructure.formation import FormationSpec
 from netem.link_parameters import Conditions
 from netem.messages import MediumSetup
@@ -48,12 +48,19 @@ RunName = Annotated[
     ),
 ]
 
+Briefed = Annotated[
+    Literal["all"] | Annotated[tuple[AgentId, ...], Meta(max_length=MAX_AGENTS)],
+    Meta(description="'all', or a list of ids"),
+]
+
 
 class Fleet(Table, frozen=True):
     """The number of agents, their control rate and their start.
 
     boot_s: simulated time from a restart or join to the agent's first step. spare: how many agents
-    may join by ``qswarm fault RUN join``, besides those that join by events.
+    may join by ``qswarm fault RUN join``, besides those that join by events. briefed: who knows the
+    formation and the frame at the start, as from a flight plan; the others hear of them by radio,
+    as everybody does who joins or restarts later.
     """
 
     agents: Annotated[int, Meta(ge=1, le=MAX_AGENTS)]
@@ -61,6 +68,7 @@ class Fleet(Table, frozen=True):
     start: BoxStart | ListStart = BoxStart()
     boot_s: Annotated[float, Meta(ge=0, le=3600)] = 1.0
     spare: Annotated[int, Meta(ge=0, le=MAX_AGENTS)] = 0
+    briefed: Briefed = "all"
 
 
 def _optional(table: type[Table]) -> list[tuple[str, Any, None]]:
@@ -199,6 +207,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
 
     def agent_setup(self, agent: int, incarnation: int, command_ticks: int) -> AgentSetup:
         """Return the setup of one agent; ``command_ticks``: for how many a command is valid."""
+        briefed = self.is_briefed(agent, incarnation)
         return AgentSetup(
             id=agent,
             incarnation=incarnation,
@@ -210,8 +219,8 @@ class Scenario(Table, frozen=True, omit_defaults=False):
             control=self.control,
             comms=self.comms,
             sensor=self.sensor,
-            formation=self.formation,
-            frame=path_of(self.frame),
+            formation=self.formation if briefed else None,
+            frame=path_of(self.frame) if briefed else AT_HOME,
             team=self.fleet.agents,
             ids=self.rows,
             relays=self.relays,
@@ -226,3 +235,9 @@ class Scenario(Table, frozen=True, omit_defaults=False):
         """
         blind = any("proximity" not in vehicle.sensors for vehicle in self.vehicles)
         return blind or self.control.allocation == "assignment"
+
+    def is_briefed(self, agent: int, incarnation: int) -> bool:
+        """Return whether a process of an agent knows the mission from its start on."""
+        takes_off = incarnation == 0 and agent < self.fleet.agents
+        briefed = self.fleet.briefed
+        return takes_off and (briefed == "all" or agent in briefed)

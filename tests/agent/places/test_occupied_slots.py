@@ -41,7 +41,7 @@ def senses(now_s, unidentified=(), vehicles=(), at=ME[1]):
 
 def update(occupied, near, team=(ME, FAR), reported=frozenset()):
     """Return the places that are not available. team: place and position of each member."""
-    return occupied.update(near, team, len(team), frozenset(reported))
+    return occupied.update(near, MISSION, team, len(team), frozenset(reported))
 
 
 @pytest.fixture
