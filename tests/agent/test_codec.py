@@ -189,6 +189,7 @@ KINDS = pytest.mark.parametrize("kind", GOOD, ids=lambda kind: kind.__name__)
 DECODING_CAUSES = {"oversize", "garbage", "invalid"}
 
 counts = st.integers(0, 2**53 - 1)
+mission_keys = st.integers(-1, 2**53 - 1)
 ids = st.integers(0, 2**16 - 1)
 indices = st.integers(-1, 2**15 - 1)
 seconds = st.floats(0.0, 1e9)
@@ -234,7 +235,7 @@ records = st.builds(
     queue=indices,
     rank=indices,
     cost_mm=costs,
-    mission=counts,
+    mission=mission_keys,
     blocked=blocked,
 )
 places = st.tuples(indices, indices)
@@ -297,7 +298,7 @@ telemetries = st.builds(
     place=st.none() | st.tuples(indices, indices),
     heard=st.lists(ids, max_size=20).map(tuple),
     rejected=st.lists(st.tuples(st.integers(0, len(CAUSES) - 1), counts), max_size=8).map(tuple),
-    mission=counts,
+    mission=mission_keys,
     tier=indices,
     parent=parents,
     role=st.integers(0, 3),
@@ -339,8 +340,8 @@ messages = st.one_of(
         cost_mm=costs,
         speed_cap=st.floats(0.0, 100.0),
         echoes=st.lists(st.tuples(ids, counts), max_size=20).map(tuple),
-        mission=counts,
-        frame_key=counts,
+        mission=mission_keys,
+        frame_key=mission_keys,
         frame=poses,
         drift=st.none() | drifts,
         blocked=blocked,
@@ -571,6 +572,16 @@ def test_a_bomb_is_garbage(kind, data):
 def test_an_oversize_message_is_rejected_before_decoding(kind, monkeypatch):
     monkeypatch.setattr(msgpack, "unpackb", lambda *_, **__: pytest.fail("it was decoded"))
     assert rejection_cause(kind, bytes(LIMIT_B[kind] + 1)) == "oversize"
+
+
+def test_no_mission_is_one_value_and_a_piece_always_has_a_key():
+    for key, taken in ((-1, True), (-2, False), (2**53 - 1, True), (2**53, False)):
+        for field in ("mission", "frame_key"):
+            sent = encode(msgspec.structs.replace(GOOD[Beacon], **{field: key}))
+            assert (decoded_or_none(Beacon, sent) is not None) == taken
+    piece = Piece(key=-1, index=0, count=1, data=b"")
+    sent = encode(msgspec.structs.replace(GOOD[Gossip], piece=piece))
+    assert rejection_cause(Gossip, sent) == "invalid"
 
 
 def test_lists_longer_than_allowed_are_rejected():

@@ -14,8 +14,10 @@ class ByNumber:
         self.cost_m = 0.0
         self.blocked = ()
 
-    def select(self, senses: Senses) -> OwnTarget:
-        """Return the target of this agent in a team of two."""
+    def select(self, senses: Senses) -> OwnTarget | None:
+        """Return the target of this agent in a team of two; None without a mission."""
+        if senses.mission is None:
+            return None
         layout = senses.mission.formation.layout(2)
         place = layout.places[self._own_id]
         return OwnTarget(place, layout.slots[place], vertex=True)

@@ -61,7 +61,7 @@ def run(tmp_path: Path) -> Path:
 def rough(scenario: Write) -> Write:
     def write(duration_s: float) -> str:
         path = Path(scenario(duration_s))
-        clean = path.read_text().replace("agents = 4", "agents = 4\nboot_s = 0.5")
+        clean = path.read_text().replace("agents = 4", "agents = 4\nboot_s = 0.5\nbriefed = [0]")
         path.write_text(clean.replace("delay_ms = 10", "delay_ms = 10" + ROUGH) + EVENTS)
         return str(path)
 

@@ -94,7 +94,15 @@ def draft(draw: Draw, steps: int) -> Tables:
         made["obstacle_field"] = field(draw, about)
     made["event"] = Timeline(draw, made, slowest).events()
     made["expect"] = expectations(draw, made)
+    if draw.chance(0.25):
+        made["fleet"]["briefed"] = briefed(draw, agents)
     return made
+
+
+def briefed(draw: Draw, agents: int) -> list[int]:
+    """Return the agents that know the mission at the start: one, some or none."""
+    some = sorted(draw.some(range(agents), draw.whole(1, agents)))
+    return draw.among(([0], some, []))
 
 
 def duration(draw: Draw, longest_s: float) -> float:

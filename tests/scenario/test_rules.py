@@ -39,6 +39,40 @@ def test_a_run_too_short_to_see_convergence_is_a_warning() -> None:
     assert warning.key == "expect.converge_within_s"
 
 
+def test_a_mission_that_nobody_knows_and_no_event_gives_is_a_warning() -> None:
+    (warning,) = warnings_for(wedge(fleet__briefed="[]"))
+    assert warning.key == "fleet.briefed"
+    for change in ("formation = '../formations/helix.toml'", "frame = { yaw_deg = 90 }"):
+        assert not warnings_for(wedge(fleet__briefed="[]", event=f"[{{ at_s = 1, {change} }}]"))
+    assert not warnings_for(wedge(fleet__briefed="[8]"))
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"fleet__briefed": "[0]"},
+        {"event": "[{ at_s = 1, join = 1 }]"},
+        {"event": "[{ at_s = 1, kill = [0] }, { at_s = 2, restart = [0] }]"},
+        {"event": "[{ at_s = 1, leave = [0], for_s = 1 }]"},
+    ],
+)
+def test_a_mission_that_cannot_spread_to_who_needs_it_is_a_warning(keys: dict[str, str]) -> None:
+    assert not warnings_for(wedge(**keys))
+    (warning,) = warnings_for(wedge(comms__multihop_hz="0", **keys))
+    assert warning.key == "comms.multihop_hz"
+    assert not warnings_for(
+        wedge(
+            comms__multihop_hz="0",
+            expect="{ converge = false, min_separation_m = 0.25 }",
+            **keys,
+        )
+    )
+
+
+def test_a_team_that_is_briefed_and_stays_needs_no_channel_for_missions() -> None:
+    assert not warnings_for(wedge(comms__multihop_hz="0", event="[{ at_s = 1, kill = [0] }]"))
+
+
 @pytest.mark.parametrize(
     ("speed", "ticks", "tick_hz"),
     [("0.5", 1, None), ("1", 2, None), ("1.01", 2, 21), ("2", 1, None), ("2", 2, 40)],

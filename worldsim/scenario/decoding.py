@@ -131,7 +131,8 @@ def _chosen(kind: Any, value: Any) -> Any:
     if len(options) == 1:
         return _chosen(options[0], value)
     if isinstance(value, list):
-        return next((_chosen(each, value) for each in options if not _is_table(each)), kind)
+        bare = (_chosen(each, value) for each in options)
+        return next((each for each in bare if get_origin(each) is tuple), kind)
     for option in options if isinstance(value, dict) else ():
         config = getattr(option, "__struct_config__", None)
         if config is not None and (not config.tag or value.get(config.tag_field) == config.tag):
