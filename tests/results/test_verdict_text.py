@@ -142,7 +142,7 @@ def test_a_formation_that_was_replaced_names_the_next_mission(summary: Summary) 
 @pytest.mark.parametrize(
     ("residual_m", "words"),
     [
-        (None, "no agent in a place"),
+        (None, "not every agent has a place"),
         (0.0002, "< 1 mm"),
         (0.02516, "25.2 mm"),
         (0.9244, "0.924 m"),

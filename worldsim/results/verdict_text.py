@@ -136,7 +136,7 @@ def _mark(row: ExpectationRow) -> str:
 
 
 def _accuracy(summary: Summary) -> str:
-    error = _slot_error(summary["phases"][-1]["residual_m"], "no agent in a place")
+    error = _slot_error(summary["phases"][-1]["residual_m"], "not every agent has a place")
     turns = summary["turns_over_limit_fraction"]
     return f"largest slot error at the end: {error}; steps over the turn limit: {_percent(turns)}"
 
