@@ -9,10 +9,13 @@ from agent.structure.structure import Structure
 
 
 class StructureMember:
-    """One agent's place, by the Q-structure."""
+    """One agent's place, by the Q-structure.
 
-    def __init__(self, setup: AgentSetup) -> None:
-        self._setup = setup
+    structure: another kind of structure may be flown, to see what a part of it is worth.
+    """
+
+    def __init__(self, setup: AgentSetup, structure: type[Structure] = Structure) -> None:
+        self._setup, self._kind = setup, structure
         self._structure: Structure | None = None
         self._mission = -1
 
@@ -34,7 +37,7 @@ class StructureMember:
         if self._structure is None or mission.key != self._mission:
             self._mission = mission.key
             formation = map_of(mission.formation)
-            self._structure = Structure(self._setup, formation, mission.key, senses.now_s)
+            self._structure = self._kind(self._setup, formation, mission.key, senses.now_s)
         return self._structure.update(senses, mission)
 
     def words(self, now_s: float) -> Words:

@@ -93,7 +93,7 @@ class Structure:
         view = self._view = self._look(senses, mission)
         self._hear_summaries(view, senses.summaries)
         view.summaries = self._summaries
-        self._follow_trees(view, senses)
+        self.follow_trees(view, senses)
         if senses.now_s >= self._next_decision_s:
             self._next_decision_s = senses.now_s + 1.0 / DECISION_HZ - 1e-9
             self._decide(view, senses, mission)
@@ -131,7 +131,8 @@ class Structure:
             self._news = self._news or known is None or _differ(known, down)
             self._summaries[v] = down
 
-    def _follow_trees(self, view: View, senses: Senses) -> None:
+    def follow_trees(self, view: View, senses: Senses) -> None:
+        """Find the root of each tree, and the own parent and tier."""
         for v, tree in enumerate(self.trees):
             followers = [
                 Follower(h, branch) for h in view.heard if (branch := _branch(h, v)) is not None
