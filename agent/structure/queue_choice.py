@@ -10,6 +10,9 @@ from agent.structure.claim import NO_QUEUE, Claim
 from agent.structure.transfers import transfers
 from agent.structure.view import View, leads
 
+OFFER_S = 0.5
+"""Offers are computed anew after this time, or when the counts change."""
+
 
 class QueueChoice:
     """One agent's choice of its queue."""
@@ -18,6 +21,9 @@ class QueueChoice:
         self._own_id = own_id
         self._done: dict[int, int] = {}
         """Number of the last order that was seen to, by the leader's id."""
+        self._asked: tuple[int, int, tuple[int, ...], tuple[int, ...]] | None = None
+        self._offered_s = 0.0
+        self._offers: tuple[Candidate, ...] = ()
 
     def choose(self, view: View, claim: Claim) -> None:
         """Choose a queue: one that lacks members, else the nearest."""
@@ -71,6 +77,14 @@ class QueueChoice:
         takers = transfers(view.map, view.counts, view.shares).get(claim.queue)
         if takers is None:
             return ()
+        asked = (claim.queue, claim.number, tuple(view.counts), view.shares)
+        if asked != self._asked or view.now_s - self._offered_s >= OFFER_S:
+            self._asked, self._offered_s = asked, view.now_s
+            self._offers = self._ways(view, claim, takers)
+        return self._offers
+
+    def _ways(self, view: View, claim: Claim, takers: list[int]) -> tuple[Candidate, ...]:
+        """Return the extra way to each queue that takes members."""
         own_m = (
             view.distance(claim.queue, claim.number)
             if claim.number > 0

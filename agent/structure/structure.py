@@ -5,31 +5,26 @@ lead of a vertex. What is urgent goes into its beacons (:class:`~agent.messages.
 slow goes into summaries on the multihop channel, sooner while there is news.
 """
 
-from math import ceil, inf, log
-
-import msgspec
+from math import inf
 
 from agent.config import AgentSetup
-from agent.controller import Flown, Heard, HeardSummary, Senses
+from agent.controller import Flown, Heard, Senses
 from agent.messages import (
     DISTRESS,
-    MAX_PLACES,
     MEMBER,
     SUB_VERTEX,
     VERTEX,
     Branch,
-    LeaderSummary,
     Place,
     Standing,
     Subtree,
     Summary,
-    TreeReport,
 )
 from agent.places.occupied_slots import OccupiedSlots
 from agent.places.place_points import OwnTarget, PlacePoints
-from agent.structure.census import FIRST_QUEUE, FIRST_VERTEX, UNPLACED, Census
+from agent.structure.census import FIRST_QUEUE, FIRST_VERTEX, UNPLACED, Census, Population
 from agent.structure.claim import NO_QUEUE, Claim
-from agent.structure.convergecast import ROUNDS, Convergecast, joined, own_part
+from agent.structure.convergecast import own_part
 from agent.structure.direct_rule import DirectRule
 from agent.structure.election import Election
 from agent.structure.leader import Leader
@@ -37,20 +32,14 @@ from agent.structure.link_timing import timing_of
 from agent.structure.numbers import Numbers
 from agent.structure.queue_choice import QueueChoice, likely_length
 from agent.structure.queue_map import QueueMap
+from agent.structure.slow_layer import SlowLayer
 from agent.structure.swaps import Swaps
 from agent.structure.tree import Follower, Tree
 from agent.structure.view import View
 
 DECISION_HZ = 10.0
-NEWS_LOST, LEAST_LOSS = 0.2, 0.05
-"""News is repeated until a neighbour has missed it with less than this probability, if beacons are
-lost at all."""
 FAR_M = 2.5
 """Within this distance of its place an agent flies there even if it lies beyond the tail."""
-REPORTS = 6
-"""Most trees in one summary."""
-NEWS_SHARE = 0.25
-"""With news the next summary comes after this share of a round (as a Trickle timer, RFC 6206)."""
 
 
 class Structure:
@@ -58,14 +47,13 @@ class Structure:
 
     def __init__(self, setup: AgentSetup, formation: QueueMap, mission: int, now_s: float) -> None:
         own_id = setup.id
-        self._own_id, self._mission, self._map = own_id, mission, formation
+        self._own_id, self._map = own_id, formation
         self._beacon_s = 1.0 / setup.comms.local_hz
         self._round_s = 1.0 / setup.comms.multihop_hz if setup.comms.multihop_hz > 0.0 else inf
         self.claim = Claim(now_s)
         self.trees = [Tree(own_id, now_s) for _ in range(formation.vertices)]
         self.census = Census(own_id, setup.ids)
-        self._collected = [Convergecast(own_id) for _ in self.trees]
-        self._summaries: list[LeaderSummary | None] = [None] * formation.vertices
+        self._slow = SlowLayer(own_id, mission, formation, self.census, self._round_s)
         self._queue_choice = QueueChoice(own_id)
         self._election = Election(own_id, now_s)
         self._numbers = Numbers(own_id, now_s)
@@ -75,13 +63,9 @@ class Structure:
         self._occupied = OccupiedSlots(points, "proximity" in setup.vehicle.sensors)
         self._leader: Leader | None = None
         self._followed = False
-        self._next_decision_s = self._next_round_s = self._sent_s = now_s
-        self._news = True
-        self._repeats = 0
-        self._offered: list[set[tuple[int, int]]] = [set() for _ in self.trees]
+        self._next_decision_s = now_s
         self._blocked: frozenset[Place] = frozenset()
         self._view: View | None = None
-        self._turn = 0
 
     @property
     def blocked(self) -> tuple[Place, ...]:
@@ -91,8 +75,8 @@ class Structure:
     def update(self, senses: Senses, mission: Flown) -> OwnTarget | None:
         """Return the own target now; None for an agent without a place."""
         view = self._view = self._look(senses, mission)
-        self._hear_summaries(view, senses.summaries)
-        view.summaries = self._summaries
+        self._slow.hear(senses.summaries, self.trees, senses.now_s)
+        view.summaries = self._slow.summaries
         self.follow_trees(view, senses)
         if senses.now_s >= self._next_decision_s:
             self._next_decision_s = senses.now_s + 1.0 / DECISION_HZ - 1e-9
@@ -108,29 +92,6 @@ class Structure:
         view.blocked = self._blocked
         return view
 
-    def _hear_summaries(self, view: View, summaries: tuple[HeardSummary, ...]) -> None:
-        """Take what comes up and down the trees, and the labels of the census."""
-        for sender, stamp_s, summary in summaries:
-            if summary.mission != self._mission:
-                continue
-            self.census.merge(summary, stamp_s, view.now_s)
-            for report in summary.trees:
-                if report.vertex < len(self.trees):
-                    self._hear_report(sender, stamp_s, report)
-
-    def _hear_report(self, sender: int, stamp_s: float, report: TreeReport) -> None:
-        v, tree = report.vertex, self.trees[report.vertex]
-        self._collected[v].hear(sender, report, stamp_s)
-        down = report.down
-        if down is None or down.root != tree.root or not 0 <= report.tier < tree.tier:
-            return
-        if len(down.counts) != len(self._map.homed[v]):
-            return
-        known = self._summaries[v]
-        if known is None or known.root != down.root or down.version > known.version:
-            self._news = self._news or known is None or _differ(known, down)
-            self._summaries[v] = down
-
     def follow_trees(self, view: View, senses: Senses) -> None:
         """Find the root of each tree, and the own parent and tier."""
         for v, tree in enumerate(self.trees):
@@ -141,9 +102,7 @@ class Structure:
             deposed = tree.follow_root(view.now_s, followers, leading, view.timing)
             near = [each for each in followers if each.heard.age_s < view.timing.parent_s]
             tree.choose_parent(view.here, near, senses.link.reach_m)
-            summary = self._summaries[v]
-            if summary is not None and summary.root != tree.root:
-                self._summaries[v] = None
+            self._slow.keep_to(v, tree)
             if leading is not None and deposed:
                 self._step_down(view, v)
 
@@ -151,7 +110,7 @@ class Structure:
         """Make way for a leader that is nearer."""
         queue = NO_QUEUE if self._map.is_common(vertex) else self.claim.queue
         self.claim.give_up(queue, view.now_s)
-        self._election.key, self._leader, self._news = None, None, True
+        self._election.key, self._leader, self._slow.news = None, None, True
 
     def _decide(self, view: View, senses: Senses, mission: Flown) -> None:
         self._count(view)
@@ -162,13 +121,12 @@ class Structure:
             self._queue_choice.choose(view, self.claim)
         if not self.claim.leads:
             self._decide_as_member(view)
-        self._note_candidates(view)
         self._followed = any(
             branch is not None and branch.parent == self._own_id
             for h in view.heard
             for branch in (h.standing.branches if h.standing is not None else ())
         )
-        self._summarise(view)
+        self._report(view)
 
     def _decide_as_member(self, view: View) -> None:
         claim = self.claim
@@ -176,26 +134,15 @@ class Structure:
             key = self._election.key
             if key is not None:
                 self._leader = Leader(claim.vertex, key, view.now_s, self._round_s)
-            self._news = True
+            self._slow.news = True
         elif self._direct.applies:
             self._direct.choose(view, claim)
         elif self._queue_choice.obey(view, claim):
-            self._news = True
+            self._slow.news = True
         elif claim.number < 1:
             self._numbers.take_first(view, claim)
         elif not self._swaps.proceed(view, claim) and not self._numbers.keep_up(view, claim):
             self._swaps.propose(view, claim)
-
-    def _note_candidates(self, view: View) -> None:
-        """Report soon which agents could leave their queue, when that has changed."""
-        offered = [
-            {(each.agent, each.to) for queue in self._subtree(view, v).candidates for each in queue}
-            if tree.parent >= 0
-            else set()
-            for v, tree in enumerate(self.trees)
-        ]
-        self._news = self._news or any(a - b for a, b in zip(offered, self._offered, strict=True))
-        self._offered = offered
 
     def _count(self, view: View) -> None:
         """Bring the census up to date with the members heard directly, and the own label."""
@@ -257,81 +204,36 @@ class Structure:
         slot = self._map.slot(claim.queue, count, view.extent(claim.queue, count))
         return own._replace(slot=slot) if own is not None and slot is not None else own
 
-    def _summarise(self, view: View) -> None:
-        """Bring the own parts of all trees up to date; as a leader, the summary."""
-        leader = self._leader
-        if leader is None:
-            return
-        v = leader.vertex
-        subtree = self._subtree(view, v)
-        population = self.census.population(
-            view.now_s, view.timing.lost_s, self._map.queues, self._map.vertices
-        )
-        blocked = frozenset(Place(*p) for p in subtree.blocked) | self._blocked
-        summary = leader.summary(view, population, subtree, blocked)
-        known = self._summaries[v]
-        self._news = self._news or known is None or _differ(known, summary)
-        self._summaries[v] = summary
+    def _report(self, view: View) -> None:
+        """Bring up to date what goes up each tree; as a leader, the own summary."""
+        for v, tree in enumerate(self.trees):
+            leads = self._leader is not None and self._leader.vertex == v
+            if tree.parent < 0 and not leads:
+                continue
+            own = self._own_part(view, v)
+            subtree = self._slow.collect(v, own, self.blocked, view.now_s, view.timing)
+            if leads and self._leader is not None:
+                blocked = frozenset(Place(*p) for p in subtree.blocked) | self._blocked
+                population = self._population(view)
+                self._slow.publish(v, self._leader.summary(view, population, subtree, blocked))
 
-    def _subtree(self, view: View, vertex: int) -> Subtree:
-        tree, claim = self.trees[vertex], self.claim
-        rounds_s = ROUNDS * min(self._round_s, 10.0) / (1.0 - view.timing.loss)
-        self._collected[vertex].forget(view.now_s - rounds_s - view.timing.latency_s)
-        parts = self._collected[vertex].followers() if tree.root is not None else []
-        homed = self._map.homed[vertex]
-        if claim.queue in homed and not (claim.leads and claim.number < 1):
-            offers = () if self._direct.applies else self._queue_choice.candidates(view, claim)
-            away_m = view.to_vertex(vertex)
-            parts.append(own_part(homed, claim.queue, claim.number, away_m, offers))
-        seen = [p for p in self.blocked if p.queue in homed or self._map.vertex_of.get(p) == vertex]
-        own = joined(parts, len(homed))
-        places = sorted({*own.blocked, *seen})[:MAX_PLACES]
-        return msgspec.structs.replace(own, blocked=tuple(places))
+    def _own_part(self, view: View, vertex: int) -> Subtree | None:
+        """Return the own part of what goes up a tree; None for a queue of another vertex."""
+        homed, claim = self._map.homed[vertex], self.claim
+        if claim.queue not in homed or (claim.leads and claim.number < 1):
+            return None
+        offers = () if self._direct.applies else self._queue_choice.candidates(view, claim)
+        return own_part(homed, claim.queue, claim.number, view.to_vertex(vertex), offers)
+
+    def _population(self, view: View) -> Population:
+        lost_s = view.timing.lost_s
+        return self.census.population(view.now_s, lost_s, self._map.queues, self._map.vertices)
 
     def summary(self, now_s: float) -> Summary | None:
         """Return what is due on the multihop channel, None where nothing is."""
-        if self._news or self.census.has_news:
-            self._repeats = self._enough_repeats()
-        share = NEWS_SHARE if self._repeats > 0 else 1.0
-        if self._view is None or now_s - self._sent_s < share * self._round_s - 1e-6:
+        if self._view is None:
             return None
-        regular = now_s >= self._next_round_s
-        self._sent_s, self._news = now_s, False
-        self._repeats = max(0, self._repeats - 1)
-        first, labels = 0, b""
-        if regular:
-            self._next_round_s = now_s + self._round_s - 1e-6
-            first, labels = self.census.wire(now_s)
-        return Summary(
-            mission=self._mission,
-            first=first,
-            labels=labels,
-            news=self.census.news(now_s),
-            trees=tuple(self._report(self._view, v) for v in self._reported()),
-        )
-
-    def _enough_repeats(self) -> int:
-        """Return in how many summaries news goes out sooner, so that most neighbours hear it."""
-        loss = self._view.timing.loss if self._view is not None else 0.0
-        return 1 if loss < LEAST_LOSS else 1 + ceil(log(NEWS_LOST) / log(loss))
-
-    def _reported(self) -> list[int]:
-        """Return the vertices of one summary: as many as fit, other ones in each turn."""
-        known = [v for v, tree in enumerate(self.trees) if tree.tier >= 0]
-        if len(known) <= REPORTS:
-            return known
-        self._turn = (self._turn + REPORTS) % len(known)
-        return sorted((known + known)[self._turn : self._turn + REPORTS])
-
-    def _report(self, view: View, vertex: int) -> TreeReport:
-        tree = self.trees[vertex]
-        return TreeReport(
-            vertex=vertex,
-            tier=tree.tier,
-            parent=tree.parent,
-            down=self._summaries[vertex],
-            up=self._subtree(view, vertex) if tree.parent >= 0 else None,
-        )
+        return self._slow.due(self.trees, self._view.timing, now_s)
 
     @property
     def tier(self) -> int:
@@ -378,10 +280,3 @@ def _branch(heard: Heard, vertex: int) -> Branch | None:
     if standing is None or vertex >= len(standing.branches):
         return None
     return standing.branches[vertex]
-
-
-def _differ(a: LeaderSummary, b: LeaderSummary) -> bool:
-    """Whether two summaries differ in what agents act on at once."""
-    return (a.root, a.total, a.counts, a.go, a.order, a.blocked) != (
-        *(b.root, b.total, b.counts, b.go, b.order, b.blocked),
-    )

@@ -1,0 +1,174 @@
+"""The slow layer of Fig. 3: what an agent hears and sends of the structure on the multihop channel.
+
+Labels of the census go any way. Leaders' summaries come down the trees: an agent takes one only
+from a lower tier. Its followers' reports go up, with its own part, to its parent. A summary goes
+out each round; with news sooner, as a Trickle timer does (RFC 6206).
+"""
+
+from collections.abc import Collection, Sequence
+from math import ceil, inf, log
+
+import msgspec
+
+from agent.controller import HeardSummary
+from agent.messages import MAX_PLACES, LeaderSummary, Place, Subtree, Summary, TreeReport
+from agent.structure.census import Census
+from agent.structure.convergecast import ROUNDS, Convergecast, joined
+from agent.structure.link_timing import Timing
+from agent.structure.queue_map import QueueMap
+from agent.structure.tree import Tree
+
+NEWS_SHARE = 0.25
+"""With news the next summary comes after this share of a round."""
+NEWS_LOST, LEAST_LOSS = 0.2, 0.05
+"""News is repeated until a neighbour has missed it with less than this probability, if beacons are
+lost at all."""
+REPORTS = 6
+"""Most trees in one summary."""
+LABELS_EVERY = 2
+"""Labels go out in each such round; in every round if beacons are lost."""
+LONGEST_ROUND_S = 10.0
+
+
+class SlowLayer:
+    """One agent's slow layer, with the ``summaries`` of each vertex's leader that it knows.
+
+    round_s: period of the multihop channel [s]; infinite where it is off.
+    """
+
+    def __init__(
+        self, own_id: int, mission: int, formation: QueueMap, census: Census, round_s: float
+    ) -> None:
+        self._mission, self._map, self._census = mission, formation, census
+        self._round_s = round_s
+        vertices = range(formation.vertices)
+        self.summaries: list[LeaderSummary | None] = [None for _ in vertices]
+        self.news = True
+        """Whether something changed that others act on at once."""
+        self._collected = [Convergecast(own_id) for _ in vertices]
+        self._subtrees: list[Subtree | None] = [None for _ in vertices]
+        self._offered: list[set[tuple[int, int]]] = [set() for _ in vertices]
+        self._next_round_s = self._sent_s = -inf
+        self._rounds = self._repeats = self._turn = 0
+
+    def hear(self, heard: Sequence[HeardSummary], trees: Sequence[Tree], now_s: float) -> None:
+        """Take what comes up and down the trees, and the labels of the census."""
+        for sender, stamp_s, summary in heard:
+            if summary.mission != self._mission:
+                continue
+            self._census.merge(summary, stamp_s, now_s)
+            for report in summary.trees:
+                if report.vertex < len(trees):
+                    self._collected[report.vertex].hear(sender, report, stamp_s)
+                    self._take_down(report, trees[report.vertex])
+
+    def _take_down(self, report: TreeReport, tree: Tree) -> None:
+        """Take a leader's summary from an agent of a lower tier."""
+        v, down = report.vertex, report.down
+        if down is None or down.root != tree.root or not 0 <= report.tier < tree.tier:
+            return
+        known = self.summaries[v]
+        newer = known is None or known.root != down.root or down.version > known.version
+        if newer and len(down.counts) == len(self._map.homed[v]):
+            self.publish(v, down)
+
+    def publish(self, vertex: int, summary: LeaderSummary) -> None:
+        """Keep a leader's latest summary; what agents act on at once is news."""
+        known = self.summaries[vertex]
+        self.news = self.news or known is None or _differ(known, summary)
+        self.summaries[vertex] = summary
+
+    def keep_to(self, vertex: int, tree: Tree) -> None:
+        """Forget the summary of a leader that is no longer the root."""
+        summary = self.summaries[vertex]
+        if summary is not None and summary.root != tree.root:
+            self.summaries[vertex] = None
+
+    def collect(
+        self,
+        vertex: int,
+        own: Subtree | None,
+        seen: Collection[Place],
+        now_s: float,
+        timing: Timing,
+    ) -> Subtree:
+        """Return what a vertex's tree reports below the own agent, its own part included.
+
+        own: None where the agent belongs to none of the vertex's queues; seen: places that it sees
+        taken by unidentified vehicles.
+        """
+        homed = self._map.homed[vertex]
+        rounds_s = ROUNDS * min(self._round_s, LONGEST_ROUND_S) / (1.0 - timing.loss)
+        self._collected[vertex].forget(now_s - rounds_s - timing.latency_s)
+        parts = self._collected[vertex].followers()
+        found = joined([*parts, own] if own is not None else parts, len(homed))
+        near = [p for p in seen if p.queue in homed or self._map.vertex_of.get(p) == vertex]
+        if near:
+            places = sorted({*(Place(*place) for place in found.blocked), *near})[:MAX_PLACES]
+            found = msgspec.structs.replace(found, blocked=tuple(places))
+        self._note_candidates(vertex, found)
+        self._subtrees[vertex] = found
+        return found
+
+    def _note_candidates(self, vertex: int, subtree: Subtree) -> None:
+        """Report soon that an agent could leave its queue."""
+        offered = {(each.agent, each.to) for queue in subtree.candidates for each in queue}
+        self.news = self.news or bool(offered - self._offered[vertex])
+        self._offered[vertex] = offered
+
+    def due(self, trees: Sequence[Tree], timing: Timing, now_s: float) -> Summary | None:
+        """Return what is due on the multihop channel, None where nothing is."""
+        if self.news or self._census.has_news:
+            self._repeats = _enough_repeats(timing.loss)
+        share = NEWS_SHARE if self._repeats > 0 else 1.0
+        if now_s - self._sent_s < share * self._round_s - 1e-6:
+            return None
+        self._sent_s, self.news = now_s, False
+        self._repeats = max(0, self._repeats - 1)
+        first, labels = self._labels(timing.loss, now_s)
+        return Summary(
+            mission=self._mission,
+            first=first,
+            labels=labels,
+            news=self._census.news(now_s),
+            trees=tuple(self._report(v, trees[v]) for v in self._reported(trees)),
+        )
+
+    def _labels(self, loss: float, now_s: float) -> tuple[int, bytes]:
+        """Return the first id and the labels of this summary; none between rounds."""
+        if now_s < self._next_round_s:
+            return 0, b""
+        self._next_round_s = now_s + self._round_s - 1e-6
+        self._rounds += 1
+        if loss < LEAST_LOSS and self._rounds % LABELS_EVERY != 1:
+            return 0, b""
+        return self._census.wire(now_s)
+
+    def _reported(self, trees: Sequence[Tree]) -> list[int]:
+        """Return the vertices of one summary: as many as fit, other ones in each turn."""
+        known = [v for v, tree in enumerate(trees) if tree.tier >= 0]
+        if len(known) <= REPORTS:
+            return known
+        self._turn = (self._turn + REPORTS) % len(known)
+        return sorted((known + known)[self._turn : self._turn + REPORTS])
+
+    def _report(self, vertex: int, tree: Tree) -> TreeReport:
+        return TreeReport(
+            vertex=vertex,
+            tier=tree.tier,
+            parent=tree.parent,
+            down=self.summaries[vertex],
+            up=self._subtrees[vertex] if tree.parent >= 0 else None,
+        )
+
+
+def _enough_repeats(loss: float) -> int:
+    """Return in how many summaries news goes out sooner, so that most neighbours hear it."""
+    return 1 if loss < LEAST_LOSS else 1 + ceil(log(NEWS_LOST) / log(loss))
+
+
+def _differ(a: LeaderSummary, b: LeaderSummary) -> bool:
+    """Whether two summaries differ in what agents act on at once."""
+    return (a.root, a.total, a.counts, a.go, a.order, a.blocked) != (
+        *(b.root, b.total, b.counts, b.go, b.order, b.blocked),
+    )
