@@ -5,7 +5,14 @@ from typing import Annotated, Literal, assert_never, get_args
 import msgspec
 from msgspec import Meta
 
-from agent.messages import AGENT_IDS, AT_HOME, MAX_SPEED_MPS, AgentId, FramePath
+from agent.messages import (
+    AGENT_IDS,
+    AT_HOME,
+    MAX_SPEED_MPS,
+    AgentId,
+    AllocationKind,
+    FramePath,
+)
 from agent.qstructure.formation import FormationSpec
 
 LEAST = 0.001
@@ -16,7 +23,6 @@ Hertz = Annotated[float, Meta(ge=LEAST, le=1000)]
 FrameSpeed = Annotated[float, Meta(ge=LEAST, le=MAX_SPEED_MPS)]
 Noise = Annotated[float, Meta(ge=0, le=1)]
 VehicleKind = Literal["kinematic", "accelerating", "forward"]
-AllocationKind = Literal["structure", "assignment"]
 AvoidanceKind = Literal["constellation", "direct", "none"]
 
 

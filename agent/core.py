@@ -91,7 +91,12 @@ class Agent:
         self._safety_monitor = SafetyMonitor(setup)
         self._perception = ObstaclePerception(setup)
         self._missions = Missions(
-            setup.id, setup.formation, setup.control.spacing_m, setup.frame, setup.ids
+            setup.id,
+            setup.formation,
+            setup.control.spacing_m,
+            setup.frame,
+            setup.ids,
+            setup.control.allocation,
         )
         self._summaries: list[HeardSummary] = []
         self._unidentified_vehicles = UnidentifiedVehicles(setup.fleet_max_speed_mps)

@@ -5,10 +5,13 @@ up). Yaw is counted from +x towards +y. Decoding checks every number: it is fini
 bounds given here.
 """
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import msgspec
 from msgspec import Meta
+
+AllocationKind = Literal["structure", "assignment"]
+"""Who takes which place; see agent.config.Control."""
 
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
@@ -274,7 +277,8 @@ MAX_CANDIDATES = 8
 Orders = Annotated[tuple[Order, ...], Meta(max_length=64)]
 Histogram = Annotated[bytes, Meta(min_length=0, max_length=64)]
 """Agents by distance from the vertex, one byte a bin; see agent.structure.histogram."""
-Counts = Annotated[tuple[Annotated[int, Meta(ge=0, lt=AGENT_IDS)], ...], Meta(max_length=64)]
+Members = Annotated[int, Meta(ge=0, le=MAX_TEAM)]
+Counts = Annotated[tuple[Members, ...], Meta(max_length=64)]
 
 
 class LeaderSummary(Message, frozen=True):
@@ -282,7 +286,7 @@ class LeaderSummary(Message, frozen=True):
 
     root: RootKey
     version: Count  # the leader's time at the writing [10 ms]
-    total: Annotated[int, Meta(ge=0, lt=AGENT_IDS)]  # members of the team
+    total: Members  # of the team
     counts: Counts  # members of each queue, those in vertices apart
     highest: Counts  # number of the last claimed place of each queue
     histogram: Histogram

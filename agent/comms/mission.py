@@ -32,6 +32,7 @@ from agent.messages import (
     MAX_TEAM,
     NO_MISSION,
     PIECE_B,
+    AllocationKind,
     Beacon,
     Drift,
     FramePath,
@@ -119,8 +120,10 @@ class Missions:
         spacing: float,
         path: FramePath = AT_HOME,
         ids: int = MAX_TEAM,
+        allocation: AllocationKind = "structure",
     ) -> None:
         self._own_id = own_id
+        self._allocation: AllocationKind = allocation
         self._spacing = spacing
         self._team = min(ids, MAX_TEAM)
         self._deaf_until_s: dict[int, float] = {}
@@ -248,7 +251,7 @@ class Missions:
         known = flown is not None and encoded == self._encoded
         formation = flown.formation if flown is not None and known else self._formation(encoded)
         try:
-            check_mission(formation, path, self._team)
+            check_mission(formation, path, self._team, self._allocation)
         except MissionError as error:
             raise RejectedError("mission", str(error)) from error
         if key < self.frame_key and isinstance(self._frame, ReportedFrame):

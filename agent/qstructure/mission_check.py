@@ -7,7 +7,14 @@ of the world's, so no slot leaves the world, whichever formation meets whichever
 
 from math import dist
 
-from agent.messages import MAX_SPEED_MPS, REACH_M, Drift, FramePath
+from agent.messages import (
+    MAX_SPEED_MPS,
+    MAX_VERTICES,
+    REACH_M,
+    AllocationKind,
+    Drift,
+    FramePath,
+)
 from agent.qstructure.formation import Formation
 
 LEAST_LEG_M = 1e-3
@@ -24,9 +31,17 @@ class MissionError(ValueError):
         self.detail = detail
 
 
-def check_mission(formation: Formation, path: FramePath, agents: int) -> None:
+def check_mission(
+    formation: Formation, path: FramePath, agents: int, allocation: AllocationKind
+) -> None:
     """Raise MissionError for a mission that a team of up to ``agents`` cannot fly."""
     _check_reach(formation, agents)
+    if allocation == "structure" and len(formation.vertices) > MAX_VERTICES:
+        raise MissionError(
+            "formation.vertices",
+            f"{len(formation.vertices)} vertices; a beacon has room for the trees of at most"
+            f' {MAX_VERTICES}, or set control.allocation = "assignment"',
+        )
     _check_path(path)
     turning_mps = path.turn_rate * formation.reach_m(agents)
     if turning_mps > MAX_SPEED_MPS:

@@ -2,7 +2,15 @@
 
 from collections.abc import Iterable, Sequence
 
-from agent.messages import MAX_CANDIDATES, MAX_PLACES, Candidate, Place, Subtree, TreeReport
+from agent.messages import (
+    MAX_CANDIDATES,
+    MAX_PLACES,
+    MAX_TEAM,
+    Candidate,
+    Place,
+    Subtree,
+    TreeReport,
+)
 from agent.structure import histogram
 from agent.structure.leader import CANDIDATES
 
@@ -81,7 +89,7 @@ def own_part(
     """Return one agent's own part. queues: those of the vertex; away_m: distance from it [m]."""
     mine = [queue == j for j in queues]
     return Subtree(
-        highest=tuple(number if each else 0 for each in mine),
+        highest=tuple(min(number, MAX_TEAM) if each else 0 for each in mine),
         histogram=histogram.of_one(away_m) if any(mine) else histogram.EMPTY,
         candidates=tuple(candidates if each else () for each in mine),
         blocked=(),

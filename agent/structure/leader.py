@@ -9,7 +9,7 @@ the counts have followed or the time for it is over.
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from agent.messages import Candidate, LeaderSummary, Order, Place, RootKey, Subtree
+from agent.messages import MAX_TEAM, Candidate, LeaderSummary, Order, Place, RootKey, Subtree
 from agent.structure.census import Population
 from agent.structure.transfers import transfers
 from agent.structure.tree import version_at
@@ -60,8 +60,8 @@ class Leader:
         return LeaderSummary(
             root=self._key,
             version=version_at(view.now_s),
-            total=population.total,
-            counts=tuple(population.members[j] for j in homed),
+            total=min(population.total, MAX_TEAM),
+            counts=tuple(min(population.members[j], MAX_TEAM) for j in homed),
             highest=subtree.highest,
             histogram=subtree.histogram,
             go=self._go,

@@ -263,7 +263,12 @@ class EventChecks:
     def _mission(self, formation: Formation, frame: FrameTable) -> Iterator[Problem]:
         """Check a formation together with the path of its frame."""
         try:
-            check_mission(formation, path_of(frame), self._scenario.rows)
+            check_mission(
+                formation,
+                path_of(frame),
+                self._scenario.rows,
+                self._scenario.control.allocation,
+            )
         except MissionError as error:
             yield Problem(error.key, error.detail)
 

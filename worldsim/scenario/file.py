@@ -129,7 +129,9 @@ def _check_formation(scenario: Scenario, file: Path, source: Path, prefix: str) 
     try:
         formation = formation_of(scenario.formation, control.spacing_m)
         formation.check(scenario.fleet.agents, scenario.min_slot_distance_m)
-        check_mission(formation, path_of(scenario.frame), scenario.rows)
+        check_mission(
+            formation, path_of(scenario.frame), scenario.rows, scenario.control.allocation
+        )
     except FormationError as error:
         raise ScenarioError(source, prefix + error.key, error.detail) from error
     except MissionError as error:
