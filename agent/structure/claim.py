@@ -2,9 +2,10 @@
 
 from math import inf
 
-from agent.messages import Swap
+from agent.messages import MAX_COST_MM, Swap
 
 NO_QUEUE, NO_NUMBER, NO_VERTEX = -1, 0, -1
+MOST_COST_M = MAX_COST_MM / 1000.0
 
 
 class Claim:
@@ -41,8 +42,12 @@ class Claim:
         return self.proposal is not None or self.reservation is not None
 
     def take(self, queue: int, number: int, cost_m: float, now_s: float) -> None:
-        """Claim a number in a queue. cost_m: distance to the place now [m]."""
-        self.queue, self.number, self.cost_m, self.since_s = queue, number, cost_m, now_s
+        """Claim a number in a queue.
+
+        cost_m: distance to the place now [m]; infinite where a full queue has no place for it.
+        """
+        self.queue, self.number, self.since_s = queue, number, now_s
+        self.cost_m = min(cost_m, MOST_COST_M)
         self.proposal, self.push_until_s, self.ranked = None, -inf, True
 
     def lead(self, vertex: int, cost_m: float, now_s: float) -> None:

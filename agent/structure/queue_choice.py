@@ -5,6 +5,8 @@ then on only a leader moves it (queue level of Fig. 3). An agent that could leav
 tiers: a candidate, with the extra way that it would have.
 """
 
+from math import inf
+
 from agent.messages import Candidate, Order
 from agent.structure.claim import NO_QUEUE, Claim
 from agent.structure.transfers import transfers
@@ -85,19 +87,16 @@ class QueueChoice:
 
     def _ways(self, view: View, claim: Claim, takers: list[int]) -> tuple[Candidate, ...]:
         """Return the extra way to each queue that takes members."""
-        own_m = (
-            view.distance(claim.queue, claim.number)
-            if claim.number > 0
-            else view.way_to(claim.queue, view.counts[claim.queue])
-        )
+        own_m = view.distance(claim.queue, claim.number)
+        if own_m == inf:  # no number, or one that a full queue has no place for
+            own_m = view.way_to(claim.queue, view.counts[claim.queue])
+        ways_m = {
+            j: view.way_to(j, view.counts[j] + 1) for j, number in enumerate(takers) if number > 0
+        }
         return tuple(
-            Candidate(
-                extra_dm=round(10.0 * (view.way_to(j, view.counts[j] + 1) - own_m)),
-                agent=self._own_id,
-                to=j,
-            )
-            for j, number in enumerate(takers)
-            if number > 0
+            Candidate(round(10.0 * (way_m - own_m)), self._own_id, j)
+            for j, way_m in ways_m.items()
+            if way_m < inf and own_m < inf
         )
 
 
