@@ -9,12 +9,12 @@ from math import dist
 from random import Random
 
 from agent.config import AgentSetup, Comms, Control, Vehicle
-from agent.controller import Flown, Heard, HeardSummary, Link, Senses
+from agent.controller import NO_WORDS, Flown, Heard, HeardSummary, Link, Senses
 from agent.messages import ZERO
 from agent.qstructure.formation import FormationSpec
 from agent.qstructure.target_frame import Frame
 from agent.structure.link_timing import timing_of
-from agent.structure.structure import Structure
+from agent.structure.member import StructureMember
 
 TICK_S = 0.05
 SPEED_MPS = 0.5
@@ -26,7 +26,7 @@ Drops = Callable[[int, int, float], bool]
 class Member:
     """One agent of the team: where it is, what it heard, and its structure."""
 
-    def __init__(self, own_id, at, team, now_s):
+    def __init__(self, own_id, at, team):
         self.id, self.at, self.velocity = own_id, at, ZERO
         setup = AgentSetup(
             id=own_id,
@@ -41,14 +41,16 @@ class Member:
             formation=FormationSpec("f", {}, ()),
             ids=team.ids,
         )
-        self.structure = Structure(setup, team.map, 0, now_s)
+        self.structure = StructureMember(setup)
+        self.words = NO_WORDS
         self.beacons = {}
         self.summaries = []
         self.place, self.changes = None, 0
 
     @property
-    def claim(self):
-        return self.structure.claim
+    def leads(self):
+        standing = self.words.standing
+        return standing is not None and standing.leads >= 0
 
 
 class Team:
@@ -60,14 +62,14 @@ class Team:
         self.random = Random(seed)
         self.link = Link(loss, latency_s, range_m)
         self.drops: Drops = lambda *_: self.random.random() < loss
-        self.members = {k: Member(k, at, self, 0.0) for k, at in enumerate(points)}
+        self.members = {k: Member(k, at, self) for k, at in enumerate(points)}
         self.now_s = 0.0
         self._air = []
 
     def join(self, at):
         """Let another agent take off."""
         own_id = max(self.members) + 1
-        self.members[own_id] = Member(own_id, at, self, self.now_s)
+        self.members[own_id] = Member(own_id, at, self)
 
     def run(self, seconds):
         """Fly on; return how often agents changed their places meanwhile."""
@@ -102,7 +104,8 @@ class Team:
             for sender, beacon in member.beacons.items()
             if self.now_s - beacon[0] <= lost_s
         }
-        own = member.structure.update(self._senses(member))
+        own = member.structure.select(self._senses(member))
+        member.words = member.structure.words(self.now_s)
         member.summaries = []
         if own is None:
             return
@@ -152,10 +155,8 @@ class Team:
         member.velocity = tuple((y - x) / TICK_S for x, y in zip(before, member.at, strict=True))
 
     def _send(self, member):
-        summary = member.structure.summary(self.now_s)
-        standing = member.structure.standing(self.now_s)
-        claim = member.claim
-        beacon = (member.at, member.velocity, member.place, claim.cost_m, standing)
+        summary, cost_m = member.words.summary, member.structure.cost_m
+        beacon = (member.at, member.velocity, member.place, cost_m, member.words.standing)
         arrives_s = self.now_s + self.link.latency_s
         for other in self.members.values():
             if other is member or dist(member.at, other.at) > self.link.reach_m:

@@ -1,0 +1,118 @@
+"""The direct rule is the team's: it holds only where every member hears every member."""
+
+import pytest
+
+from agent.messages import Place
+from agent.structure.claim import Claim
+from agent.structure.direct_rule import ENTER_S, LEAVE_S, DirectRule
+from tests.agent.structure.builders import LINE, TWO, heard, leader_summary, lines, view
+
+TICK_S = 0.1
+TEAM = 4
+APEX = Place(0, 0)
+
+
+def told(total=TEAM, **fields):
+    return leader_summary(total=total, counts=(total - 1,), **fields)
+
+
+def neighbours(*counts, leader=True):
+    """Return neighbours that hear so many members each; the first one leads."""
+    found = []
+    for k, count in enumerate(counts):
+        at = (-float(k), 0.0, 0.0)
+        if k == 0 and leader:
+            found.append(heard(k + 1, at, APEX, heard=count, leads=0))
+        else:
+            found.append(heard(k + 1, at, LINE.place(0, k or 1), heard=count))
+    return found
+
+
+class Flight:
+    """An agent that asks its rule ten times a second."""
+
+    def __init__(self, formation=LINE, ranked=True):
+        self.formation, self.now_s = formation, 0.0
+        self.claim = Claim(-9.0)
+        if ranked:
+            self.claim.take(0, 3, 0.0, -9.0)
+        self.rule = DirectRule(9, 0.0)
+
+    def run(self, seconds, others, summaries=None):
+        for _ in range(round(seconds / TICK_S)):
+            self.now_s += TICK_S
+            summaries = summaries or [told()]
+            seen = view(
+                self.formation, self.now_s, others, at=(-9.0, 0.0, 0.0), summaries=summaries
+            )
+            self.rule.update(seen, self.claim)
+            if self.rule.applies:
+                self.rule.choose(seen, self.claim)
+        return self.rule.applies
+
+
+def test_it_holds_where_all_hear_all():
+    flight = Flight()
+    assert not flight.run(ENTER_S - TICK_S, neighbours(4, 4, 4))
+    assert flight.run(0.5, neighbours(4, 4, 4))
+    assert flight.rule.heard == TEAM
+
+
+@pytest.mark.parametrize("counts", [(4, 4), (4, 4, 3), (4, 4, 4, 4)])
+def test_it_does_not_hold_where_a_member_is_not_heard_by_any_or_not_counted(counts):
+    assert not Flight().run(5.0, neighbours(*counts))
+
+
+def test_it_does_not_hold_before_the_team_is_counted():
+    assert not Flight().run(5.0, neighbours(4, 4, 4), [told(go=False)])
+
+
+def test_it_ends_for_all_when_a_member_hears_fewer_for_long():
+    flight = Flight()
+    flight.run(1.0, neighbours(4, 4, 4))
+    assert flight.run(LEAVE_S, neighbours(4, 3, 4)), "a lost beacon or two end nothing"
+    assert flight.run(1.0, neighbours(4, 4, 4))
+    assert not flight.run(LEAVE_S + 2.0 * TICK_S, neighbours(4, 3, 4))
+
+
+def test_it_ends_while_a_vertex_has_no_leader():
+    """Else nobody is ordered to a vertex that nobody started near."""
+    pair = lines((0.0, 0.0, 0.0), (0.0, 3.0, 0.0))
+    other = leader_summary(total=TEAM, counts=(0,))
+    flight = Flight(pair)
+    assert flight.run(1.0, neighbours(4, 4, 4), [told(), other])
+    assert not flight.run(LEAVE_S + 2.0 * TICK_S, neighbours(4, 4, 4), [told(), None])
+
+
+def test_no_swap_under_way_is_cut_short():
+    flight = Flight()
+    flight.claim.proposal = object()
+    assert not flight.run(3.0, neighbours(4, 4, 4))
+
+
+def test_each_takes_another_place_of_the_layout_and_the_leader_keeps_its_own():
+    """All four compute the assignment of the same team, each from its own side."""
+    at = {1: (0.0, 0.0, 0.0), 2: (-3.0, 0.2, 0.0), 3: (-1.0, 0.1, 0.0), 4: (-2.0, 0.0, 0.0)}
+    chosen = {}
+    for own in (2, 3, 4):
+        others = [heard(1, at[1], APEX, heard=4, leads=0)]
+        others += [heard(k, at[k], None, heard=4) for k in (2, 3, 4) if k != own]
+        claim, rule = Claim(-9.0), DirectRule(own, 0.0)
+        for tick in range(12):
+            seen = view(LINE, TICK_S * tick, others, at=at[own], summaries=[told()])
+            rule.update(seen, claim)
+            if rule.applies:
+                rule.choose(seen, claim)
+        chosen[own] = claim.number
+    assert chosen == {2: 3, 3: 1, 4: 2}
+
+
+def test_two_leaders_of_one_vertex_leave_the_places_as_they_are():
+    """There are then more places than agents without one; one of the two will make way."""
+    flight = Flight(TWO)
+    assert flight.run(1.0, neighbours(4, 4, 4))
+    before = flight.claim.queue, flight.claim.number
+    double = neighbours(4, 4, 4)
+    double[1] = heard(2, (0.1, 0.0, 0.0), APEX, heard=4, leads=0)
+    flight.run(0.8, double)
+    assert (flight.claim.queue, flight.claim.number) == before

@@ -1,0 +1,119 @@
+"""Small teams by the whole structure: they form the layout exactly, and then keep still."""
+
+from random import Random
+
+import pytest
+
+from tests.agent.structure.builders import LIBRARY, LINE, TWO, library, lines, rays
+from tests.agent.structure.team import Team
+
+WEDGE = rays((-1, 1, 1), (-1, -1, 1), (-1, 1, -1), (-1, -1, -1))
+THREE_LINES = lines((0.0, 0.0, 0.0), (0.0, 3.0, 0.0), (0.0, 6.0, 0.0))
+FIGURES = {path.stem: library(path) for path in LIBRARY if path.stem.startswith("figure")}
+MAPS = {"line": LINE, "two": TWO, "wedge": WEDGE, "three lines": THREE_LINES, **FIGURES}
+RADIOS = {
+    "clean": {},
+    "clean, short": {"range_m": 6.0},
+    "half lost": {"loss": 0.5, "latency_s": 0.2},
+    "half lost, short": {"loss": 0.5, "latency_s": 0.2, "range_m": 6.0},
+}
+RADIO = pytest.mark.parametrize("radio", RADIOS.values(), ids=RADIOS)
+
+
+def team(formation, agents, seed=0, **radio):
+    """Return a team scattered around the origin."""
+    random = Random(seed)
+    sides = (4.0, 4.0, 2.0)
+    points = [tuple(random.uniform(-side, side) for side in sides) for _ in range(agents)]
+    return Team(formation, points, seed, **radio)
+
+
+def check_stays(flown, seconds=8.0):
+    """Check that no agent changes its place any more."""
+    assert flown.run(seconds) == 0
+    assert flown.formed()
+
+
+@RADIO
+@pytest.mark.parametrize("name", MAPS)
+def test_a_team_forms_and_keeps_still(name, radio):
+    flown = team(MAPS[name], 12, **radio)
+    assert flown.until_formed(30.0)
+    check_stays(flown)
+
+
+@RADIO
+def test_a_vertex_that_nobody_starts_near_gets_its_leader(radio):
+    """All start beside the first of three lines: the others' leaders are ordered there."""
+    points = [(-float(k), -1.0, 0.0) for k in range(6)]
+    flown = Team(THREE_LINES, points, **radio)
+    assert flown.until_formed(40.0)
+    check_stays(flown)
+
+
+@RADIO
+@pytest.mark.parametrize("name", ["line", "wedge", "figure-1a"])
+def test_a_team_forms_anew_when_leaders_leave_and_others_join(name, radio):
+    flown = team(MAPS[name], 12, seed=1, **radio)
+    assert flown.until_formed(30.0)
+    for leader in [k for k, member in flown.members.items() if member.leads][:2]:
+        del flown.members[leader]
+    assert flown.until_formed(40.0)
+    for at in ((-3.0, -3.0, 0.0), (3.0, 3.0, 1.0), (2.0, 0.0, 0.0)):
+        flown.join(at)
+    assert flown.until_formed(40.0)
+    check_stays(flown)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_halves_that_meet_again_form_one_team(seed):
+    flown = team(WEDGE, 10, seed)
+    apart = flown.drops
+    flown.drops = lambda sender, receiver, _: (sender < 5) != (receiver < 5)
+    flown.run(20.0)
+    flown.drops = apart
+    assert flown.until_formed(30.0)
+    check_stays(flown)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_an_adversary_of_the_radio_costs_no_place(seed):
+    """For 15 s it makes each way deaf as it likes, for seconds on end: no place is lost for good."""
+    flown, random, deaf = team(WEDGE, 8, seed, range_m=8.0), Random(seed), {}
+
+    def drops(sender, receiver, now_s):
+        if now_s > 15.0:
+            return False
+        until_s, lost = deaf.get((sender, receiver), (0.0, False))
+        if now_s >= until_s:
+            lost = random.random() < 0.6
+            deaf[(sender, receiver)] = (now_s + random.expovariate(1.0), lost)
+        return lost
+
+    flown.drops = drops
+    flown.run(15.0)
+    assert flown.until_formed(40.0)
+    check_stays(flown)
+
+
+def test_equal_seeds_give_equal_flights():
+    def flight():
+        flown = team(WEDGE, 9, 3, loss=0.5, latency_s=0.2, range_m=6.0)
+        flown.run(6.0)
+        return [(member.place, member.at) for member in flown.members.values()]
+
+    assert flight() == flight()
+
+
+def test_where_the_team_is_does_not_matter():
+    """The same flight elsewhere, with its formation, ends in the same places."""
+
+    def places(shift):
+        formation = lines((shift, 0.0, 0.0), (shift, 3.0, 0.0))
+        random = Random(4)
+        points = [(shift + random.uniform(-4, 4), random.uniform(-4, 4), 0.0) for _ in range(8)]
+        flown = Team(formation, points, 4)
+        flown.run(10.0)
+        return [member.place for member in flown.members.values()]
+
+    assert places(0.0) == places(4096.0)
