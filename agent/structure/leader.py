@@ -93,7 +93,13 @@ class Leader:
         self, view: View, population: Population, subtree: Subtree, blocked: frozenset[Place]
     ) -> None:
         counts = population.members
+        vacant = [
+            v
+            for v, place in enumerate(view.map.vertex_places)
+            if population.holders[v] == 0 and place not in blocked
+        ]
         shares = view.map.members(population.total, blocked)
+        shares = view.map.with_vacancies(shares, counts, vacant)
         given = transfers(view.map, counts, shares)
         homed = view.map.homed[self.vertex]
         own = {j: given[j] for j in homed if j in given}

@@ -76,10 +76,10 @@ class QueueChoice:
         """Return the extra way to each queue that the own one may give to."""
         if claim.queue == NO_QUEUE or claim.leads or claim.swapping or claim.pushes(view.now_s):
             return ()
-        takers = transfers(view.map, view.counts, view.shares).get(claim.queue)
+        takers = transfers(view.map, view.counts, view.wanted).get(claim.queue)
         if takers is None:
             return ()
-        asked = (claim.queue, claim.number, tuple(view.counts), view.shares)
+        asked = (claim.queue, claim.number, tuple(view.counts), view.wanted)
         if asked != self._asked or view.now_s - self._offered_s >= OFFER_S:
             self._asked, self._offered_s = asked, view.now_s
             self._offers = self._ways(view, claim, takers)

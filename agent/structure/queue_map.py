@@ -4,7 +4,7 @@ The members of a queue besides those in vertices are numbered from 1, outwards f
 first vertex, its *home*. A number is a place's rank, counted from the first rank that is no vertex.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from math import dist
 from typing import NamedTuple
@@ -58,6 +58,20 @@ class QueueMap:
         """Return a member's number in its queue, counted from 1; less than 1 for a vertex."""
         queue, rank = place
         return rank - self._first_rank[queue] + 1 if 0 <= queue < self.queues else 0
+
+    def with_vacancies(
+        self, shares: Sequence[int], counts: Sequence[int], vacant: Iterable[int]
+    ) -> tuple[int, ...]:
+        """Return the shares, and one more in a queue of each vertex that nobody will stand for.
+
+        vacant: vertices without a leader. Where a queue through one has members, they stand for it.
+        """
+        wanted = [*shares]
+        for v in vacant:
+            through = [j for j in range(self.queues) if v in self.vertices_of[j]]
+            if not any(counts[j] for j in through):
+                wanted[through[0]] += 1
+        return tuple(wanted)
 
     def blocked_numbers(self, queue: int, blocked: Iterable[Place]) -> frozenset[int]:
         """Return the numbers of a queue's members whose places are blocked."""

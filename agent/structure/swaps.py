@@ -108,7 +108,7 @@ class Swaps:
         """
         now_s, timing = view.now_s, view.timing
         waits = now_s < claim.no_swap_before_s or now_s - claim.since_s <= timing.hold_s
-        leaving = claim.queue in transfers(view.map, view.counts, view.shares)
+        leaving = claim.queue in transfers(view.map, view.counts, view.wanted)
         if waits or leaving or claim.swapping or claim.pushes(now_s):
             return
         best: tuple[float, Heard] | None = None

@@ -78,6 +78,16 @@ class View:
         latest = max(known, key=lambda each: each.version, default=None)
         return self.map.members(latest.total if latest is not None else 0, self.blocked)
 
+    @cached_property
+    def wanted(self) -> tuple[int, ...]:
+        """The shares, with those who are to lead a vertex that nobody is near."""
+        vacant = [
+            v
+            for v, summary in enumerate(self.summaries)
+            if summary is None and self.map.vertex_places[v] not in self.blocked
+        ]
+        return self.map.with_vacancies(self.shares, self.counts, vacant)
+
     def home_of(self, queue: int) -> LeaderSummary | None:
         """Return the summary of the leader of a queue's first vertex."""
         return self.summaries[self.map.home[queue]]
