@@ -11,7 +11,7 @@ LATE_S = 999_999_999.9
 
 
 def beacon(sender, sequence, stamp_s, *, at=ORIGIN, echoes=(), **fields):
-    """Return a beacon; by default of an agent at rest at the origin without a place or a standing."""
+    """Return a beacon; by default of an agent at rest at the origin that claims nothing."""
     defaults = {
         "incarnation": 0,
         "velocity": AT_REST,

@@ -7,10 +7,11 @@ from collections import Counter
 from collections.abc import Callable
 from math import dist
 from random import Random
+from typing import NamedTuple
 
 from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.controller import NO_WORDS, Flown, Heard, HeardSummary, Link, Senses
-from agent.messages import ZERO
+from agent.messages import ZERO, Place, Standing, Vector
 from agent.qstructure.formation import FormationSpec
 from agent.qstructure.target_frame import Frame
 from agent.structure.link_timing import timing_of
@@ -21,6 +22,18 @@ SPEED_MPS = 0.5
 ECHO_LASTS_S = 3.0
 Drops = Callable[[int, int, float], bool]
 """Whether a frame from one agent to another, sent at a time [s], is dropped."""
+
+
+class Said(NamedTuple):
+    """What an agent's beacon says."""
+
+    sender: int
+    stamp_s: float
+    at: Vector
+    velocity: Vector
+    place: Place | None
+    cost_m: float
+    standing: Standing | None
 
 
 class Member:
@@ -90,19 +103,19 @@ class Team:
         for member in self.members.values():
             self._send(member)
 
-    def _deliver(self, receiver, sender, stamp_s, at, velocity, place, cost_m, standing, summary):
-        known = receiver.beacons.get(sender)
-        if known is None or known[0] < stamp_s:
-            receiver.beacons[sender] = (stamp_s, at, velocity, place, cost_m, standing)
+    def _deliver(self, receiver, said, summary):
+        known = receiver.beacons.get(said.sender)
+        if known is None or known.stamp_s < said.stamp_s:
+            receiver.beacons[said.sender] = said
         if summary is not None:
-            receiver.summaries.append(HeardSummary(sender, stamp_s, summary))
+            receiver.summaries.append(HeardSummary(said.sender, said.stamp_s, summary))
 
     def _decide(self, member):
         lost_s = timing_of(self.link, TICK_S).lost_s
         member.beacons = {
             sender: beacon
             for sender, beacon in member.beacons.items()
-            if self.now_s - beacon[0] <= lost_s
+            if self.now_s - beacon.stamp_s <= lost_s
         }
         own = member.structure.select(self._senses(member))
         member.words = member.structure.words(self.now_s)
@@ -114,10 +127,7 @@ class Team:
         self._fly(member, own.slot.point)
 
     def _senses(self, member):
-        neighbours = [
-            self._heard(member, sender, *beacon)
-            for sender, beacon in sorted(member.beacons.items())
-        ]
+        neighbours = [self._heard(member, said) for _, said in sorted(member.beacons.items())]
         return Senses(
             now_s=self.now_s,
             position=member.at,
@@ -131,20 +141,20 @@ class Team:
             summaries=tuple(member.summaries),
         )
 
-    def _heard(self, member, sender, stamp_s, at, velocity, place, cost_m, standing):
-        age_s = self.now_s - stamp_s
-        other = self.members.get(sender)
+    def _heard(self, member, said):
+        age_s = self.now_s - said.stamp_s
+        other = self.members.get(said.sender)
         echoed = other.beacons.get(member.id) if other is not None else None
         return Heard(
-            id=sender,
+            id=said.sender,
             age_s=age_s,
-            position=tuple(x + age_s * u for x, u in zip(at, velocity, strict=True)),
-            velocity=velocity,
-            target=at,
-            place=place,
-            cost_m=cost_m,
-            standing=standing,
-            hears_me=echoed is not None and self.now_s - echoed[0] < ECHO_LASTS_S,
+            position=tuple(x + age_s * u for x, u in zip(said.at, said.velocity, strict=True)),
+            velocity=said.velocity,
+            target=said.at,
+            place=said.place,
+            cost_m=said.cost_m,
+            standing=said.standing,
+            hears_me=echoed is not None and self.now_s - echoed.stamp_s < ECHO_LASTS_S,
         )
 
     def _fly(self, member, target):
@@ -155,16 +165,23 @@ class Team:
         member.velocity = tuple((y - x) / TICK_S for x, y in zip(before, member.at, strict=True))
 
     def _send(self, member):
-        summary, cost_m = member.words.summary, member.structure.cost_m
-        beacon = (member.at, member.velocity, member.place, cost_m, member.words.standing)
+        said = Said(
+            sender=member.id,
+            stamp_s=self.now_s,
+            at=member.at,
+            velocity=member.velocity,
+            place=member.place,
+            cost_m=member.structure.cost_m,
+            standing=member.words.standing,
+        )
         arrives_s = self.now_s + self.link.latency_s
         for other in self.members.values():
             if other is member or dist(member.at, other.at) > self.link.reach_m:
                 continue
             lost = self.drops(member.id, other.id, self.now_s)
-            told = None if self.drops(member.id, other.id, self.now_s) else summary
+            told = None if self.drops(member.id, other.id, self.now_s) else member.words.summary
             if not lost or told is not None:
-                self._air.append((arrives_s, other.id, (member.id, self.now_s, *beacon, told)))
+                self._air.append((arrives_s, other.id, (said, told)))
 
     def _changes(self):
         return sum(member.changes for member in self.members.values())

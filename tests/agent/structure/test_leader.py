@@ -169,6 +169,16 @@ def test_who_leads_orders_only_members_of_its_own_queues():
     assert len(orders) == 2
 
 
+def test_an_agent_is_ordered_to_a_vertex_that_nobody_will_stand_for():
+    """Its share besides the vertex is none; one more is too much nowhere else."""
+    counted = population(2, 0, holders=(1, 0))
+    assert HOMES.members(counted.total) == (1, 0)
+    orders = Flight(HOMES).until_orders(counted)
+    assert [(order.queue, order.to) for order in orders] == [(0, 1)]
+    stands = population(1, 1, holders=(1, 0))
+    assert Flight(HOMES).until_orders(stands) == (), "a member of the queue will stand for it"
+
+
 def test_a_blocked_place_changes_the_shares_and_is_told():
     blocked = [TWO.vertex_places[0]]
     flight = Flight(TWO)

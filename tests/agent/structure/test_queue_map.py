@@ -123,6 +123,15 @@ def test_there_is_no_place_without_a_number():
     assert TWO.slot(0, -3, 5) is None
 
 
+def test_a_vertex_without_a_leader_wants_one_member_in_one_of_its_queues():
+    bridge = MAPS["bridge"]
+    shares = (3, 2)
+    assert bridge.with_vacancies(shares, (0, 0), [1]) == (4, 2)
+    assert bridge.with_vacancies(shares, (0, 0), [0, 2]) == (5, 2)
+    assert bridge.with_vacancies(shares, (0, 1), [0, 1]) == (4, 2), "the one in Q2 stands for A"
+    assert bridge.with_vacancies(shares, (1, 0), [0, 1, 2]) == shares
+
+
 def test_a_shared_vertex_is_common_and_of_all_its_queues():
     assert TWO.is_common(0)
     assert TWO.vertices_of == [[0], [0]]

@@ -37,8 +37,19 @@ def check_stays(flown, seconds=8.0):
 @RADIO
 @pytest.mark.parametrize("name", MAPS)
 def test_a_team_forms_and_keeps_still(name, radio):
-    flown = team(MAPS[name], 12, **radio)
+    flown = team(MAPS[name], 10, **radio)
     assert flown.until_formed(30.0)
+    check_stays(flown)
+
+
+@pytest.mark.parametrize("radio", [{}, RADIOS["half lost, short"]], ids=["clean", "half lost"])
+@pytest.mark.parametrize(
+    ("name", "agents"),
+    [("figure-1a", 5), ("figure-1a", 6), ("figure-1b", 6), ("three lines", 3), ("three lines", 5)],
+)
+def test_a_team_hardly_larger_than_its_vertices_leads_them_all(name, agents, radio):
+    flown = team(MAPS[name], agents, **radio)
+    assert flown.until_formed(40.0)
     check_stays(flown)
 
 
@@ -51,10 +62,10 @@ def test_a_vertex_that_nobody_starts_near_gets_its_leader(radio):
     check_stays(flown)
 
 
-@RADIO
+@pytest.mark.parametrize("radio", [{}, RADIOS["half lost, short"]], ids=["clean", "half lost"])
 @pytest.mark.parametrize("name", ["line", "wedge", "figure-1a"])
 def test_a_team_forms_anew_when_leaders_leave_and_others_join(name, radio):
-    flown = team(MAPS[name], 12, seed=1, **radio)
+    flown = team(MAPS[name], 9, seed=1, **radio)
     assert flown.until_formed(30.0)
     for leader in [k for k, member in flown.members.items() if member.leads][:2]:
         del flown.members[leader]
@@ -76,9 +87,9 @@ def test_two_halves_that_meet_again_form_one_team(seed):
     check_stays(flown)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(5))
 def test_an_adversary_of_the_radio_costs_no_place(seed):
-    """For 15 s it makes each way deaf as it likes, for seconds on end: no place is lost for good."""
+    """For 15 s it makes each way deaf as it likes, for seconds on end: no place is lost."""
     flown, random, deaf = team(WEDGE, 8, seed, range_m=8.0), Random(seed), {}
 
     def drops(sender, receiver, now_s):
