@@ -2,7 +2,8 @@
 
 Each member has a label: the time at which it was last known to be there, and its queue then. Of two
 labels of a member the later one holds, so labels may travel any way, any number of times. A member
-whose label has not become later for longer than its way here explains is gone.
+whose label has not become later for longer than its way here explains is asked for: the own label
+of it goes out as news, and whoever knows a later one answers. Without an answer it is gone.
 
 On the radio a label takes two bytes: its age in quanta of 0.25 s, and a code of its queue. In
 memory it is the time in quanta times CODES, plus the code; a label on the radio is then its
@@ -35,6 +36,10 @@ LAGS = 2.0
 """A label may stand still for so many of its usual lags, besides T_lost."""
 MAX_LABELLED = 2**14
 """Ids from here on are not counted."""
+LABEL_S = QUANTUM_S / CODES
+"""Time of one step of a label [s]."""
+ASK_S, FORGOTTEN_S = 0.5, 10.0
+"""Who has been silent for too long is asked for so often, and no longer after so long a time."""
 SHARED_LABELS = MAX_LABELS_B // 2
 NEWS = 48
 """Most news in one frame."""
@@ -58,12 +63,14 @@ class Census:
         self._lag_s: list[float] = []
         """How old labels are when they arrive, by member [s]."""
         self._changed: set[int] = set()
-        """Members whose queue changed since others were told."""
+        """Members of which others are to be told: their queue changed, or they are asked for."""
+        self._asked_s: dict[int, float] = {}
+        """When a member that has been silent for too long was last asked for [s]."""
         self._from = 0
 
     @property
     def has_news(self) -> bool:
-        """Whether a member's queue changed since others were told."""
+        """Whether there is a member of which others are to be told."""
         return bool(self._changed)
 
     def hear(self, member: int, stamp_s: float, code: int) -> None:
@@ -82,10 +89,26 @@ class Census:
         for member, label in summary.news:
             if member < self._ids and label != UNKNOWN:
                 self._make_room(member + 1)
-                if greatest - label > self._labels[member]:
-                    self._adopt(member, greatest - label, now_s)
+                self._compare(member, greatest - label, now_s)
         if summary.labels:
             self._merge_run(summary.first, summary.labels, greatest, now_s)
+
+    def _compare(self, member: int, label: int, now_s: float) -> None:
+        """Take a later label of a member; answer a much older one."""
+        if label > self._labels[member]:
+            self._adopt(member, label, now_s)
+        elif label + WORTH_QUANTA * CODES <= self._labels[member]:
+            self._changed.add(member)
+
+    def ask(self, now_s: float, lost_s: float) -> None:
+        """Ask for members that have been silent for too long. lost_s: T_lost of a neighbour [s]."""
+        oldest_s = now_s - lost_s
+        forgotten = int((oldest_s - FORGOTTEN_S) / QUANTUM_S) * CODES
+        for member, label in enumerate(self._labels):
+            late = label and label * LABEL_S < oldest_s - LAGS * self._lag_s[member]
+            if late and label > forgotten and now_s - self._asked_s.get(member, 0.0) >= ASK_S:
+                self._asked_s[member] = now_s
+                self._changed.add(member)
 
     def _merge_run(self, first: int, labels: bytes, greatest: int, now_s: float) -> None:
         wire = _unpacked(labels)
@@ -113,7 +136,7 @@ class Census:
         self._labels[member] = label
 
     def population(self, now_s: float, lost_s: float, queues: int, vertices: int) -> Population:
-        """Return who is there now. lost_s: T_lost of a neighbour [s]."""
+        """Return who is there now. lost_s: T_lost of a neighbour, and time for an answer [s]."""
         codes = Counter(self._codes(now_s, lost_s))
         return Population(
             total=codes.total(),
@@ -124,11 +147,10 @@ class Census:
     def _codes(self, now_s: float, lost_s: float) -> list[int]:
         """Return the code of each member that is there."""
         oldest_s = now_s - lost_s - QUANTUM_S
-        scale = QUANTUM_S / CODES
         return [
             label % CODES
             for label, lag_s in zip(self._labels, self._lag_s, strict=True)
-            if label and label * scale >= oldest_s - LAGS * lag_s
+            if label and label * LABEL_S >= oldest_s - LAGS * lag_s
         ]
 
     def wire(self, now_s: float) -> tuple[int, bytes]:

@@ -10,6 +10,8 @@ LEAST_PARENT_S = 0.25
 LOG_LOST, LOG_PARENT = log(1e-6), log(1e-3)
 """Logarithms of the probability that chance alone makes such a silence."""
 LEAST_LOSS = 1e-3
+ANSWER_S = 0.15
+"""An answer waits so long for the next summary [s]."""
 MOST_LOSS = 0.95
 
 
@@ -27,6 +29,7 @@ class Timing(NamedTuple):
     pending_s: float  # a proposed swap waits so long for its answer
     push_s: float  # a claim pushes so long
     settle_s: float  # counts are steady when unchanged for so long, at the start
+    answer_s: float  # time for a question to all neighbours, and their answer
     resettle_s: float  # the same later, when a wrong order would move vehicles for nothing
 
 
@@ -49,5 +52,6 @@ def timing_of(link: Link, beacon_period_s: float) -> Timing:
         pending_s=0.6 + 3.0 * latency,
         push_s=1.0 + 3.0 * latency,
         settle_s=0.25 + hop_s,
+        answer_s=2.0 * (ANSWER_S + latency) / (1.0 - loss),
         resettle_s=1.0 + 4.0 * latency,
     )

@@ -150,6 +150,7 @@ class Structure:
             stamp_s = view.now_s - heard.age_s
             self.census.hear(heard.id, stamp_s, self._code_of(heard))
         self.census.hear(self._own_id, view.now_s, self._own_code())
+        self.census.ask(view.now_s, view.timing.lost_s)
 
     def _code_of(self, heard: Heard) -> int:
         standing = heard.standing
@@ -226,7 +227,7 @@ class Structure:
         return own_part(homed, claim.queue, claim.number, view.to_vertex(vertex), offers)
 
     def _population(self, view: View) -> Population:
-        lost_s = view.timing.lost_s
+        lost_s = view.timing.lost_s + view.timing.answer_s
         return self.census.population(view.now_s, lost_s, self._map.queues, self._map.vertices)
 
     def summary(self, now_s: float) -> Summary | None:
