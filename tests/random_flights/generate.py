@@ -96,6 +96,10 @@ def draft(draw: Draw, steps: int) -> Tables:
     made["expect"] = expectations(draw, made)
     if draw.chance(0.25):
         made["fleet"]["briefed"] = briefed(draw, agents)
+    if draw.chance(0.25):
+        made["control"]["allocation"] = "assignment"
+    if draw.chance(0.1):
+        made["expect"]["attitude_within_deg"] = draw.number(1.0, 180.0, 0)
     return made
 
 
