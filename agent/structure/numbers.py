@@ -22,6 +22,8 @@ GREW_WITHIN_S, GREW_BY = 12.0, 1.3
 COMPLETE_GAP_S, GAP_S, FAR_GAP_S = 0.25, 0.5, 1.0
 """How long a number has not been heard until it counts as a gap."""
 NEAR_M = 1.0
+STANDS_M = 0.2
+"""Who is nearer than this to a place when the numbers are taken stands in it."""
 
 
 class Numbers:
@@ -88,6 +90,9 @@ class Numbers:
         nearer = sum((view.to_vertex(vertex, h.position), h.id) < own for h in same)
         if complete:
             return 1 + nearer, max(count, share)
+        standing = view.nearest_number(queue, share)
+        if view.distance(queue, standing) < STANDS_M:
+            return standing, share
         home = view.home_of(queue)
         bins = home.histogram if home is not None else b""
         if not sum(bins):

@@ -87,6 +87,14 @@ def test_where_all_hear_all_the_first_numbers_are_those_of_the_distances():
     assert queue.run(0.1) == [3, 1, 4, 2]
 
 
+def test_who_stands_in_a_place_takes_its_number_though_it_hears_only_some():
+    members = [Ranked(k, float(k)) for k in range(1, 10)]
+    queue = Queue(members, reach_m=1.0)
+    for each in members:
+        each.numbers = Numbers(each.id, -1.0)
+    assert queue.run(0.1) == list(range(1, 10))
+
+
 @settings(derandomize=True, deadline=None, max_examples=40)
 @given(st.lists(st.integers(1, 8), min_size=1, max_size=8), st.integers(0, 999))
 def test_any_numbers_become_those_from_1_to_the_count(numbers, seed):
