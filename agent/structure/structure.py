@@ -5,12 +5,13 @@ lead of a vertex. What is urgent goes into its beacons (:class:`~agent.messages.
 slow goes into summaries on the multihop channel, sooner while there is news.
 """
 
-from math import inf
+from math import dist, inf
 
 from agent.config import AgentSetup
 from agent.controller import Flown, Heard, Senses
 from agent.messages import (
     DISTRESS,
+    MAX_TEAM,
     MEMBER,
     SUB_VERTEX,
     VERTEX,
@@ -22,6 +23,7 @@ from agent.messages import (
 )
 from agent.places.occupied_slots import OccupiedSlots
 from agent.places.place_points import OwnTarget, PlacePoints
+from agent.qstructure.formation import Slot
 from agent.structure.census import FIRST_QUEUE, FIRST_VERTEX, UNPLACED, Census, Population
 from agent.structure.claim import NO_QUEUE, Claim
 from agent.structure.convergecast import own_part
@@ -29,7 +31,7 @@ from agent.structure.direct_rule import DirectRule
 from agent.structure.election import Election
 from agent.structure.leader import Leader
 from agent.structure.link_timing import timing_of
-from agent.structure.numbers import Numbers
+from agent.structure.numbers import STANDS_M, Numbers
 from agent.structure.queue_choice import QueueChoice, likely_length
 from agent.structure.queue_map import QueueMap
 from agent.structure.slow_layer import SlowLayer
@@ -53,6 +55,7 @@ class Structure:
         self.claim = Claim(now_s)
         self.trees = [Tree(own_id, now_s) for _ in range(formation.vertices)]
         self.census = Census(own_id, setup.ids)
+        self._most_members = min(setup.ids, MAX_TEAM)
         self._slow = SlowLayer(own_id, mission, formation, self.census, self._round_s)
         self._queue_choice = QueueChoice(own_id)
         self._election = Election(own_id, now_s)
@@ -184,15 +187,28 @@ class Structure:
         )
 
     def _target(self, view: View) -> OwnTarget | None:
-        """Return where to fly. An agent without a claim waits by the nearest place of its queue."""
+        """Return where to fly. An agent without a claim waits by the nearest place of its queue.
+
+        Who stands in any place of it waits there.
+        """
         claim = self.claim
         if claim.leads or claim.number > 0:
             return self._shortened(view, view.target(claim))
         if claim.queue == NO_QUEUE:
             return None
-        number = view.nearest_number(claim.queue, likely_length(view))
-        slot = self._map.slot(claim.queue, number, view.extent(claim.queue, number))
+        slot = self._standing_slot(view, claim.queue)
+        if slot is None:
+            number = view.nearest_number(claim.queue, likely_length(view))
+            slot = self._map.slot(claim.queue, number, view.extent(claim.queue, number))
         return OwnTarget(None, slot, False) if slot is not None else None
+
+    def _standing_slot(self, view: View, queue: int) -> Slot | None:
+        """Return the slot of a queue in which the agent stands by chance, None for none."""
+        number = view.nearest_number(queue, self._most_members)
+        slots = [self._map.slot(queue, number, view.extent(queue, number))]
+        slots += [self._map.vertex_slot(v) for v in self._map.vertices_of[queue]]
+        near = [each for each in slots if each and dist(each.point, view.origin) < STANDS_M]
+        return near[0] if near else None
 
     def _shortened(self, view: View, own: OwnTarget | None) -> OwnTarget | None:
         """Return the target for now: a push may lead past the tail, which is no place to fly to."""

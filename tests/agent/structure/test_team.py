@@ -53,6 +53,18 @@ def test_a_team_hardly_larger_than_its_vertices_leads_them_all(name, agents, rad
     check_stays(flown)
 
 
+@pytest.mark.parametrize("agents", [2, 5, 8, 15])
+def test_a_line_that_stands_in_its_places_stays_there(agents):
+    """Remark 5: each hears only those beside it, at exactly the range, so no step is free."""
+    points = [(-float(k), 0.0, 0.0) for k in range(agents)]
+    flown = Team(LINE, points, range_m=1.0 + 1e-6)
+    assert flown.until_formed(12.0)
+    check_stays(flown, 20.0)
+    words = [member.words for member in flown.members.values()]
+    assert [each.tier for each in words] == list(range(agents))
+    assert [each.parent for each in words] == list(range(-1, agents - 1))
+
+
 @RADIO
 def test_a_vertex_that_nobody_starts_near_gets_its_leader(radio):
     """All start beside the first of three lines: the others' leaders are ordered there."""
