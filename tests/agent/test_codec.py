@@ -25,6 +25,7 @@ from agent.messages import (
     CAUSES,
     FRAME_M,
     LEAST_SPEED_MPS,
+    MAX_TEAM,
     MAX_VERTICES,
     Beacon,
     Branch,
@@ -239,7 +240,8 @@ records = st.builds(
     blocked=blocked,
 )
 places = st.tuples(indices, indices)
-member_counts = st.lists(st.integers(0, 2**16 - 1), max_size=6).map(tuple)
+members = st.integers(0, MAX_TEAM)
+member_counts = st.lists(members, max_size=6).map(tuple)
 roots = st.builds(RootKey, cost_cm=costs, id=ids)
 branches = st.builds(Branch, root=roots, version=counts, tier=indices, parent=parents)
 swaps = st.builds(Swap, partner=ids, place=places, other=places)
@@ -248,7 +250,7 @@ standings = st.builds(
     branches=st.lists(st.none() | branches, max_size=4).map(tuple),
     leads=indices,
     queue=indices,
-    heard=st.integers(0, 2**16 - 1),
+    heard=members,
     pushes=st.booleans(),
     proposal=st.none() | swaps,
     reservation=st.none() | swaps,
@@ -257,7 +259,7 @@ leader_summaries = st.builds(
     LeaderSummary,
     root=roots,
     version=counts,
-    total=st.integers(0, 2**16 - 1),
+    total=members,
     counts=member_counts,
     highest=member_counts,
     histogram=st.binary(max_size=64),
