@@ -124,6 +124,8 @@ class Structure:
             self._queue_choice.choose(view, self.claim)
         if not self.claim.leads:
             self._decide_as_member(view)
+        elif self.claim.number < 1 and self._map.vertex_places[self.claim.vertex] in view.blocked:
+            self._numbers.take_first(view, self.claim)
         self._followed = any(
             branch is not None and branch.parent == self._own_id
             for h in view.heard
