@@ -51,6 +51,7 @@ class Population(NamedTuple):
     total: int
     members: tuple[int, ...]  # of each queue, besides those in vertices
     holders: tuple[int, ...]  # of each vertex
+    changed_s: float = 0.0  # when a member was new or changed its queue last, by the labels [s]
 
 
 class Census:
@@ -67,6 +68,7 @@ class Census:
         self._asked_s: dict[int, float] = {}
         """When a member that has been silent for too long was last asked for [s]."""
         self._from = 0
+        self._changed_s = 0.0
 
     @property
     def has_news(self) -> bool:
@@ -80,7 +82,7 @@ class Census:
         self._make_room(member + 1)
         label = int(stamp_s / QUANTUM_S) * CODES + code
         if label > self._labels[member]:
-            self._set(member, label)
+            self._set(member, label, stamp_s)
             self._lag_s[member] *= 1.0 - LAG_SMOOTHING
 
     def merge(self, summary: Summary, stamp_s: float, now_s: float) -> None:
@@ -128,11 +130,13 @@ class Census:
             return
         lag_s = max(now_s - label // CODES * QUANTUM_S, 0.0)
         self._lag_s[member] += LAG_SMOOTHING * (lag_s - self._lag_s[member])
-        self._set(member, label)
+        self._set(member, label, now_s)
 
-    def _set(self, member: int, label: int) -> None:
+    def _set(self, member: int, label: int, now_s: float) -> None:
         if label % CODES != self._labels[member] % CODES:
             self._changed.add(member)
+            if member != self._own:
+                self._changed_s = max(self._changed_s, now_s)
         self._labels[member] = label
 
     def population(self, now_s: float, lost_s: float, queues: int, vertices: int) -> Population:
@@ -142,6 +146,7 @@ class Census:
             total=codes.total(),
             members=tuple([codes[FIRST_QUEUE + j] for j in range(queues)]),
             holders=tuple([codes[FIRST_VERTEX + v] for v in range(vertices)]),
+            changed_s=self._changed_s,
         )
 
     def _codes(self, now_s: float, lost_s: float) -> list[int]:

@@ -5,6 +5,8 @@ hears also hears all. Otherwise agents of two minds take each other's places. Le
 vertex has no leader the rule does not apply, for the others may have to order somebody there.
 """
 
+from math import dist
+
 from agent.assignment.allocation import own_place
 from agent.controller import Peer
 from agent.messages import Place
@@ -14,6 +16,8 @@ from agent.structure.view import View, leads
 ENTER_S = 0.4
 """How long the members heard must have been all, and the same."""
 LEAVE_S = 1.0
+GUESS_AFTER_S, MOST_GUESSED = 0.05, 24
+"""A guess is made once nobody new was heard for so long, among so many members at most."""
 LEAST_HEARD_S = 0.5
 CHOICE_HZ = 5.0
 
@@ -30,6 +34,9 @@ class DirectRule:
         self._next_choice_s = now_s
         self.applies = False
         self.heard = 1
+        self._guessed: tuple[int, ...] | None = None
+        """Among which members the last guess was made."""
+        self._guess: Place | None = None
 
     def update(self, view: View, claim: Claim) -> None:
         """Decide anew whether the rule applies."""
@@ -71,6 +78,40 @@ class DirectRule:
             self.applies, self._short_since_s = True, None
             claim.push_until_s = view.now_s
 
+    @property
+    def is_near(self) -> bool:
+        """Whether all members are heard, so that the rule will apply if nothing changes."""
+        return self._full_since_s is not None and not self.applies
+
+    def guess(self, view: View, claim: Claim) -> Place | None:
+        """Return the place that the assignment over the members heard gives, without claiming it.
+
+        Where they are the whole team this is the place that the agent will take, so that it flies
+        there at once. None where too few are heard to tell, or so many that it takes too long.
+        """
+        settled = view.now_s - self._same_since_s >= GUESS_AFTER_S + view.timing.latency_s
+        if len(view.heard) > MOST_GUESSED:
+            return None
+        if settled and view.heard and self._guessed != self._ids:
+            self._guessed = self._ids
+            self._guess = self._likely_place(view, claim)
+        return self._guess
+
+    def _likely_place(self, view: View, claim: Claim) -> Place | None:
+        """Return the place that the own agent is likely to get, once the nearest lead."""
+        team = self._team(view, claim)
+        layout = view.map.formation.layout(len(view.heard) + 1, view.blocked)
+        places = list(layout.places)
+        for place in [p for p in layout.places if p in view.map.vertex_of]:
+            point = view.frame.to_world(layout.slots[place].point)
+            nearest = min(team, key=lambda peer: (dist(peer.position, point), peer.id))
+            if nearest.id == self._own_id:
+                return place
+            team.remove(nearest)
+            places.remove(place)
+        points = [view.frame.to_world(layout.slots[place].point) for place in places]
+        return own_place(self._own_id, team, places, points) if len(places) <= len(team) else None
+
     def choose(self, view: View, claim: Claim) -> None:
         """Take the place that the assignment over all members gives."""
         now_s = view.now_s
@@ -79,18 +120,22 @@ class DirectRule:
         self._next_choice_s = now_s + 1.0 / CHOICE_HZ - 1e-9
         if claim.number > 0 and now_s - claim.since_s < view.timing.hold_s:
             return
+        place = self._assigned(view, claim)
+        if place is not None:
+            self._take(view, claim, place)
+
+    def _assigned(self, view: View, claim: Claim) -> Place | None:
+        """Return the own place among all members; None where the election comes first."""
         layout = view.map.formation.layout(view.total, view.blocked)
         held = {h.place for h in view.heard if leads(h) and h.place is not None}
         places = [place for place in layout.places if place not in held]
         if any(place in view.map.vertex_of for place in places):
-            return  # a vertex without a leader: the election comes first
+            return None  # a vertex without a leader
         team = self._team(view, claim)
         if len(places) > len(team):
-            return  # two lead one vertex: one of them will make way
+            return None  # two lead one vertex: one of them will make way
         points = [view.frame.to_world(layout.slots[place].point) for place in places]
-        place = own_place(self._own_id, team, places, points)
-        if place is not None:
-            self._take(view, claim, place)
+        return own_place(self._own_id, team, places, points)
 
     def _team(self, view: View, claim: Claim) -> list[Peer]:
         own = view.map.place(claim.queue, claim.number) if claim.number > 0 else None

@@ -73,7 +73,9 @@ class Leader:
     def _is_steady(self, view: View, population: Population) -> bool:
         counted = Counted(population.total, population.members)
         if counted != self._counted:
-            self._counted, self._since_s = counted, view.now_s
+            # What an agent counted before it led counts too.
+            self._since_s = view.now_s if self._counted is not None else population.changed_s
+            self._counted = counted
         timing = view.timing
         wait_s = timing.resettle_s if self._go else timing.settle_s
         if not self._go and counted.total < len(view.heard) + 1:

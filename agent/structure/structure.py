@@ -40,6 +40,8 @@ from agent.structure.tree import Follower, Tree
 from agent.structure.view import View
 
 DECISION_HZ = 10.0
+PATIENCE_S = 0.3
+"""So long an agent without a number stays where it is: most have one by then, and need not turn."""
 FAR_M = 2.5
 """Within this distance of its place an agent flies there even if it lies beyond the tail."""
 
@@ -66,6 +68,7 @@ class Structure:
         self._occupied = OccupiedSlots(points, "proximity" in setup.vehicle.sensors)
         self._leader: Leader | None = None
         self._followed = False
+        self._started_s = now_s
         self._next_decision_s = now_s
         self._blocked: frozenset[Place] = frozenset()
         self._view: View | None = None
@@ -104,7 +107,7 @@ class Structure:
             leading = self._election.key if self.claim.vertex == v else None
             deposed = tree.follow_root(view.now_s, followers, leading, view.timing)
             near = [each for each in followers if each.heard.age_s < view.timing.parent_s]
-            tree.choose_parent(view.here, near, senses.link.reach_m)
+            tree.choose_parent(view.here, senses.velocity, near, senses.link.reach_m)
             self._slow.keep_to(v, tree)
             if leading is not None and deposed:
                 self._step_down(view, v)
@@ -139,13 +142,15 @@ class Structure:
             key = self._election.key
             if key is not None:
                 self._leader = Leader(claim.vertex, key, view.now_s, self._round_s)
+                self.census.hear(self._own_id, view.now_s, self._own_code())
             self._slow.news = True
         elif self._direct.applies:
             self._direct.choose(view, claim)
         elif self._queue_choice.obey(view, claim):
             self._slow.news = True
         elif claim.number < 1:
-            self._numbers.take_first(view, claim)
+            if not self._direct.is_near:
+                self._numbers.take_first(view, claim)
         elif not self._swaps.proceed(view, claim) and not self._numbers.keep_up(view, claim):
             self._swaps.propose(view, claim)
 
@@ -198,7 +203,9 @@ class Structure:
             return self._shortened(view, view.target(claim))
         if claim.queue == NO_QUEUE:
             return None
-        slot = self._standing_slot(view, claim.queue)
+        slot = self._standing_slot(view, claim.queue) or self._guessed_slot(view)
+        if slot is None and view.now_s - self._started_s < PATIENCE_S:
+            return None
         if slot is None:
             number = view.nearest_number(claim.queue, likely_length(view))
             slot = self._map.slot(claim.queue, number, view.extent(claim.queue, number))
@@ -211,6 +218,10 @@ class Structure:
         slots += [self._map.vertex_slot(v) for v in self._map.vertices_of[queue]]
         near = [each for each in slots if each and dist(each.point, view.origin) < STANDS_M]
         return near[0] if near else None
+
+    def _guessed_slot(self, view: View) -> Slot | None:
+        place = self._direct.guess(view, self.claim)
+        return self._map.formation.slot(place, len(view.heard) + 1) if place is not None else None
 
     def _shortened(self, view: View, own: OwnTarget | None) -> OwnTarget | None:
         """Return the target for now: a push may lead past the tail, which is no place to fly to."""

@@ -5,23 +5,27 @@ latest time that it heard (the *version*). Of two roots the one with the lower k
 whose version stands still is void, and stays so until its version has gone on by ``REVIVAL_S``:
 otherwise the last words of a dead root would go round for ever.
 
-A parent has the lowest tier among the agents heard of the same root, with a margin of range; the
-present parent is kept as long as it is as good. What comes from the root is taken only from agents
+A parent has the lowest tier among the agents heard of the same root that stay in range; the present
+parent is kept as long as it is as good. What comes from the root is taken only from agents
 of a lower tier, and what goes to it is sent to the parent.
 """
 
 from collections.abc import Collection
-from math import dist
+from math import dist, hypot
 from typing import NamedTuple
 
 from agent.controller import Heard
-from agent.messages import Branch, RootKey
+from agent.messages import Branch, RootKey, Vector
 from agent.structure.link_timing import Timing
 
 VERSIONS_PER_S = 100.0
 REVIVAL_S = 1.0
-NEW_PARENT_WITHIN, PARENT_WITHIN = 0.8, 0.93
-"""Share of the range within which a new parent, and the present one, count as near."""
+NEW_PARENT_STAYS_S, PARENT_STAYS_S = 2.5, 1.0
+"""A parent that leaves the range within this time counts as LEAVING tiers worse: so an agent looks
+for another before its parent is lost, and keeps the present one longer than it takes a new one."""
+LEAVING = 2
+APART_MPS = 0.05
+"""Two agents that part more slowly than this stay where they are."""
 MAX_TIER = 1000
 VOID_KEPT = 32
 
@@ -96,9 +100,12 @@ class Tree:
             del self._void[next(iter(self._void))]
 
     def choose_parent(
-        self, here: tuple[float, float, float], followers: list[Follower], reach_m: float
+        self, here: Vector, velocity: Vector, followers: list[Follower], reach_m: float
     ) -> None:
-        """Choose the parent. followers: agents heard lately enough to be one."""
+        """Choose the parent. followers: agents heard lately enough to be one.
+
+        here, velocity: own [m, m/s; world frame]; reach_m: the range as measured [m].
+        """
         if self.root is None or self.root.id == self._own_id:
             self.parent, self.tier = -1, (-1 if self.root is None else 0)
             return
@@ -107,12 +114,8 @@ class Tree:
         def order(each: Follower) -> tuple[int, bool, float, int]:
             heard, branch = each
             current = heard.id == self.parent
-            away_m = dist(here, heard.position)
-            near = NEW_PARENT_WITHIN * reach_m
-            if away_m < near or (current and away_m < PARENT_WITHIN * reach_m):
-                far = 0
-            else:
-                far = 1 if away_m < PARENT_WITHIN * reach_m else 2
+            horizon_s = PARENT_STAYS_S if current else NEW_PARENT_STAYS_S
+            far = LEAVING if _leaves(here, velocity, heard, horizon_s, reach_m) else 0
             deaf = 0 if heard.hears_me else 1
             above = position_of.get(branch.parent)
             to_its_parent = dist(heard.position, above) if above is not None else 0.0
@@ -128,3 +131,12 @@ class Tree:
         best = min(eligible, key=order, default=None)
         self.parent = best.heard.id if best is not None else -1
         self.tier = best.branch.tier + 1 if best is not None else -1
+
+
+def _leaves(here: Vector, velocity: Vector, other: Heard, horizon_s: float, reach_m: float) -> bool:
+    """Whether another agent leaves the range within a time, if both fly on as now."""
+    apart = [b - a for a, b in zip(here, other.position, strict=True)]
+    away_m = hypot(*apart)
+    rates = [v - u for u, v in zip(velocity, other.velocity, strict=True)]
+    rate_mps = sum(d * v for d, v in zip(apart, rates, strict=True)) / max(away_m, 1e-9)
+    return rate_mps > APART_MPS and away_m + horizon_s * rate_mps > reach_m

@@ -68,7 +68,7 @@ class Team:
         if tree.follow_root(self.now_s, followers, key, self.timing):
             self.leading.pop(own, None)
         near = [each for each in followers if each.heard.age_s < self.timing.parent_s]
-        tree.choose_parent(self.points[own], near, REACH_M)
+        tree.choose_parent(self.points[own], ZERO, near, REACH_M)
 
     def place(self, own):
         return self.trees[own].tier, self.trees[own].parent
@@ -240,7 +240,7 @@ def test_a_leader_makes_way_for_a_lower_key_only():
 
 def chosen(tree, *followers, reach_m=REACH_M):
     follow(tree, 5.0, *followers)
-    tree.choose_parent(ZERO, list(followers), reach_m)
+    tree.choose_parent(ZERO, ZERO, list(followers), reach_m)
     return tree.parent
 
 
@@ -288,6 +288,6 @@ def test_hostile_branches_leave_a_tier_that_fits_its_message(branches):
     tree = Tree(9, 5.0)
     followers = [Follower(heard(k), each) for k, each in enumerate(branches)]
     follow(tree, 5.0, *followers)
-    tree.choose_parent(ZERO, followers, REACH_M)
+    tree.choose_parent(ZERO, ZERO, followers, REACH_M)
     assert -1 <= tree.tier <= 1000
     assert tree.root is None or tree.root.id != 9
