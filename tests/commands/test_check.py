@@ -25,7 +25,8 @@ def test_each_warning_is_one_line(small: Path, qswarm: Command) -> None:
         "check", small, "--set", "netem.range_m=0.9", "--set", "vehicle.max_speed_mps=1.5"
     )
     assert printed.status == 0
-    range_line, speed_line = printed.err.splitlines()
+    range_line, start_line, speed_line = printed.err.splitlines()
     assert range_line.startswith(f"{small}: netem.range_m: warning: ")
+    assert start_line.startswith(f"{small}: fleet.start: warning: 2 groups of agents")
     assert "'qswarm run' rejects this" in speed_line
     assert parse(printed.out).netem.range_m == 0.9

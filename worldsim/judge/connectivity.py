@@ -84,18 +84,25 @@ class Connectivity:
 
     def components(self, tick: Tick) -> Components:
         """Return the connected components at a tick."""
-        lost = self._lost(MULTIHOP, tick)
+        lost = self._lost(MULTIHOP, tick.position, tick.alive)
         label = _components(lost < 1.0, tick.alive)
         within = lost[(lost < 1.0) & (label[:, None] == label)]
         loss = _weakest(lost, label, np.unique(within))
         linked = (lost <= loss) & (label[:, None] == label)
         rows = np.flatnonzero(tick.alive).tolist()
         hops = max((int(_hops_from(row, linked).max()) for row in rows), default=0)
-        heard = self._lost(LOCAL, tick) < 1.0
+        heard = self._lost(LOCAL, tick.position, tick.alive) < 1.0
         foreign = (heard | (lost < 1.0)) & (label[:, None] != label)
         open_ = np.unique(label[foreign.any(axis=0)])
         closed = ~np.isin(np.arange(label.max(initial=-1) + 1), open_)
         return Components(label, hops, loss, bool(within.any()), closed, heard.T)
+
+    def groups(self, position: Floats, alive: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Return the group of agents (N,) in which beacons of each come to each; -1 for the others.
+
+        position (N, 3) [m; world frame]; alive: the agents that take part.
+        """
+        return _components(self._lost(LOCAL, position, alive) < 1.0, alive)
 
     def dissemination_s(self, agents: int, hops: int, loss: float | None = None) -> float:
         """Return B [s]: a record reaches every agent in this time, with probability 1 - 1e-6.
@@ -134,17 +141,17 @@ class Connectivity:
         cut = [[self._network.partitions(a, b) for b in rows] for a in rows]
         self._cut = np.array(cut, dtype=np.bool_)
 
-    def _lost(self, channel: int, tick: Tick) -> Floats:
+    def _lost(self, channel: int, position: Floats, alive: NDArray[np.bool_]) -> Floats:
         """Return the share of a channel's frames that each link loses, from row to column (N, N).
 
         It is 1 where no frame gets through, and to the agent itself.
         """
-        away = tick.position[:, None] - tick.position[None]
+        away = position[:, None] - position[None]
         distance = np.sqrt(np.sum(away * away, axis=2))
         lost = self._lost_over(channel, distance)
-        usable = ~self._cut & tick.alive[:, None] & tick.alive
+        usable = ~self._cut & alive[:, None] & alive
         if self._network.obstructed:
-            free = [not self._network.jammed((x, y, z)) for x, y, z in tick.position.tolist()]
+            free = [not self._network.jammed((x, y, z)) for x, y, z in position.tolist()]
             usable &= np.outer(free, free)
         np.fill_diagonal(usable, val=False)
         return np.where(usable, lost, 1.0)

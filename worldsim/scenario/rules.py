@@ -23,6 +23,7 @@ from worldsim.scenario.safety_checks import SAFETY_WARNINGS
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.tables import CONVERGED_S, SLOTS_PER_TICK, Scenario
 from worldsim.scenario.target_frame import frame_problem, path_of
+from worldsim.scenario.team_checks import empty_queues
 from worldsim.scenario.toml import ScenarioError
 
 MAX_STEP_M = 0.1
@@ -42,7 +43,8 @@ def warnings_for(scenario: Scenario) -> list[Problem]:
     """Return what a scenario is allowed to ask for but should not."""
     found = (warning(scenario) for warning in WARNINGS)
     single = [problem for problem in found if problem is not None]
-    return [*single, *yaws_not_held(scenario), *idle_keys(scenario)]
+    several = (yaws_not_held, empty_queues, idle_keys)
+    return [*single, *(problem for warning in several for problem in warning(scenario))]
 
 
 def speed_problem(scenario: Scenario, command_ticks: int) -> Problem | None:
