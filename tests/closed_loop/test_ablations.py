@@ -1,0 +1,67 @@
+"""What the Q-structure carries: without a part of it, agents get no places (docs/method.md)."""
+
+from pathlib import Path
+
+import pytest
+
+from worldsim.engine.virtual import Flight, fly
+from worldsim.scenario.file import load
+
+WEDGE = Path(__file__).parents[2] / "deploy" / "scenarios" / "wedge-9.toml"
+AGENTS = 9
+APEX = (0, 0)
+PLAIN: dict[str, str] = {}
+WITHOUT_TIERS = {"control.controller": "tests.closed_loop.ablated:WithoutTiers"}
+MUTE_LEADERS = {"control.controller": "tests.closed_loop.ablated:MuteLeaders"}
+MULTIHOP_OFF = {"comms.multihop_hz": "0"}
+ONE_BRIEFED = {"fleet.briefed": "[0]"}
+SEEDS = (0, 1)
+
+
+def flown(seed: int, switched: dict[str, str], range_m: float = 6.0) -> Flight:
+    given = {"seed": str(seed), "duration_s": "20", "netem.range_m": str(range_m)}
+    return fly(load(WEDGE, given | switched))
+
+
+def places_of(flight: Flight) -> list[tuple[int, int]]:
+    """Return the places that agents claim at the end."""
+    telemetry = [command.telemetry for command in flight.loop.world.latest]
+    return [tuple(each.place) for each in telemetry if each.place is not None]
+
+
+def missions_of(flight: Flight) -> set[int]:
+    """Return the keys of the missions that agents fly at the end."""
+    return {command.telemetry.mission for command in flight.loop.world.latest}
+
+
+@pytest.mark.parametrize("range_m", [6.0, 3.0])
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("switched", [PLAIN, ONE_BRIEFED], ids=["plain", "one briefed"])
+def test_the_whole_structure_fills_the_formation(
+    switched: dict[str, str], seed: int, range_m: float
+) -> None:
+    flight = flown(seed, switched, range_m)
+    assert flight.loop.judge.phases[0].converge_s is not None
+    assert len(set(places_of(flight))) == AGENTS
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    "switched",
+    [WITHOUT_TIERS, MUTE_LEADERS, MULTIHOP_OFF, ONE_BRIEFED | WITHOUT_TIERS],
+    ids=["without tiers", "mute leaders", "multihop off", "one briefed, without tiers"],
+)
+def test_without_a_part_only_the_leader_has_a_place(switched: dict[str, str], seed: int) -> None:
+    """Nobody else hears that the team is counted, even where each agent hears all others."""
+    flight = flown(seed, switched)
+    assert flight.loop.judge.phases[0].converge_s is None
+    assert places_of(flight) == [APEX]
+    assert "converge pyramidal-wedge" in flight.loop.judge.shortcomings().missed
+    assert flight.loop.judge.invariants()["I1"].violations == 0
+
+
+def test_missions_need_no_tiers_but_places_do() -> None:
+    without = flown(0, ONE_BRIEFED | WITHOUT_TIERS)
+    assert missions_of(without) == {0}
+    off = flown(0, ONE_BRIEFED | MULTIHOP_OFF)
+    assert missions_of(off) == {-1, 0}
