@@ -274,8 +274,10 @@ class Candidate(NamedTuple):
 
 MAX_CANDIDATES = 8
 """Most candidates of a queue in one report."""
-Orders = Annotated[tuple[Order, ...], Meta(max_length=64)]
-Histogram = Annotated[bytes, Meta(min_length=0, max_length=64)]
+MAX_ORDERS = 16
+"""Most orders of a leader at one time."""
+Orders = Annotated[tuple[Order, ...], Meta(max_length=MAX_ORDERS)]
+Histogram = Annotated[bytes, Meta(min_length=0, max_length=16)]
 """Agents by distance from the vertex, one byte a bin; see agent.structure.histogram."""
 Members = Annotated[int, Meta(ge=0, le=MAX_TEAM)]
 Counts = Annotated[tuple[Members, ...], Meta(max_length=64)]

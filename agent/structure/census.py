@@ -75,6 +75,16 @@ class Census:
         """Whether there is a member of which others are to be told."""
         return bool(self._changed)
 
+    @property
+    def news_number(self) -> int:
+        """How many news one frame would hold, if there is room."""
+        return min(len(self._changed), NEWS)
+
+    @property
+    def labels(self) -> int:
+        """How many labels are passed on in one round."""
+        return min(len(self._labels), SHARED_LABELS)
+
     def hear(self, member: int, stamp_s: float, code: int) -> None:
         """Note a member heard directly, or the own agent."""
         if member >= self._ids:
@@ -158,16 +168,17 @@ class Census:
             if label and label * LABEL_S >= oldest_s - LAGS * lag_s
         ]
 
-    def wire(self, now_s: float) -> tuple[int, bytes]:
-        """Return the first id and the labels of one frame; of many ids other ones in each turn."""
-        first = self._from if self._from < len(self._labels) else 0
-        self._from = first + SHARED_LABELS
-        shared = self._labels[first : first + SHARED_LABELS]
-        return first, _packed([_on_the_radio(label, now_s) for label in shared])
+    def wire(self, now_s: float, most: int = SHARED_LABELS) -> tuple[int, bytes]:
+        """Return the first id and the labels of one frame; of more ids other ones in each turn."""
+        if most < 1:
+            return 0, b""
+        first, end = self._from, self._from + min(most, SHARED_LABELS)
+        self._from = end if end < len(self._labels) else 0
+        return first, _packed([_on_the_radio(each, now_s) for each in self._labels[first:end]])
 
-    def news(self, now_s: float) -> tuple[tuple[int, int], ...]:
+    def news(self, now_s: float, most: int = NEWS) -> tuple[tuple[int, int], ...]:
         """Return the labels of members whose queue changed; from then on others are told."""
-        told = sorted(self._changed)[:NEWS]
+        told = sorted(self._changed)[: min(most, NEWS)]
         self._changed.difference_update(told)
         return tuple([(member, _on_the_radio(self._labels[member], now_s)) for member in told])
 

@@ -28,15 +28,16 @@ class Convergecast:
     def hear(self, sender: int, report: TreeReport, stamp_s: float) -> None:
         """Take an agent's report; one that names another parent ends what it told before.
 
-        A report that was overtaken on its way counts for nothing.
+        A report that was overtaken on its way counts for nothing. One whose part that goes up had
+        no room in the frame leaves what was told before.
         """
         known = self._reports.get(sender)
         if known is not None and known[0] > stamp_s:
             return
-        if report.parent == self._own_id and report.up is not None:
-            self._reports[sender] = (stamp_s, report)
-        else:
+        if report.parent != self._own_id:
             self._reports.pop(sender, None)
+        elif report.up is not None:
+            self._reports[sender] = (stamp_s, report)
 
     def forget(self, oldest_s: float) -> None:
         """Drop reports with a stamp before that time [s]."""

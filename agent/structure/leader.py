@@ -9,7 +9,16 @@ the counts have followed or the time for it is over.
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from agent.messages import MAX_TEAM, Candidate, LeaderSummary, Order, Place, RootKey, Subtree
+from agent.messages import (
+    MAX_ORDERS,
+    MAX_TEAM,
+    Candidate,
+    LeaderSummary,
+    Order,
+    Place,
+    RootKey,
+    Subtree,
+)
 from agent.structure.census import Population
 from agent.structure.transfers import transfers
 from agent.structure.tree import version_at
@@ -17,7 +26,6 @@ from agent.structure.view import View
 
 CANDIDATES = 4
 """Most candidates of a queue for another one that are passed on."""
-MAX_ORDERS = 16
 FOLLOWED_S, FOLLOWED_LATENCIES = 2.5, 6.0
 """How long a leader waits for its orders to show in the counts."""
 COLLECTED_S, COLLECTED_LATENCIES = 1.0, 4.0

@@ -16,6 +16,14 @@ from agent.structure.census import Census
 from agent.structure.convergecast import ROUNDS, Convergecast, joined
 from agent.structure.link_timing import Timing
 from agent.structure.queue_map import QueueMap
+from agent.structure.summary_frame import (
+    LABEL_B,
+    NEWS_B,
+    ROOM_B,
+    ReportTurns,
+    length_of,
+    news_that_fit,
+)
 from agent.structure.tree import Tree
 
 NEWS_SHARE = 0.25
@@ -23,11 +31,11 @@ NEWS_SHARE = 0.25
 NEWS_LOST, LEAST_LOSS = 0.2, 0.05
 """News is repeated until a neighbour has missed it with less than this probability, if beacons are
 lost at all."""
-REPORTS = 6
-"""Most trees in one summary."""
 LABELS_EVERY = 2
 """Labels go out in each such round; in every round if beacons are lost."""
 LONGEST_ROUND_S = 10.0
+VERTICES_A_ROUND = 8
+"""Reports on more vertices than this may take longer than a round, and hold for longer."""
 
 
 class SlowLayer:
@@ -49,7 +57,10 @@ class SlowLayer:
         self._subtrees: list[Subtree | None] = [None for _ in vertices]
         self._offered: list[set[tuple[int, int]]] = [set() for _ in vertices]
         self._next_round_s = self._sent_s = -inf
-        self._rounds = self._repeats = self._turn = 0
+        self._rounds = self._repeats = 0
+        self._turns = ReportTurns()
+        self._labels = 0
+        """How many labels are still to be sent in this round."""
 
     def hear(self, heard: Sequence[HeardSummary], trees: Sequence[Tree], now_s: float) -> None:
         """Take what comes up and down the trees, and the labels of the census."""
@@ -69,7 +80,7 @@ class SlowLayer:
             return
         known = self.summaries[v]
         newer = known is None or known.root != down.root or down.version > known.version
-        if newer and len(down.counts) == len(self._map.homed[v]):
+        if newer and len(down.counts) == len(down.highest) == len(self._map.homed[v]):
             self.publish(v, down)
 
     def publish(self, vertex: int, summary: LeaderSummary) -> None:
@@ -98,7 +109,8 @@ class SlowLayer:
         taken by unidentified vehicles.
         """
         homed = self._map.homed[vertex]
-        rounds_s = ROUNDS * min(self._round_s, LONGEST_ROUND_S) / (1.0 - timing.loss)
+        rounds = ROUNDS * max(1.0, self._map.vertices / VERTICES_A_ROUND)
+        rounds_s = rounds * min(self._round_s, LONGEST_ROUND_S) / (1.0 - timing.loss)
         self._collected[vertex].forget(now_s - rounds_s - timing.latency_s)
         parts = self._collected[vertex].followers()
         found = joined([*parts, own] if own is not None else parts, len(homed))
@@ -120,37 +132,35 @@ class SlowLayer:
         """Return what is due on the multihop channel, None where nothing is."""
         if self.news or self._census.has_news:
             self._repeats = _enough_repeats(timing.loss)
-        share = NEWS_SHARE if self._repeats > 0 else 1.0
+        soon = self._repeats > 0 or self._turns.has_rest
+        share = NEWS_SHARE if soon else 1.0
         if now_s - self._sent_s < share * self._round_s - 1e-6:
             return None
         self._sent_s, self.news = now_s, False
         self._repeats = max(0, self._repeats - 1)
-        first, labels = self._labels(timing.loss, now_s)
-        return Summary(
-            mission=self._mission,
-            first=first,
-            labels=labels,
-            news=self._census.news(now_s),
-            trees=tuple(self._report(v, trees[v]) for v in self._reported(trees)),
-        )
+        self._begin_round(timing.loss, now_s)
+        return self._filled([self._report(v, tree) for v, tree in enumerate(trees)], now_s)
 
-    def _labels(self, loss: float, now_s: float) -> tuple[int, bytes]:
-        """Return the first id and the labels of this summary; none between rounds."""
+    def _begin_round(self, loss: float, now_s: float) -> None:
+        """Have labels sent, if a round begins now."""
         if now_s < self._next_round_s:
-            return 0, b""
+            return
         self._next_round_s = now_s + self._round_s - 1e-6
         self._rounds += 1
-        if loss < LEAST_LOSS and self._rounds % LABELS_EVERY != 1:
-            return 0, b""
-        return self._census.wire(now_s)
+        if loss >= LEAST_LOSS or self._rounds % LABELS_EVERY == 1:
+            self._labels = self._census.labels
 
-    def _reported(self, trees: Sequence[Tree]) -> list[int]:
-        """Return the vertices of one summary: as many as fit, other ones in each turn."""
-        known = [v for v, tree in enumerate(trees) if tree.tier >= 0]
-        if len(known) <= REPORTS:
-            return known
-        self._turn = (self._turn + REPORTS) % len(known)
-        return sorted((known + known)[self._turn : self._turn + REPORTS])
+    def _filled(self, reports: Sequence[TreeReport], now_s: float) -> Summary:
+        """Return a summary with as much as fits: reports first, then news, then labels."""
+        known = [each for each in reports if each.tier >= 0]
+        waiting_b = NEWS_B * self._census.news_number + LABEL_B * self._labels
+        trees = self._turns.take(known, waiting_b)
+        room_b = ROOM_B - length_of(trees)
+        news = self._census.news(now_s, news_that_fit(room_b, self._labels))
+        room_b -= NEWS_B * len(news)
+        first, labels = self._census.wire(now_s, min(self._labels, room_b // LABEL_B))
+        self._labels -= len(labels) // LABEL_B
+        return Summary(mission=self._mission, first=first, labels=labels, news=news, trees=trees)
 
     def _report(self, vertex: int, tree: Tree) -> TreeReport:
         return TreeReport(

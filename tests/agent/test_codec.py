@@ -262,7 +262,7 @@ leader_summaries = st.builds(
     total=members,
     counts=member_counts,
     highest=member_counts,
-    histogram=st.binary(max_size=64),
+    histogram=st.binary(max_size=16),
     go=st.booleans(),
     order=counts,
     orders=st.lists(st.builds(Order, agent=ids, queue=indices, to=indices), max_size=3).map(tuple),
@@ -272,7 +272,7 @@ candidates = st.builds(Candidate, extra_dm=st.integers(-(2**31), 2**31 - 1), age
 subtrees = st.builds(
     Subtree,
     highest=member_counts,
-    histogram=st.binary(max_size=64),
+    histogram=st.binary(max_size=16),
     candidates=st.lists(st.lists(candidates, max_size=3).map(tuple), max_size=3).map(tuple),
     blocked=blocked,
 )

@@ -72,8 +72,15 @@ def test_a_follower_counts_once_and_not_after_it_left():
     assert [each.highest for each in known.followers()] == [(2, 0), (3, 0)]
     known.hear(3, report(subtree(highest=(2, 0)), parent=4), 3.0)
     assert [each.highest for each in known.followers()] == [(3, 0)]
-    known.hear(4, report(None), 3.0)
+    known.hear(4, report(None, parent=3), 3.0)
     assert known.followers() == []
+
+
+def test_a_report_without_room_for_what_goes_up_leaves_what_was_told():
+    known = Convergecast(OWN)
+    known.hear(3, report(subtree(highest=(1, 0))), 1.0)
+    known.hear(3, report(None), 2.0)
+    assert [each.highest for each in known.followers()] == [(1, 0)]
 
 
 def test_a_report_that_was_overtaken_counts_for_nothing():
