@@ -28,6 +28,9 @@ from netem.wire.channels import LOCAL, MULTIHOP, Channel
 
 REMEMBERED_BEACONS = 200
 """How many own sending times are kept, for echoes that may come."""
+NEWS_SHARE, PIECES_SOON = 0.25, 8
+"""A mission that a neighbour lacks goes out after this share of a round, so many times; then once a
+round, as a Trickle timer does (RFC 6206): the neighbour may not hear this agent."""
 MAX_ECHOES = 8
 """Most echoes of one beacon; of more neighbours others have their turn in the next."""
 
@@ -78,6 +81,8 @@ class Broadcast:
         self._round_period_s = round_period_s
         self._next_beacon_s = 0.0
         self._next_round_s = 0.0 if round_period_s < inf else inf
+        self._pieces_key: int | None = None
+        self._pieces_sent, self._next_pieces_s = 0, inf
         self.sequence = 0
         self.sent_s: dict[int, float] = {}
 
@@ -91,7 +96,8 @@ class Broadcast:
     ) -> tuple[tuple[Channel, bytes], ...]:
         """Return the frames due now, as (channel, payload).
 
-        pieces: of the mission, if a neighbour lacks it; they go out with the next multihop round.
+        pieces: of the mission, if a neighbour lacks it; they go out several times in a row, then
+        with each multihop round.
         """
         frames: list[tuple[Channel, bytes]] = []
         if now_s >= self._next_beacon_s:
@@ -100,11 +106,26 @@ class Broadcast:
         if now_s >= self._next_round_s:
             self._next_round_s = now_s + self._round_period_s - 1e-9
             record = self._record(now_s, own) if self._relays else None
-            frames.extend((MULTIHOP, frame) for frame in table.frames(now_s, record, pieces))
+            frames.extend((MULTIHOP, frame) for frame in table.frames(now_s, record))
+        if self._pieces_due(now_s, pieces):
+            frames.extend((MULTIHOP, frame) for frame in table.frames(now_s, None, pieces))
         if own.summary is not None and self._round_period_s < inf:
             gossip = Gossip(self._id, now_s, records=(), piece=None, summary=own.summary)
             frames.append((MULTIHOP, add_checksum(encode(gossip))))
         return tuple(frames)
+
+    def _pieces_due(self, now_s: float, pieces: Sequence[Piece]) -> bool:
+        """Whether the pieces of a mission go out now: sooner at first, for it is news."""
+        key = pieces[0].key if pieces else None
+        if key != self._pieces_key:
+            self._pieces_key, self._pieces_sent = key, 0
+            self._next_pieces_s = now_s if self._round_period_s < inf else inf
+        if not pieces or now_s < self._next_pieces_s:
+            return False
+        self._pieces_sent += 1
+        share = NEWS_SHARE if self._pieces_sent < PIECES_SOON else 1.0
+        self._next_pieces_s = now_s + share * self._round_period_s - 1e-9
+        return True
 
     def _beacon(self, now_s: float, own: OwnState, echoes: tuple[tuple[int, int], ...]) -> Beacon:
         sequence = self._next_sequence(now_s)

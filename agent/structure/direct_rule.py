@@ -37,6 +37,8 @@ class DirectRule:
         self._guessed: tuple[int, ...] | None = None
         """Among which members the last guess was made."""
         self._guess: Place | None = None
+        self._around: tuple[int, ...] = ()
+        self._around_since_s = now_s
 
     def update(self, view: View, claim: Claim) -> None:
         """Decide anew whether the rule applies."""
@@ -84,23 +86,28 @@ class DirectRule:
         return self._full_since_s is not None and not self.applies
 
     def guess(self, view: View, claim: Claim) -> Place | None:
-        """Return the place that the assignment over the members heard gives, without claiming it.
+        """Return the place that the assignment over all neighbours gives, without claiming it.
 
         Where they are the whole team this is the place that the agent will take, so that it flies
         there at once. None where too few are heard to tell, or so many that it takes too long.
         """
-        settled = view.now_s - self._same_since_s >= GUESS_AFTER_S + view.timing.latency_s
-        if len(view.heard) > MOST_GUESSED:
+        if not 0 < len(view.around) <= MOST_GUESSED:
             return None
-        if settled and view.heard and self._guessed != self._ids:
-            self._guessed = self._ids
-            self._guess = self._likely_place(view, claim)
+        ids = tuple([h.id for h in view.around])
+        if ids != self._around:
+            self._around, self._around_since_s = ids, view.now_s
+        settled = view.now_s - self._around_since_s >= GUESS_AFTER_S + view.timing.latency_s
+        if settled and self._guessed != ids:
+            self._guessed = ids
+            self._guess = self._likely_place(view)
         return self._guess
 
-    def _likely_place(self, view: View, claim: Claim) -> Place | None:
+    def _likely_place(self, view: View) -> Place | None:
         """Return the place that the own agent is likely to get, once the nearest lead."""
-        team = self._team(view, claim)
-        layout = view.map.formation.layout(len(view.heard) + 1, view.blocked)
+        team = [Peer(self._own_id, view.here, None)]
+        team += [Peer(h.id, h.position, None) for h in view.around]
+        team.sort()
+        layout = view.map.formation.layout(len(team), view.blocked)
         places = list(layout.places)
         for place in [p for p in layout.places if p in view.map.vertex_of]:
             point = view.frame.to_world(layout.slots[place].point)

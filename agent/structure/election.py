@@ -63,13 +63,17 @@ class Election:
     def _is_nearest(self, view: View, vertex: int) -> bool:
         """Whether no agent heard is nearer to the vertex and may lead it."""
         own = (view.to_vertex(vertex), self._own_id)
+        early = view.now_s - self._started_s < ALONE_S
         return all(
             (view.to_vertex(vertex, other.position), other.id) > own
-            for other in view.heard
+            for other in (view.around if early else view.heard)
             if self._may_lead(view, other, vertex)
         )
 
     def _may_lead(self, view: View, other: Heard, vertex: int) -> bool:
+        """Whether another agent may lead; one that flies an older mission, once it has this one."""
+        if other.mission != view.mission:
+            return other.mission < view.mission
         queue = queue_of(other)
         return not leads(other) and (queue < 0 or vertex in view.map.vertices_of[queue])
 

@@ -90,10 +90,8 @@ class Structure:
         return self._target(view)
 
     def _look(self, senses: Senses, mission: Flown) -> View:
-        heard = [
-            h for h in senses.neighbours if h.standing is not None and h.mission == mission.key
-        ]
-        view = View(senses.now_s, senses.position, heard, self._map, mission.frame)
+        around, frame = senses.neighbours, mission.frame
+        view = View(senses.now_s, senses.position, around, mission.key, self._map, frame)
         view.timing = timing_of(senses.link, self._beacon_s)
         view.blocked = self._blocked
         return view
@@ -221,7 +219,7 @@ class Structure:
 
     def _guessed_slot(self, view: View) -> Slot | None:
         place = self._direct.guess(view, self.claim)
-        return self._map.formation.slot(place, len(view.heard) + 1) if place is not None else None
+        return self._map.formation.slot(place, len(view.around) + 1) if place is not None else None
 
     def _shortened(self, view: View, own: OwnTarget | None) -> OwnTarget | None:
         """Return the target for now: a push may lead past the tail, which is no place to fly to."""

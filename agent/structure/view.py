@@ -16,19 +16,22 @@ from agent.structure.queue_map import QueueMap
 class View:
     """One agent's knowledge at one time.
 
-    heard: the members heard that fly the same mission. summaries: of each vertex's leader, None
-    where none was heard. blocked: places that are not available (E18).
+    around: all neighbours; heard: those that fly the same mission. summaries: of each vertex's
+    leader, None where none was heard. blocked: places that are not available (E18).
     """
 
     def __init__(
         self,
         now_s: float,
         here: Vector,
-        heard: Sequence[Heard],
+        around: Sequence[Heard],
+        mission: int,
         formation: QueueMap,
         frame: Frame,
     ) -> None:
-        self.now_s, self.here, self.heard = now_s, here, heard
+        self.now_s, self.here, self.around = now_s, here, around
+        self.mission = mission
+        self.heard = [h for h in around if h.standing is not None and h.mission == mission]
         self.map, self.frame = formation, frame
         self.timing: Timing
         self.summaries: Sequence[LeaderSummary | None] = ()
