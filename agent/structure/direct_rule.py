@@ -89,13 +89,16 @@ class DirectRule:
         """Return the place that the assignment over all neighbours gives, without claiming it.
 
         Where they are the whole team this is the place that the agent will take, so that it flies
-        there at once. None where too few are heard to tell, or so many that it takes too long.
+        there at once. None where a neighbour hears more, or where so many are heard that it takes
+        too long.
         """
         if not 0 < len(view.around) <= MOST_GUESSED:
             return None
         ids = tuple([h.id for h in view.around])
         if ids != self._around:
             self._around, self._around_since_s = ids, view.now_s
+        if any(h.standing is not None and h.standing.heard > len(ids) + 1 for h in view.around):
+            return None
         settled = view.now_s - self._around_since_s >= GUESS_AFTER_S + view.timing.latency_s
         if settled and self._guessed != ids:
             self._guessed = ids

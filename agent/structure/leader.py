@@ -28,6 +28,9 @@ CANDIDATES = 4
 """Most candidates of a queue for another one that are passed on."""
 FOLLOWED_S, FOLLOWED_LATENCIES = 2.5, 6.0
 """How long a leader waits for its orders to show in the counts."""
+BEYOND_S, MOST_BEYOND_S = 0.45, 1.2
+"""The first counts must be steady for so much longer where the team is three times as large as those
+heard, four times and so on."""
 COLLECTED_S, COLLECTED_LATENCIES = 1.0, 4.0
 """How long it waits for candidates to come up the tiers, if there are too few."""
 
@@ -84,11 +87,18 @@ class Leader:
             # What an agent counted before it led counts too.
             self._since_s = view.now_s if self._counted is not None else population.changed_s
             self._counted = counted
-        timing = view.timing
-        wait_s = timing.resettle_s if self._go else timing.settle_s
+        wait_s = view.timing.resettle_s if self._go else self._first_wait_s(view, counted.total)
         if not self._go and counted.total < len(view.heard) + 1:
             return False
         return view.now_s - self._since_s >= wait_s - 1e-9 and counted.total > 0
+
+    def _first_wait_s(self, view: View, total: int) -> float:
+        """Return how long the first counts must be steady [s]: longer for news from farther away.
+
+        Numbers taken too early move many agents for nothing, and cost more than the wait.
+        """
+        beyond = total / (len(view.heard) + 1) - 2.0
+        return view.timing.settle_s + min(MOST_BEYOND_S, BEYOND_S * max(0.0, beyond))
 
     def _follow_up(self, view: View, population: Population) -> None:
         """Take orders back once they have been followed, or have had the time for it."""

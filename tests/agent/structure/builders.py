@@ -61,13 +61,15 @@ def standing(**fields):
     return Standing(**{**defaults, **fields})
 
 
-def heard(agent, at=ZERO, place=None, *, age_s=0.0, cost_m=0.0, hears_me=True, **fields):
+def heard(
+    agent, at=ZERO, place=None, *, velocity=ZERO, age_s=0.0, cost_m=0.0, hears_me=True, **fields
+):
     """Return a neighbour; the other fields are those of its standing."""
     return Heard(
         id=agent,
         age_s=age_s,
         position=at,
-        velocity=ZERO,
+        velocity=velocity,
         target=at,
         place=place,
         cost_m=cost_m,

@@ -45,7 +45,8 @@ def told(known, now_s=NOW_S, regular=True):
 
 
 def counted(known, now_s=NOW_S):
-    return known.population(now_s, LOST_S, QUEUES, VERTICES)
+    """Return who is there, whenever that was learnt."""
+    return known.population(now_s, LOST_S, QUEUES, VERTICES)._replace(changed_s=0.0)
 
 
 def content(known):

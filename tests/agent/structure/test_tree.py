@@ -12,8 +12,8 @@ from agent.controller import Link
 from agent.messages import ZERO, Branch, RootKey
 from agent.structure.link_timing import timing_of
 from agent.structure.tree import (
-    NEW_PARENT_WITHIN,
-    PARENT_WITHIN,
+    NEW_PARENT_STAYS_S,
+    PARENT_STAYS_S,
     REVIVAL_S,
     Follower,
     Tree,
@@ -98,8 +98,8 @@ def scattered(random, agents, side_m):
 
 
 def check_spans(team, root=0):
-    """Check that who is connected has a tier within the bounds of the margin, and a parent."""
-    best, sure = team.hops(REACH_M, root), team.hops(NEW_PARENT_WITHIN * REACH_M, root)
+    """Check that who is connected has the tier of the fewest hops, and a parent."""
+    best = team.hops(REACH_M, root)
     for own in team.alive:
         tier, parent = team.place(own)
         if best[own] == inf:
@@ -107,8 +107,7 @@ def check_spans(team, root=0):
         elif own == root:
             assert (tier, parent) == (0, -1)
         else:
-            assert best[own] <= tier
-            assert tier <= sure[own]
+            assert tier == best[own]
             assert tier == team.trees[parent].tier + 1
             assert dist(team.points[own], team.points[parent]) <= REACH_M
     for own in team.alive:
@@ -182,8 +181,8 @@ def follow(tree, now_s, *followers, leading=None):
     tree.follow_root(now_s, followers, leading, TIMING)
 
 
-def near(agent, at=(1.0, 0.0, 0.0), hears_me=True, **fields):
-    return Follower(heard(agent, at, hears_me=hears_me), branch(**fields))
+def near(agent, at=(1.0, 0.0, 0.0), hears_me=True, velocity=ZERO, **fields):
+    return Follower(heard(agent, at, hears_me=hears_me, velocity=velocity), branch(**fields))
 
 
 def test_a_version_from_the_future_is_ignored():
@@ -252,13 +251,24 @@ def test_the_parent_is_kept_while_it_is_as_good():
     assert tree.tier == 2
 
 
-def test_near_the_edge_of_its_range_a_parent_is_kept_but_not_taken():
-    edge = (0.5 * (NEW_PARENT_WITHIN + PARENT_WITHIN) * REACH_M, 0.0, 0.0)
-    fresh = Tree(9, 5.0)
-    assert chosen(fresh, near(4, edge, tier=1), near(5, tier=1, parent=1)) == 5
+def leaving(stays_s):
+    """Return an agent of tier 1 that flies out of range within a time [s]."""
+    return near(4, (REACH_M - 0.5 * stays_s, 0.0, 0.0), velocity=(0.5, 0.0, 0.0), tier=1)
+
+
+def test_an_agent_that_soon_leaves_the_range_is_kept_but_not_taken():
+    other = near(5, tier=2, parent=1)
+    soon = leaving(0.5 * (PARENT_STAYS_S + NEW_PARENT_STAYS_S))
+    assert chosen(Tree(9, 5.0), soon, other) == 5
     kept = Tree(9, 5.0)
     assert chosen(kept, near(4, tier=1)) == 4
-    assert chosen(kept, near(4, edge, tier=1), near(5, tier=1, parent=1)) == 4
+    assert chosen(kept, soon, other) == 4
+    assert chosen(kept, leaving(0.5 * PARENT_STAYS_S), other) == 5, "lost at once"
+
+
+def test_an_agent_at_the_edge_of_the_range_that_stays_there_is_as_good_as_any():
+    edge = near(4, (REACH_M, 0.0, 0.0), tier=1)
+    assert chosen(Tree(9, 5.0), edge, near(5, tier=2, parent=1)) == 4
 
 
 def test_who_does_not_hear_the_agent_is_no_parent_if_another_is_as_near_to_the_root():
