@@ -70,7 +70,15 @@ def test_a_mission_that_cannot_spread_to_who_needs_it_is_a_warning(keys: dict[st
 
 
 def test_a_team_that_is_briefed_and_stays_needs_no_channel_for_missions() -> None:
-    assert not warnings_for(wedge(comms__multihop_hz="0", event="[{ at_s = 1, kill = [0] }]"))
+    keys = {"comms__multihop_hz": "0", "event": "[{ at_s = 1, kill = [0] }]"}
+    assert not warnings_for(wedge(control__allocation="assignment", **keys))
+    assert not warnings_for(wedge(control__controller="flocking", **keys))
+
+
+def test_leaders_without_their_channel_are_a_warning() -> None:
+    (warning,) = warnings_for(wedge(comms__multihop_hz="0"))
+    assert warning.key == "comms.multihop_hz"
+    assert "nobody but a leader takes a place" in warning.detail
 
 
 @pytest.mark.parametrize(

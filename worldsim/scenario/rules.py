@@ -315,17 +315,26 @@ def _someone_knows_the_mission(scenario: Scenario) -> Problem | None:
     return Problem("fleet.briefed", detail)
 
 
-def _mission_can_spread(scenario: Scenario) -> Problem | None:
-    """Warn where an agent has to learn the mission by a channel that is off."""
+def _slow_channel_is_on(scenario: Scenario) -> Problem | None:
+    """Warn where agents need a channel that is off: for the mission, or for counts and orders."""
     if scenario.comms.multihop_hz > 0.0 or not scenario.expect.converge:
         return None
     unbriefed = [i for i in range(scenario.fleet.agents) if not scenario.is_briefed(i, 0)]
-    if not unbriefed and not any(map(_starts_agents, scenario.event)):
+    if unbriefed or any(map(_starts_agents, scenario.event)):
+        return Problem(
+            "comms.multihop_hz",
+            "the mission spreads on this channel, which is off: an agent that is not briefed, joins"
+            " or restarts never learns it",
+        )
+    control = scenario.control
+    if control.controller != "q_structure" or control.allocation != "structure":
+        return None
+    if scenario.rows == 1:
         return None
     return Problem(
         "comms.multihop_hz",
-        "the mission spreads on this channel, which is off: an agent that is not briefed, joins or"
-        " restarts never learns it",
+        "leaders count and order their queues on this channel, which is off: nobody but a leader"
+        " takes a place; control.allocation = 'assignment' needs no leaders",
     )
 
 
@@ -368,6 +377,6 @@ WARNINGS = (
     _long_enough_to_converge,
     _frame_slow_enough,
     _someone_knows_the_mission,
-    _mission_can_spread,
+    _slow_channel_is_on,
     *SAFETY_WARNINGS,
 )
