@@ -1,1 +1,1 @@
-"""Communication: neighbours, gossip, missions and the hierarchy."""
+"""Communication: broadcasts, neighbours, records of members, and missions."""
