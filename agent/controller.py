@@ -51,7 +51,7 @@ class Link(NamedTuple):
 
     loss: float  # share of beacons lost, from gaps in their sequence
     latency_s: float  # mean delay of beacons [s]
-    reach_m: float  # from how far a neighbour was heard at most [m]
+    reach_m: float  # from how far two neighbours were heard, or the only one [m]
 
 
 UNHEARD = Link(loss=0.0, latency_s=0.0, reach_m=inf)

@@ -4,7 +4,7 @@ A pure state machine: the time comes with each observation. The shells around it
 Zenoh, or virtual time) only carry bytes.
 """
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from math import dist, hypot, inf
 from typing import NamedTuple, assert_never
@@ -45,8 +45,8 @@ from agent.sensing.obstacle_perception import ObstaclePerception
 from netem.wire import channels
 from netem.wire.channels import Channel
 
-MAX_SUMMARIES = 256
-"""Most summaries taken in one step."""
+MAX_SUMMARIES = 8
+"""Most summaries of one sender taken in one step: its latest."""
 HOUSEKEEPING_S = 0.2
 """Period of what need not be done every tick [s]."""
 IMPLAUSIBLE_SPEEDS = 4.0
@@ -98,7 +98,7 @@ class Agent:
             setup.ids,
             setup.control.allocation,
         )
-        self._summaries: list[HeardSummary] = []
+        self._summaries: dict[int, deque[HeardSummary]] = {}
         self._unidentified_vehicles = UnidentifiedVehicles(setup.fleet_max_speed_mps)
         self._unidentified: tuple[Vector, ...] = ()
         self._blocked: frozenset[Place] = frozenset()
@@ -190,8 +190,9 @@ class Agent:
         if gossip.stamp_s > now_s + self._slack_s:
             raise RejectedError("future", f"the stamp is {gossip.stamp_s - now_s:.3f} s ahead")
         self._table.adopt(gossip, now_s, self._slack_s)
-        if gossip.summary is not None and len(self._summaries) < MAX_SUMMARIES:
-            self._summaries.append(HeardSummary(source, gossip.stamp_s, gossip.summary))
+        if gossip.summary is not None:
+            heard = self._summaries.setdefault(source, deque(maxlen=MAX_SUMMARIES))
+            heard.append(HeardSummary(source, gossip.stamp_s, gossip.summary))
         if gossip.piece is not None:
             self._missions.receive(gossip.piece, source, now_s)
 
@@ -204,7 +205,7 @@ class Agent:
         place = self._intent.place if self._intent is not None else None
         cost_m = self._intent.cost_m if self._intent is not None else None
         own = Peer(id=self.id, position=observation.position, place=place, cost_m=cost_m)
-        summaries, self._summaries = tuple(self._summaries), []
+        summaries, self._summaries = self._summaries, {}
         return Senses(
             now_s=now_s,
             position=observation.position,
@@ -217,7 +218,7 @@ class Agent:
             silent=self._unidentified,
             blocked=self._blocked,
             link=self._link,
-            summaries=summaries,
+            summaries=tuple(each for heard in summaries.values() for each in heard),
             obstacles=self._obstacles(observation),
         )
 

@@ -25,6 +25,8 @@ HEARD_BY_OTHERS = 0.25
 """Share of T_lost by which others may hear a departing agent's last beacon later."""
 POOLED = 0.005
 """Weight of one beacon in the radio's quality: it follows from the last 200 beacons or so."""
+WITNESSES = 2
+"""So many neighbours must have been heard from a distance until it counts as within reach."""
 ECHO_LASTS_S = 3.0
 """A neighbour that echoed a beacon hears this agent for so long."""
 SMOOTHING = 0.05
@@ -59,7 +61,8 @@ class LinkQuality:
 
     def __init__(self) -> None:
         self._beacons = self._sent = self._latency_s = 0.0
-        self._reach_m = 0.0
+        self._farthest_m: dict[int, float] = {}
+        """The two neighbours that were heard from farthest away."""
 
     def note(self, gap: float, latency_s: float) -> None:
         """Note a beacon heard. gap: beacons that its sender has sent since the last one heard."""
@@ -67,9 +70,16 @@ class LinkQuality:
         self._sent += gap - POOLED * self._sent
         self._latency_s += latency_s - POOLED * self._latency_s
 
-    def note_distance(self, away_m: float) -> None:
-        """Note from how far a neighbour was heard [m]."""
-        self._reach_m = max(self._reach_m, away_m)
+    def note_distance(self, sender: int, away_m: float) -> None:
+        """Note from how far a neighbour was heard [m].
+
+        The reach is the second farthest: a neighbour that lies about its position cannot stretch
+        it. While only one neighbour was heard, there is only that one.
+        """
+        farthest = self._farthest_m
+        farthest[sender] = max(farthest.get(sender, 0.0), away_m)
+        if len(farthest) > WITNESSES:
+            del farthest[min(farthest, key=farthest.__getitem__)]
 
     def link(self) -> Link:
         """Return the quality now."""
@@ -78,7 +88,7 @@ class LinkQuality:
         return Link(
             loss=max(0.0, 1.0 - self._beacons / self._sent),
             latency_s=self._latency_s / self._beacons,
-            reach_m=self._reach_m,
+            reach_m=min(self._farthest_m.values(), default=inf),
         )
 
 
@@ -176,7 +186,7 @@ class Neighbours:
     def link(self, here: Vector) -> Link:
         """Return the radio's quality as measured. here: own position [m; world frame]."""
         for known in self._in_order:
-            self._quality.note_distance(dist(here, known.beacon.position))
+            self._quality.note_distance(known.beacon.id, dist(here, known.beacon.position))
         return self._quality.link()
 
     def _contradicts_echo(self, beacon: Beacon, own_sent_s: dict[int, float]) -> bool:

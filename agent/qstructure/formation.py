@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from agent.messages import Place, Vector
+from agent.messages import MAX_TEAM, Place, Vector
 from agent.qstructure.curve import CurveError
 from agent.qstructure.expression import ExpressionError
 from agent.qstructure.formation_tables import (
@@ -39,6 +39,8 @@ __all__ = [
 ]
 
 NO_PLACES: frozenset[Place] = frozenset()
+MAX_RANK = 2 * MAX_TEAM
+"""A place of a higher rank is none: no team reaches it, and to measure its queue takes long."""
 LAYOUTS_KEPT = 128
 FORMATIONS_KEPT = 32
 
@@ -98,7 +100,7 @@ class Formation:
         if not 0 <= place.queue < len(self.queues) or place.rank < 1:
             return None
         queue = self.queues[place.queue]
-        if queue.closed or queue.usable(place.rank) < place.rank:
+        if queue.closed or place.rank > MAX_RANK or queue.usable(place.rank) < place.rank:
             return None
         return self.slot_at(place.queue, queue.behind(place.rank))
 

@@ -17,7 +17,7 @@ from array import array
 from collections import Counter
 from typing import NamedTuple
 
-from agent.messages import MAX_LABELS_B, Summary
+from agent.messages import MAX_LABELS_B, MAX_TEAM, Summary
 
 QUANTUM_S = 0.25
 """Resolution of a label's time [s]."""
@@ -34,6 +34,8 @@ WORTH_QUANTA = 2
 LAG_SMOOTHING = 0.25
 LAGS = 2.0
 """A label may stand still for so many of its usual lags, besides T_lost."""
+MAX_LAG_S = MAX_QUANTA * QUANTUM_S / LAGS
+"""Greatest lag that counts [s]: a label that is older than LAGS of these is not sent at all."""
 MAX_LABELLED = 2**14
 """Ids from here on are not counted."""
 LABEL_S = QUANTUM_S / CODES
@@ -69,6 +71,11 @@ class Census:
         """When a member that has been silent for too long was last asked for [s]."""
         self._from = 0
         self._changed_s = 0.0
+
+    @property
+    def most(self) -> int:
+        """The greatest number of members."""
+        return min(self._ids, MAX_TEAM)
 
     @property
     def has_news(self) -> bool:
@@ -138,7 +145,7 @@ class Census:
     def _adopt(self, member: int, label: int, now_s: float) -> None:
         if member == self._own:
             return
-        lag_s = max(now_s - label // CODES * QUANTUM_S, 0.0)
+        lag_s = min(max(now_s - label // CODES * QUANTUM_S, 0.0), MAX_LAG_S)
         self._lag_s[member] += LAG_SMOOTHING * (lag_s - self._lag_s[member])
         self._set(member, label, now_s)
 

@@ -75,7 +75,8 @@ class Election:
         if other.mission != view.mission:
             return other.mission < view.mission
         queue = queue_of(other)
-        return not leads(other) and (queue < 0 or vertex in view.map.vertices_of[queue])
+        may = not 0 <= queue < view.map.queues or vertex in view.map.vertices_of[queue]
+        return may and not leads(other)
 
     def _is_first(self, view: View, claim: Claim, vertex: int) -> bool:
         """Whether no member heard of the own queue stands nearer to the vertex."""

@@ -9,6 +9,7 @@ the tail. Gaps close inwards.
 from math import inf
 
 from agent.controller import Heard
+from agent.messages import MAX_TEAM
 from agent.structure import histogram
 from agent.structure.claim import Claim
 from agent.structure.view import View
@@ -147,9 +148,10 @@ class Numbers:
         return True
 
     def _next(self, view: View, claim: Claim, taken: frozenset[int]) -> int:
-        """Return the next number up the queue; a closed queue begins again."""
+        """Return the next number up the queue; after its last it begins again."""
         number = _available(claim.number + 1, taken)
-        if view.map.closed[claim.queue] and number > view.extent(claim.queue):
+        last = view.extent(claim.queue) if view.map.closed[claim.queue] else MAX_TEAM
+        if number > last:
             return _available(1, taken)
         return number
 

@@ -7,7 +7,7 @@ tiers: a candidate, with the extra way that it would have.
 
 from math import inf
 
-from agent.messages import Candidate, Order
+from agent.messages import MAX_TEAM, Candidate, Order
 from agent.structure.claim import NO_QUEUE, Claim
 from agent.structure.transfers import transfers
 from agent.structure.view import View, leads
@@ -41,7 +41,8 @@ class QueueChoice:
         unplaced = sorted(
             [self._own_id, *(h.id for h in view.heard if view.number_of(h) < 1 and not leads(h))]
         )
-        shares = view.map.members(max(view.total, sum(view.counts) + len(unplaced)), view.blocked)
+        agents = min(max(view.total, sum(view.counts) + len(unplaced)), MAX_TEAM)
+        shares = view.map.members(agents, view.blocked)
         lacking = [max(0, share - n) for share, n in zip(shares, view.counts, strict=True)]
         places = [j for j, number in enumerate(lacking) for _ in range(number)]
         if not places:

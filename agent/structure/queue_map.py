@@ -97,11 +97,11 @@ class QueueMap:
         """
         if number < 1:
             return None
-        slots = (
-            self._slots_between(queue, members)
-            if self.closed[queue]
-            else self._slots_behind(queue, min(number, MAX_TEAM))
-        )
+        if self.closed[queue]:
+            room = self.formation.queues[queue].room or 0
+            slots = self._slots_between(queue, min(max(1, members), room))
+        else:
+            slots = self._slots_behind(queue, min(number, MAX_TEAM))
         return slots[number - 1] if number <= len(slots) else None
 
     def nearest(self, queue: int, members: int, here: Vector) -> Nearest | None:
@@ -127,9 +127,8 @@ class QueueMap:
         return slots
 
     def _measured_between(self, queue: int, members: int) -> list[Slot]:
-        geometry = self.formation.queues[queue]
-        members = min(max(1, members), geometry.room or 0)
-        slots = [self.formation.slot_at(queue, s) for s in geometry.members(members)]
+        arc_lengths = self.formation.queues[queue].members(members)
+        slots = [self.formation.slot_at(queue, s) for s in arc_lengths]
         return [slot for slot in slots if slot is not None]
 
     def _members(self, agents: int, blocked: frozenset[Place] = NO_PLACES) -> tuple[int, ...]:

@@ -24,7 +24,7 @@ from agent.structure.summary_frame import (
     length_of,
     news_that_fit,
 )
-from agent.structure.tree import Tree
+from agent.structure.tree import Tree, latest_version
 
 NEWS_SHARE = 0.25
 """With news the next summary comes after this share of a round."""
@@ -71,17 +71,27 @@ class SlowLayer:
             for report in summary.trees:
                 if report.vertex < len(trees):
                     self._collected[report.vertex].hear(sender, report, stamp_s)
-                    self._take_down(report, trees[report.vertex])
+                    self._take_down(report, trees[report.vertex], now_s)
 
-    def _take_down(self, report: TreeReport, tree: Tree) -> None:
+    def _take_down(self, report: TreeReport, tree: Tree, now_s: float) -> None:
         """Take a leader's summary from an agent of a lower tier."""
         v, down = report.vertex, report.down
         if down is None or down.root != tree.root or not 0 <= report.tier < tree.tier:
             return
         known = self.summaries[v]
         newer = known is None or known.root != down.root or down.version > known.version
-        if newer and len(down.counts) == len(down.highest) == len(self._map.homed[v]):
+        if newer and self._is_plausible(v, down, now_s):
             self.publish(v, down)
+
+    def _is_plausible(self, vertex: int, down: LeaderSummary, now_s: float) -> bool:
+        """Whether a leader may have written a summary by now.
+
+        An invented version or order ahead of its time would shut out all that follow.
+        """
+        queues = len(self._map.homed[vertex])
+        fits = len(down.counts) == len(down.highest) == queues
+        in_time = down.order <= down.version <= latest_version(now_s)
+        return fits and in_time and sum(down.counts) <= down.total <= self._census.most
 
     def publish(self, vertex: int, summary: LeaderSummary) -> None:
         """Keep a leader's latest summary; what agents act on at once is news."""

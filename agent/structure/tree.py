@@ -42,6 +42,11 @@ def version_at(time_s: float) -> int:
     return round(time_s * VERSIONS_PER_S)
 
 
+def latest_version(now_s: float) -> int:
+    """Return the latest version that a root may have stated by now: clocks and stamps differ."""
+    return version_at(now_s + 1.0)
+
+
 class Tree:
     """One agent's view of one vertex's tree, with its own ``parent`` and ``tier``."""
 
@@ -79,7 +84,7 @@ class Tree:
         elif self.root is not None and now_s - self.advanced_s > timing.root_s:
             self._make_void(self.root)
             self.root = None
-        latest = version_at(now_s + 1.0)
+        latest = latest_version(now_s)
         for _, branch in followers:
             self._compare(branch, now_s, latest)
         return self.root != leading

@@ -110,6 +110,8 @@ class View:
 
     def point(self, queue: int, number: int) -> Vector | None:
         """Return a member's place [m; world frame]; None where there is none."""
+        if not 0 <= queue < self.map.queues:
+            return None
         slot = self.map.slot(queue, number, self.extent(queue, number))
         return self.frame.to_world(slot.point) if slot is not None else None
 

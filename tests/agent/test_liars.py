@@ -1,19 +1,37 @@
 """One member that lies with its own credentials: its lies are bounded, and the agent flies on."""
 
+from random import Random
 from time import process_time
 
 import msgspec
 import pytest
 
-from agent.codec import add_checksum, decode_beacon, encode
+from agent.codec import add_checksum, decode_beacon, decode_gossip, encode
 from agent.comms.mission import FIRST_VERSIONS, FRAME_VERSIONS_AHEAD, KEYS_PER_VERSION
+from agent.comms.neighbours import Neighbours
 from agent.config import AgentSetup, Comms, Control, Vehicle
+from agent.controller import Flown, Senses
 from agent.core import Agent
-from agent.messages import AT_HOME, PIECE_B, Drift, FramePath, Mission, Piece, Pose
-from agent.qstructure.formation import FormationSpec
+from agent.messages import (
+    AT_HOME,
+    PIECE_B,
+    Branch,
+    Drift,
+    FramePath,
+    Mission,
+    Piece,
+    Pose,
+    RootKey,
+    Summary,
+)
+from agent.qstructure.formation import FormationSpec, formation_of
+from agent.qstructure.target_frame import Frame
+from agent.structure.census import FIRST_QUEUE
 from netem.wire.channels import LOCAL, MULTIHOP
 from tests.agent.comms.builders import beacon, gossip, record
+from tests.agent.structure.builders import standing
 from tests.agent.test_core import TICK_S, observation
+from tests.random_flights.lies import Lies
 
 LIAR, HONEST, IDS = 5, 6, 12
 HIGHEST = 2**53 - 1
@@ -241,3 +259,87 @@ def test_a_restarted_agent_is_heard_after_an_invented_incarnation_falls_silent(c
         core.receive(LIAR, LOCAL, add_checksum(encode(restarted)), tick * TICK_S)
         assert telemetry(core, tick).heard == (LIAR,)
     assert core.rejected.total() == 0
+
+
+HONEST_STANDING = standing(branches=(Branch(RootKey(0, HONEST), 10, 0, -1),), leads=0)
+
+
+def lying_senses(now_s, honest):
+    """Return what a liar knows that hears an honest leader."""
+    neighbours = Neighbours(LIAR, 20.0, 0.1)
+    neighbours.receive(honest, now_s, {})
+    mission = Flown(0, formation_of(formation(), 1.0), Frame())
+    return Senses(
+        now_s=now_s,
+        position=honest.position,
+        velocity=honest.velocity,
+        yaw=0.0,
+        vehicles=(),
+        neighbours=neighbours.heard(now_s),
+        team=tuple,
+        mission=mission,
+    )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_agent_flies_on_whatever_a_member_says_of_the_structure(core, seed):
+    """Ten seconds of lies, half of them aimed: none raises, none takes long."""
+    lies, random, took_s = Lies(LIAR), Random(seed), []
+    for tick in range(200):
+        now_s = tick * TICK_S
+        honest = beacon(HONEST, tick + 1, now_s, at=(0.0, 2.0, 0.0), standing=HONEST_STANDING)
+        core.receive(HONEST, LOCAL, add_checksum(encode(honest)), now_s)
+        known = lying_senses(now_s, honest)
+        queue, rank = lies.place(known) or (-1, -1)
+        lie = beacon(
+            LIAR,
+            tick + 1,
+            now_s,
+            at=(random.uniform(-9, 9), 1.0, 0.0),
+            queue=queue,
+            rank=rank,
+            standing=lies.standing(known),
+        )
+        began = process_time()
+        core.receive(LIAR, LOCAL, add_checksum(encode(lie)), now_s)
+        for _ in range(20):
+            told = gossip(LIAR, now_s, summary=lies.summary(known))
+            core.receive(LIAR, MULTIHOP, add_checksum(encode(told)), now_s)
+        core.step(observation(tick))
+        took_s.append(process_time() - began)
+    assert core.rejected.total() == 0
+    assert sorted(took_s)[len(took_s) // 2] < 0.02
+
+
+def test_a_member_with_many_summaries_leaves_room_for_those_of_others(core):
+    """A step takes the latest of each sender: a flood shuts nobody out."""
+    label = 255 - FIRST_QUEUE
+    for _ in range(2000):
+        flood = gossip(LIAR, 0.0, summary=Summary(0, 0, b"", (), ()))
+        core.receive(LIAR, MULTIHOP, add_checksum(encode(flood)), 0.0)
+    news = Summary(0, 0, b"", ((HONEST, label),), ())
+    core.receive(HONEST, MULTIHOP, add_checksum(encode(gossip(HONEST, 0.0, summary=news))), 0.0)
+    frames = [each for tick in range(20) for each in core.step(observation(tick)).frames]
+    told = [decode_gossip(payload).summary for channel, payload in frames if channel == MULTIHOP]
+    assert HONEST in {member for each in told if each is not None for member, _ in each.news}
+
+
+def test_a_position_far_away_does_not_stretch_the_reach():
+    neighbours = Neighbours(0, 20.0, 0.1)
+    for sequence, liars_x in enumerate((2.0, 1e6, 2.0), start=1):
+        now_s = 0.05 * sequence
+        neighbours.receive(beacon(LIAR, sequence, now_s, at=(liars_x, 0.0, 0.0)), now_s, {})
+        neighbours.receive(beacon(HONEST, sequence, now_s, at=(0.0, 3.0, 0.0)), now_s, {})
+        neighbours.receive(beacon(HONEST + 1, sequence, now_s, at=(0.0, 0.0, 1.0)), now_s, {})
+        neighbours.link((0.0, 0.0, 0.0))
+    assert neighbours.link((0.0, 0.0, 0.0)).reach_m == 3.0
+
+
+def test_the_reach_of_two_is_what_the_nearer_shows_and_of_one_what_it_shows():
+    neighbours = Neighbours(0, 20.0, 0.1)
+    neighbours.receive(beacon(3, 1, 0.0, at=(7.0, 0.0, 0.0)), 0.0, {})
+    assert neighbours.link((0.0, 0.0, 0.0)).reach_m == 7.0
+    neighbours.receive(beacon(4, 1, 0.0, at=(5.0, 0.0, 0.0)), 0.0, {})
+    assert neighbours.link((0.0, 0.0, 0.0)).reach_m == 5.0
+    neighbours.receive(beacon(4, 2, 0.05, at=(6.0, 0.0, 0.0)), 0.05, {})
+    assert neighbours.link((0.0, 0.0, 0.0)).reach_m == 6.0

@@ -6,9 +6,13 @@ They know nothing but their senses. The safety filter after them must keep I1 al
 from math import atan2, dist, hypot, pi
 from random import Random
 
+from msgspec.structs import replace
+
 from agent.config import AgentSetup
 from agent.controller import Intent, Senses
+from agent.guidance.q_structure import QStructure
 from agent.messages import ZERO, Vector
+from tests.random_flights.lies import Lies
 
 RECALL_S = 5.0
 """So long a hostile remembers what it saw last."""
@@ -224,6 +228,29 @@ class Still(Hostile):
         return ZERO
 
 
+class Liar(Hostile):
+    """Flies the Q-structure, but every third says of itself and of others what comes to its mind.
+
+    The honest ones believe it within bounds; it flies where its own lies lead it.
+    """
+
+    def __init__(self, setup: AgentSetup) -> None:
+        super().__init__(setup)
+        self._honest = QStructure(setup)
+        self._lies = Lies(setup.id) if setup.id % 3 == 0 else None
+
+    def decide(self, senses: Senses) -> Intent:
+        intent = self._honest.decide(senses)
+        if self._lies is None:
+            return intent
+        return replace(
+            intent,
+            place=self._lies.place(senses),
+            cost_m=self.random.choice((0.0, 1.0, 1e6)),
+            words=self._lies.words(senses),
+        )
+
+
 KINDS: tuple[type[Hostile], ...] = (
     Chase,
     Spiral,
@@ -244,6 +271,7 @@ KINDS: tuple[type[Hostile], ...] = (
     Sideslip,
     Origin,
     Still,
+    Liar,
 )
 
 

@@ -3,7 +3,6 @@
 from itertools import pairwise
 from random import Random
 
-import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -34,9 +33,9 @@ from agent.structure.link_timing import timing_of
 from agent.structure.queue_map import QueueMap
 from agent.structure.slow_layer import VERTICES_A_ROUND, SlowLayer
 from agent.structure.summary_frame import SUMMARY_HEAD_B, ReportTurns
-from agent.structure.tree import Tree
+from agent.structure.tree import Tree, version_at
 from netem.wire.channels import MAX_PAYLOAD_B
-from tests.agent.structure.builders import BEACON_S, leader_summary, rays, subtree
+from tests.agent.structure.builders import BEACON_S, leader_summary, rays, replace, subtree
 from tests.agent.structure.team import Team
 
 GREATEST = 2**53 - 1
@@ -190,13 +189,12 @@ def test_summaries_of_any_agent_fit_their_frames(vertices, members, changed, rep
         assert decode_gossip(payload).summary == summary
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_summaries_of_random_teams_fit_their_frames(seed):
+def test_summaries_of_an_uneven_team_fit_their_frames():
     """Uneven teams at one vertex of ten queues: many candidates, orders and news at once."""
-    random = Random(seed)
+    random = Random(0)
     fan = rays(*((-1.0, -2.0 + 0.4 * j, 0.0) for j in range(10)))
-    points = [(random.uniform(-9, -1), random.uniform(2, 9), 0.0) for _ in range(40)]
-    flown, longest_b = Team(fan, points, seed, loss=0.3, range_m=8.0), 0
+    points = [(random.uniform(-9, -1), random.uniform(2, 9), 0.0) for _ in range(24)]
+    flown, longest_b = Team(fan, points, 0, loss=0.3, range_m=8.0), 0
     for _ in range(60):
         flown.step()
         words = [member.words.summary for member in flown.members.values()]
@@ -207,10 +205,13 @@ def test_summaries_of_random_teams_fit_their_frames(seed):
 def test_a_summary_in_parts_tells_the_same_as_a_whole_one():
     """The receiver takes what comes down and what goes up from different frames."""
     report = greatest(MOST_QUEUES)
+    counts, version = (MAX_TEAM // MOST_QUEUES,) * MOST_QUEUES, version_at(START_S)
+    down = replace(report.down, version=version, order=version, counts=counts)
+    report = replace(report, down=down)
     sender = layer(report, 1, 10, 0)
-    hearer = SlowLayer(LAST_ID, GREATEST, fans(1, MOST_QUEUES), Census(1, 10), ROUND_S)
+    hearer = SlowLayer(LAST_ID, GREATEST, fans(1, MOST_QUEUES), Census(1, MAX_TEAM), ROUND_S)
     known = trees(report, 1)
-    own = trees(msgspec.structs.replace(report, tier=2**15 - 1, parent=-1), 1)
+    own = trees(replace(report, parent=-1), 1)
     known[0].tier -= 1
     for tick in range(40):
         now_s = START_S + BEACON_S * tick
