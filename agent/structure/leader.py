@@ -29,8 +29,8 @@ CANDIDATES = 4
 FOLLOWED_S, FOLLOWED_LATENCIES = 2.5, 6.0
 """How long a leader waits for its orders to show in the counts."""
 BEYOND_S, MOST_BEYOND_S = 0.45, 1.2
-"""The first counts must be steady for so much longer where the team is three times as large as those
-heard, four times and so on."""
+"""The first counts must be steady for so much longer where the team is three times as large as
+those heard, four times and so on."""
 COLLECTED_S, COLLECTED_LATENCIES = 1.0, 4.0
 """How long it waits for candidates to come up the tiers, if there are too few."""
 

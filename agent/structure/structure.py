@@ -241,7 +241,8 @@ class Structure:
             own = self._own_part(view, v)
             subtree = self._slow.collect(v, own, self.blocked, view.now_s, view.timing)
             if leads and self._leader is not None:
-                blocked = frozenset(Place(*p) for p in subtree.blocked) | self._blocked
+                # Only what is seen goes down, not what came down before: that would never end.
+                blocked = frozenset([Place(*place) for place in subtree.blocked])
                 population = self._population(view)
                 self._slow.publish(v, self._leader.summary(view, population, subtree, blocked))
 
