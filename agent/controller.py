@@ -113,6 +113,7 @@ class Words(NamedTuple):
     tier: int = -1  # in the queue's tree: 0 for its vertex agent, -1 in distress
     parent: int = -1  # the agent that it follows, -1 for none
     role: int = MEMBER  # index of ROLES
+    agents: int = 0  # size of the team as the structure counts it, 0 where it is not known
 
 
 NO_WORDS = Words()

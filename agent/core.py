@@ -236,6 +236,7 @@ class Agent:
         departed = self._table.forget_silent(now_s, self._neighbours.ids, lost)
         beacons = self._neighbours.beacons()
         team = self._table.members(now_s)
+        counted = self._intent.words.agents if self._intent is not None else 0
         self._record_age_s = max((0.0, *(member.age_s for member in team)))
         self._unidentified = self._unidentified_vehicles.update(
             Surroundings(
@@ -245,7 +246,7 @@ class Agent:
                 beacons=beacons,
                 team=team,
                 departed=departed,
-                reports_vehicle=self._reports_vehicle(1 + len(team)),
+                reports_vehicle=self._reports_vehicle(counted or 1 + len(team)),
             )
         )
         self._safety_monitor.relay(self._table.newest())

@@ -45,4 +45,6 @@ class StructureMember:
         own = self._structure
         if own is None:
             return Words(role=DISTRESS)
-        return Words(own.standing(now_s), own.summary(now_s), own.tier, own.parent, own.role)
+        return Words(
+            own.standing(now_s), own.summary(now_s), own.tier, own.parent, own.role, own.agents
+        )

@@ -178,8 +178,13 @@ class Structure:
             return FIRST_VERTEX + vertex
         return FIRST_QUEUE + queue if 0 <= queue < self._map.queues else UNPLACED
 
+    @property
+    def agents(self) -> int:
+        """Size of the team, as far as the agent knows."""
+        view = self._view
+        return (view.total or len(view.heard) + 1) if view is not None else 0
+
     def _update_blocked(self, view: View, senses: Senses, mission: Flown) -> None:
-        agents = view.total or len(view.heard) + 1
         reported = {*senses.blocked}
         for summary in view.summaries:
             if summary is not None:
@@ -188,7 +193,7 @@ class Structure:
         peers = [(h.place, h.position) for h in view.heard]
         peers.append((own.place if own is not None else None, view.here))
         self._blocked = view.blocked = self._occupied.update(
-            senses, mission, peers, agents, frozenset(reported)
+            senses, mission, peers, self.agents, frozenset(reported)
         )
 
     def _target(self, view: View) -> OwnTarget | None:

@@ -9,9 +9,10 @@ import pytest
 
 from agent.codec import add_checksum, decode_command, encode, strip_checksum
 from agent.config import AgentSetup, Comms, Control, Vehicle
+from agent.controller import Intent, Senses, Words
 from agent.core import Agent
-from agent.messages import Beacon, Observation
-from agent.qstructure.formation import FormationSpec
+from agent.messages import Beacon, Observation, Place
+from agent.qstructure.formation import FormationSpec, formation_of
 from netem.wire.channels import LOCAL, MAX_PAYLOAD_B, MULTIHOP
 from netem.wire.frame import Outgoing, Transmission, pack, unpack_transmission
 from tests.agent.comms.builders import (
@@ -39,21 +40,29 @@ WEDGE = msgspec.convert(
 )
 
 
+AGENT_SETUP = AgentSetup(
+    id=0,
+    incarnation=0,
+    tick_hz=1.0 / TICK_S,
+    slots_per_tick=4,
+    command_ticks=2,
+    vehicle=Vehicle(sensors=("proximity",)),
+    fleet_max_speed_mps=0.5,
+    control=Control(),
+    comms=Comms(),
+    formation=WEDGE,
+)
+
+
 def agent(agent_id=0, sensors=("proximity",), incarnation=0, allocation="structure"):
-    return Agent(
-        AgentSetup(
-            id=agent_id,
-            incarnation=incarnation,
-            tick_hz=1.0 / TICK_S,
-            slots_per_tick=4,
-            command_ticks=2,
-            vehicle=Vehicle(sensors=sensors),
-            fleet_max_speed_mps=0.5,
-            control=Control(allocation=allocation),
-            comms=Comms(),
-            formation=WEDGE,
-        )
+    setup = msgspec.structs.replace(
+        AGENT_SETUP,
+        id=agent_id,
+        incarnation=incarnation,
+        vehicle=Vehicle(sensors=sensors),
+        control=Control(allocation=allocation),
     )
+    return Agent(setup)
 
 
 def observation(tick, at=(2.0, 1.0, 0.5), vehicles=(), start_s=0.0):
@@ -298,3 +307,50 @@ def test_a_restarted_neighbour_is_accepted_at_once():
     for channel, payload in old.step(observation(32)).frames:
         listener.receive(1, channel, payload, 32 * TICK_S)
     assert listener.rejected["replay"] == 1
+
+
+class Counting:
+    """A controller that stays where it is, and says how large the team is; ``seen``: its senses."""
+
+    agents = 0
+    seen: Senses
+
+    def __init__(self, setup):
+        pass
+
+    def decide(self, senses):
+        type(self).seen = senses
+        words = Words(agents=self.agents)
+        return Intent(ORIGIN, ORIGIN, 0.0, 0.0, senses.position, words=words)
+
+
+CLOSED = msgspec.convert(
+    {
+        "name": "closed",
+        "vertices": {"V": [0, 0, 0], "W": [12, 0, 0]},
+        "queue": [{"name": "Q", "vertices": ["V", "W"]}],
+    },
+    FormationSpec,
+)
+
+
+@pytest.mark.parametrize(("agents", "kept"), [(9, True), (5, False)])
+def test_reported_places_of_a_closed_queue_are_those_of_the_team_that_is_counted(
+    monkeypatch, agents, kept
+):
+    """Of a team of nine an agent hears one; the place that this one reports is one of nine."""
+    monkeypatch.setattr(Counting, "agents", agents)
+    setup = msgspec.structs.replace(
+        AGENT_SETUP, formation=CLOSED, control=Control(controller=f"{__name__}:Counting")
+    )
+    core = Agent(setup)
+    place = Place(0, 4)
+    body = formation_of(CLOSED, 1.0).slot(place, 9).point
+    x, _, _ = body
+    for tick in range(120):
+        now_s, near = tick * TICK_S, tick < 60
+        at = (x, -1.0, 0.0) if near else (x, -4.0, 0.0)
+        witness = beacon(3, tick + 1, now_s, at=(x, 1.0, 0.0), blocked=(place,))
+        deliver(core, witness, now_s)
+        core.step(observation(tick, at, [(0.0, 1.0, 0.0)] if near else []))
+    assert bool(Counting.seen.silent) == kept
