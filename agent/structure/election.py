@@ -84,7 +84,7 @@ class Election:
         return all(
             self._along(view, claim.queue, view.number_of(other), vertex) >= own
             for other in view.same_queue(claim.queue)
-            if view.number_of(other) > 0
+            if view.number_of(other) > 0 and not leads(other)
         )
 
     def _along(self, view: View, queue: int, number: int, vertex: int) -> float:

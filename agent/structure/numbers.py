@@ -2,17 +2,18 @@
 
 The first number follows from the distance to the vertex: exactly where the whole queue is heard,
 else by the leader's histogram. Of two agents with one number the one that claimed it from farther
-away moves on. It takes a number known to be free, or pushes into the next one; so a push runs up to
-the tail. Gaps close inwards.
+away moves on; a leader that has one, since its vertex is taken (E18), keeps it. Who moves on takes
+a number known to be free, or pushes into the next one; so a push runs up to the tail. Gaps close
+inwards.
 """
 
 from math import inf
 
 from agent.controller import Heard
-from agent.messages import MAX_TEAM
+from agent.messages import MAX_TEAM, Swap
 from agent.structure import histogram
 from agent.structure.claim import Claim
-from agent.structure.view import View
+from agent.structure.view import View, leads
 
 CONFLICT_M = 0.05
 """Of two claims the nearer by more than this keeps the number, else the lower id (E17)."""
@@ -121,7 +122,7 @@ class Numbers:
         """Whether so many more members turned up that the number is to be taken anew."""
         early = view.now_s - self._first_s < GREW_WITHIN_S
         many = view.counts[claim.queue] > GREW_BY * self._first_count + 1
-        if not (early and many and self._first_count) or claim.swapping:
+        if not (early and many and self._first_count) or claim.swapping or claim.leads:
             return False
         settled = view.distance(claim.queue, claim.number) <= NEAR_M
         return not settled and not claim.pushes(view.now_s)
@@ -159,9 +160,9 @@ class Numbers:
         standing = other.standing
         if standing is None:
             return False
-        if standing.reservation is not None and standing.reservation.partner == self._own_id:
-            return False
-        if claim.reservation is not None and claim.reservation.partner == other.id:
+        if leads(other) != claim.leads:
+            return leads(other)
+        if _is_for(standing.reservation, self._own_id) or _is_for(claim.reservation, other.id):
             return False
         if standing.pushes != claim.pushes(view.now_s):
             return standing.pushes
@@ -238,6 +239,10 @@ class Numbers:
 
     def _claim(self, view: View, claim: Claim, number: int) -> None:
         claim.take(claim.queue, number, view.distance(claim.queue, number), view.now_s)
+
+
+def _is_for(reservation: Swap | None, agent: int) -> bool:
+    return reservation is not None and reservation.partner == agent
 
 
 def _available(number: int, taken: frozenset[int]) -> int:

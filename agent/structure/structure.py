@@ -125,14 +125,25 @@ class Structure:
             self._queue_choice.choose(view, self.claim)
         if not self.claim.leads:
             self._decide_as_member(view)
-        elif self.claim.number < 1 and self._map.vertex_places[self.claim.vertex] in view.blocked:
-            self._numbers.take_first(view, self.claim)
+        else:
+            self._decide_as_leader(view)
         self._followed = any(
             branch is not None and branch.parent == self._own_id
             for h in view.heard
             for branch in (h.standing.branches if h.standing is not None else ())
         )
         self._report(view)
+
+    def _decide_as_leader(self, view: View) -> None:
+        """Stand in the vertex, or while a vehicle has taken it, in the queue (E18)."""
+        claim = self.claim
+        if self._map.vertex_places[claim.vertex] not in view.blocked:
+            if claim.number > 0:
+                claim.lead(claim.vertex, view.to_vertex(claim.vertex), view.now_s)
+        elif claim.number < 1:
+            self._numbers.take_first(view, claim)
+        else:
+            self._numbers.keep_up(view, claim)
 
     def _decide_as_member(self, view: View) -> None:
         claim = self.claim

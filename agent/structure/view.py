@@ -96,8 +96,15 @@ class View:
         return self.summaries[self.map.home[queue]]
 
     def same_queue(self, queue: int) -> list[Heard]:
-        """Return the members heard of a queue, besides those that lead a vertex."""
-        return [each for each in self.heard if queue_of(each) == queue and not leads(each)]
+        """Return the members heard of a queue, without those that stand in a vertex.
+
+        A leader whose vertex is taken stands in its queue (E18).
+        """
+        return [
+            each
+            for each in self.heard
+            if queue_of(each) == queue and (not leads(each) or self.number_of(each) > 0)
+        ]
 
     def number_of(self, heard: Heard) -> int:
         """Return the number that a member claims, 0 for none."""

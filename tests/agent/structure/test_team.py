@@ -1,9 +1,13 @@
 """Small teams by the whole structure: they form the layout exactly, and then keep still."""
 
+from collections import Counter
+from math import dist
 from random import Random
 
+import msgspec
 import pytest
 
+from agent.messages import Place
 from tests.agent.structure.builders import LIBRARY, LINE, TWO, library, lines, rays
 from tests.agent.structure.team import Team
 
@@ -140,3 +144,63 @@ def test_where_the_team_is_does_not_matter():
         return [member.place for member in flown.members.values()]
 
     assert places(0.0) == places(4096.0)
+
+
+class TeamWithBody(Team):
+    """A team that sees an unidentified vehicle at a point, once there is one (E18)."""
+
+    body = None
+
+    def _senses(self, member):
+        senses = super()._senses(member)
+        if self.body is None:
+            return senses
+        return msgspec.structs.replace(senses, silent=(self.body,))
+
+    def formed(self):
+        """Whether the team has the places that the body leaves, and all stand in them."""
+        taken = frozenset([Place(0, 0)] if self.body is not None else [])
+        layout = self.map.formation.layout(len(self.members), taken)
+        return self.places() == Counter(layout.places) and all(
+            dist(member.at, layout.slots[member.place].point) < 0.01
+            for member in self.members.values()
+        )
+
+
+def with_body(formation, agents, **radio):
+    """Return a team that stands in its places, the dead leader of its vertex too."""
+    points = [slot.point for slot in formation.formation.layout(agents).slots.values()]
+    flown = TeamWithBody(formation, points, **radio)
+    assert flown.until_formed(20.0)
+    (leader,) = [k for k, member in flown.members.items() if member.place == Place(0, 0)]
+    del flown.members[leader]
+    flown.body = (0.0, 0.0, 0.0)
+    flown.run(8.0)
+    assert flown.until_formed(40.0)
+    return flown
+
+
+@pytest.mark.parametrize(
+    "radio",
+    [{}, {"range_m": 2.5}, {"range_m": 2.5, "loss": 0.3}],
+    ids=["clean", "short", "lossy"],
+)
+@pytest.mark.parametrize("formation", [LINE, WEDGE], ids=["line", "wedge"])
+def test_a_leader_whose_vertex_is_taken_keeps_a_number_of_its_own(formation, radio):
+    """Who joins beside it takes its number: one of them moves on (E18)."""
+    flown = with_body(formation, 7, **radio)
+    (leader,) = [member for member in flown.members.values() if member.leads]
+    assert leader.place.rank >= 1
+    for _ in range(2):
+        flown.join(leader.at)
+        assert flown.until_formed(40.0)
+    check_stays(flown)
+    assert sum(member.leads for member in flown.members.values()) == 1
+
+
+def test_a_leader_returns_to_its_vertex_once_the_body_has_left():
+    flown = with_body(LINE, 6, range_m=2.5)
+    flown.body = None
+    assert flown.until_formed(40.0)
+    check_stays(flown)
+    assert [member.place for member in flown.members.values() if member.leads] == [Place(0, 0)]
