@@ -26,7 +26,7 @@ from agent.codec import (
     strip_checksum,
 )
 from agent.core import Agent, Outbox
-from agent.messages import Observation
+from agent.messages import Beacon, Gossip, Observation
 from netem.fault_queue import FaultQueue
 from netem.messages import SlotInput, SlotResult, Truth, unpack_slot_input, unpack_slot_result
 from netem.wire.frame import (
@@ -44,12 +44,14 @@ from netem.wire.frame import (
     unpack_transmission,
 )
 from netem.wire.latency import LatencyHistogram, unpack_report
+from tests.random_flights.lies import Lies, liars_senses
 from worldsim.engine.virtual import VirtualFleet
 from worldsim.fleet.control import RequestError, _request
 from worldsim.scenario.file import load
 
 WEDGE = Path(__file__).parents[1] / "deploy/scenarios/wedge-9.toml"
-WARM_SLOTS = 200
+WARM_SLOTS, WARM_S = 200, 2.5
+LIES = 100
 TICKS = 20
 STEP_EVERY = 500
 REFUSALS = (RejectedError, WireError, RequestError)
@@ -133,6 +135,7 @@ def _targets(
     outboxes = _said(fleet, observations)
     frames = [frame for outbox in outboxes for frame in outbox.frames]
     beacons, gossips = ([data for channel, data in frames if channel == c] for c in (0, 1))
+    lies = _lies([decode_beacon(data) for data in beacons[:LIES]])
     sent = Transmission(3, 0, tuple(Outgoing(*frame) for frame in frames))
     heard = tuple(Frame(1, 0, c, 5, data) for c, data in frames)
     batch = pack(Batch(3, heard))
@@ -147,8 +150,18 @@ def _targets(
     return [
         Target("observation", decode_observation, [encode(each) for _, each in observations]),
         Target("command", decode_command, [encode(outbox.command) for outbox in outboxes]),
-        Target("beacon", lambda data: core.receive(3, 0, data, 2.5), beacons, checksum=True),
-        Target("gossip", lambda data: core.receive(3, 1, data, 2.5), gossips, checksum=True),
+        Target(
+            "beacon",
+            lambda data: core.receive(3, 0, data, WARM_S),
+            beacons + lies[0],
+            checksum=True,
+        ),
+        Target(
+            "gossip",
+            lambda data: core.receive(3, 1, data, WARM_S),
+            gossips + lies[1],
+            checksum=True,
+        ),
         Target("transmission", unpack_transmission, [pack(sent)]),
         Target("batch", unpack_batch, [batch]),
         Target("delivery", unpack_delivery, [pack(Delivery(3, heard, tuple(range(len(heard)))))]),
@@ -170,6 +183,17 @@ def _said(fleet: VirtualFleet, observations: list[tuple[int, Observation]]) -> l
             later = msgspec.structs.replace(seen, slot=slot, time_s=slot / 80.0)
             outboxes.append(fleet._agents[agent].step(later))
     return outboxes
+
+
+def _lies(beacons: list[Beacon]) -> tuple[list[bytes], list[bytes]]:
+    """Return beacons and gossip that say anything of the Q-structure."""
+    lies, first = Lies(3), {beacon.id: beacon for beacon in reversed(beacons)}
+    senses = liars_senses(3, [each for each in first.values() if each.id != 3], WARM_S)
+    false = [msgspec.structs.replace(each, standing=lies.standing(senses)) for each in beacons]
+    told = [Gossip(3, WARM_S, (), None, lies.summary(senses)) for _ in beacons]
+    return [add_checksum(encode(each)) for each in false], [
+        add_checksum(encode(each)) for each in told
+    ]
 
 
 def _radio(channel: int) -> Callable[[bytes], msgspec.Struct]:

@@ -10,7 +10,6 @@ from agent.codec import add_checksum, decode_beacon, decode_gossip, encode
 from agent.comms.mission import FIRST_VERSIONS, FRAME_VERSIONS_AHEAD, KEYS_PER_VERSION
 from agent.comms.neighbours import Neighbours
 from agent.config import AgentSetup, Comms, Control, Vehicle
-from agent.controller import Flown, Senses
 from agent.core import Agent
 from agent.messages import (
     AT_HOME,
@@ -24,14 +23,13 @@ from agent.messages import (
     RootKey,
     Summary,
 )
-from agent.qstructure.formation import FormationSpec, formation_of
-from agent.qstructure.target_frame import Frame
+from agent.qstructure.formation import FormationSpec
 from agent.structure.census import FIRST_QUEUE
 from netem.wire.channels import LOCAL, MULTIHOP
 from tests.agent.comms.builders import beacon, gossip, record
 from tests.agent.structure.builders import standing
 from tests.agent.test_core import TICK_S, observation
-from tests.random_flights.lies import Lies
+from tests.random_flights.lies import Lies, liars_senses
 
 LIAR, HONEST, IDS = 5, 6, 12
 HIGHEST = 2**53 - 1
@@ -264,23 +262,6 @@ def test_a_restarted_agent_is_heard_after_an_invented_incarnation_falls_silent(c
 HONEST_STANDING = standing(branches=(Branch(RootKey(0, HONEST), 10, 0, -1),), leads=0)
 
 
-def lying_senses(now_s, honest):
-    """Return what a liar knows that hears an honest leader."""
-    neighbours = Neighbours(LIAR, 20.0, 0.1)
-    neighbours.receive(honest, now_s, {})
-    mission = Flown(0, formation_of(formation(), 1.0), Frame())
-    return Senses(
-        now_s=now_s,
-        position=honest.position,
-        velocity=honest.velocity,
-        yaw=0.0,
-        vehicles=(),
-        neighbours=neighbours.heard(now_s),
-        team=tuple,
-        mission=mission,
-    )
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_an_agent_flies_on_whatever_a_member_says_of_the_structure(core, seed):
     """Ten seconds of lies, half of them aimed: none raises, none takes long."""
@@ -289,7 +270,7 @@ def test_an_agent_flies_on_whatever_a_member_says_of_the_structure(core, seed):
         now_s = tick * TICK_S
         honest = beacon(HONEST, tick + 1, now_s, at=(0.0, 2.0, 0.0), standing=HONEST_STANDING)
         core.receive(HONEST, LOCAL, add_checksum(encode(honest)), now_s)
-        known = lying_senses(now_s, honest)
+        known = liars_senses(LIAR, [honest], now_s)
         queue, rank = lies.place(known) or (-1, -1)
         lie = beacon(
             LIAR,

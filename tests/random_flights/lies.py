@@ -3,9 +3,11 @@
 A lie is aimed where it takes up what honest members say: their keys, places, ids and times.
 """
 
+from collections.abc import Sequence
 from random import Random
 from typing import TypeVar
 
+from agent.comms.neighbours import Neighbours
 from agent.controller import Senses, Words
 from agent.messages import (
     AGENT_IDS,
@@ -15,6 +17,8 @@ from agent.messages import (
     MAX_PLACES,
     MAX_TEAM,
     MAX_VERTICES,
+    ZERO,
+    Beacon,
     Branch,
     Candidate,
     LeaderSummary,
@@ -30,7 +34,25 @@ from agent.messages import (
 from agent.structure.tree import version_at
 
 T = TypeVar("T")
+BEACON_HZ = 20.0
 GREATEST, LAST_INDEX = 2**53 - 1, 2**15 - 1
+
+
+def liars_senses(own_id: int, heard: Sequence[Beacon], now_s: float) -> Senses:
+    """Return what a liar knows that hears some beacons."""
+    neighbours = Neighbours(own_id, BEACON_HZ, 0.1)
+    for beacon in heard:
+        neighbours.receive(beacon, now_s, {})
+    return Senses(
+        now_s=now_s,
+        position=ZERO,
+        velocity=ZERO,
+        yaw=0.0,
+        vehicles=(),
+        neighbours=neighbours.heard(now_s),
+        team=tuple,
+        mission=None,
+    )
 
 
 class Lies:
