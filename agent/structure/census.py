@@ -32,6 +32,8 @@ FIRST_QUEUE, FIRST_VERTEX = 2, 128
 WORTH_QUANTA = 2
 """A repeated label is taken if it is so much later: to take each would cost time for nothing."""
 LAG_SMOOTHING = 0.25
+SLOWER_THAN_NEWS = 6.0
+"""So much longer than news a repeated label takes over the same way: it waits for each round."""
 LAGS = 2.0
 """A label may stand still for so many of its usual lags, besides T_lost."""
 MAX_LAG_S = MAX_QUANTA * QUANTUM_S / LAGS
@@ -114,10 +116,16 @@ class Census:
 
     def _compare(self, member: int, label: int, now_s: float) -> None:
         """Take a later label of a member; answer a much older one."""
-        if label > self._labels[member]:
-            self._adopt(member, label, now_s)
+        if label > self._labels[member] and member != self._own:
+            self._expect_later(member, now_s - label // CODES * QUANTUM_S)
+            self._set(member, label, now_s)
         elif label + WORTH_QUANTA * CODES <= self._labels[member]:
             self._changed.add(member)
+
+    def _expect_later(self, member: int, age_s: float) -> None:
+        """Note how old a label is that came as news; what is no news comes more slowly."""
+        if self._labels[member] == 0:
+            self._lag_s[member] = min(MAX_LAG_S, SLOWER_THAN_NEWS * max(age_s - QUANTUM_S, 0.0))
 
     def ask(self, now_s: float, lost_s: float) -> None:
         """Ask for members that have been silent for too long. lost_s: T_lost of a neighbour [s]."""
@@ -143,6 +151,7 @@ class Census:
                 self._adopt(first + k, greatest - wire[k], now_s)
 
     def _adopt(self, member: int, label: int, now_s: float) -> None:
+        """Take a repeated label; it tells how old the member's labels usually are here."""
         if member == self._own:
             return
         lag_s = min(max(now_s - label // CODES * QUANTUM_S, 0.0), MAX_LAG_S)

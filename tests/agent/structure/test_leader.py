@@ -44,9 +44,12 @@ class Flight:
         self._formation, self._link, self._neighbours = formation, link, neighbours
         self._leader = Leader(vertex, KEY, 0.0, ROUND_S)
         self._vertex, self.now_s = vertex, 0.0
+        self._first = True
 
     def ask(self, counted, offered=None, blocked=()):
         self.now_s += TICK_S
+        if self._first:
+            self._first, counted = False, counted._replace(changed_s=self.now_s)
         seen = view(self._formation, self.now_s, self._neighbours, link=self._link, blocked=blocked)
         if offered is None:
             offered = offers(self._formation, counted.members, vertex=self._vertex)
