@@ -1,7 +1,8 @@
 """Warnings of a start from which a formation cannot be led at once.
 
-Agents allocate the places of a formation among those that hear each other. Groups that do not are
-teams of their own until they meet. A vertex that nobody is near is led from afar.
+Agents allocate the places of a formation among those that hear each other, over one hop or several.
+Such a team finds a leader for a vertex however far it is. Groups that do not hear each other are
+teams of their own until they meet, and each sends somebody to a vertex that is out of reach of all.
 """
 
 from collections.abc import Iterator
@@ -24,18 +25,21 @@ SHOWN_SIZES = 8
 
 
 def start_warnings(scenario: Scenario) -> list[Problem]:
-    """Return warnings of a start at which vertices or agents are out of range.
+    """Return warnings of a start at which agents do not all hear each other.
 
-    The start must have room for the fleet.
+    They name the vertices that are out of everybody's range. The start must have room for the
+    fleet.
     """
     if not scenario.expect.converge:
         return []
     position = start_poses_of(scenario, Obstacles(scenario.obstacle)).position
     sizes = _group_sizes(scenario, position)
-    far = [f"{detail}; {_told(sizes)}" for detail in _far_vertices(scenario, position)]
-    if not far and len(sizes) > 1:
-        far = [f"{_told(sizes)}; each forms the whole formation until it meets the others"]
-    return [Problem(KEY, detail) for detail in far]
+    if len(sizes) == 1:
+        return []
+    groups = _told(sizes)
+    far = [f"{detail}; {groups}" for detail in _far_vertices(scenario, position)]
+    alone = f"{groups}; each forms the whole formation until it meets the others"
+    return [Problem(KEY, detail) for detail in far or [alone]]
 
 
 def _far_vertices(scenario: Scenario, position: Floats) -> Iterator[str]:
@@ -64,7 +68,5 @@ def _group_sizes(scenario: Scenario, position: Floats) -> list[int]:
 
 
 def _told(sizes: list[int]) -> str:
-    if len(sizes) == 1:
-        return f"the {sizes[0]} agents all hear each other, over one hop or several"
     shown = ", ".join(map(str, sizes[:SHOWN_SIZES])) + (", ..." if len(sizes) > SHOWN_SIZES else "")
     return f"{len(sizes)} groups of agents do not hear each other ({shown} agents)"
