@@ -1,4 +1,4 @@
-"""Broadcasting: beacons on the local channel, the record table on the multihop channel.
+"""Broadcasting: beacons on the local channel; summaries, missions and records on the multihop one.
 
 These are the two layers of Fig. 3: high frequency to all agents in range, and low frequency to be
 passed on.
