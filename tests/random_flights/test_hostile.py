@@ -29,6 +29,12 @@ def test_every_kind_of_vehicle_and_set_of_sensors_keeps_i1(tmp_path: Path) -> No
     assert [row for row in rows.values() if "failure" in row] == [], report(rows)
 
 
+def test_members_that_lie_about_the_structure_bring_nobody_near_another(tmp_path: Path) -> None:
+    generate = partial(hostile.scenario, BASE, steps=SHORT, controller="Liar")
+    rows = Campaign(generate, tmp_path, twice_every=4).fly(range(4))
+    assert [row for row in rows.values() if "failure" in row] == [], report(rows)
+
+
 def test_numbers_in_a_row_fly_every_vehicle_and_set_of_sensors_and_all_numbers_every_case() -> None:
     assert len({case_of(number).row for number in range(ROWS)}) == ROWS
     assert {case_of(number) for number in range(len(CASES))} == set(CASES)
