@@ -64,7 +64,7 @@ class Flight:
 
 
 def test_go_comes_when_the_counts_have_been_steady():
-    flight = Flight(TWO)
+    flight = Flight(TWO, neighbours=[heard(k) for k in range(2, 4)])
     for k in range(20):
         assert not flight.ask(population(k % 3, 2)).go
     found = [flight.ask(population(2, 2)).go for _ in range(10)]
