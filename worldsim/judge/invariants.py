@@ -4,7 +4,8 @@ I2: in each connected component, each vertex of the formation has exactly one ag
 I3: in each component, the number of agents of a queue is within 1 of the queue's share.
 Premise of both: T_d + 2B have passed since the last fault, and the judge can tell which agents and
 which hovering vehicles the component's agents know.
-I4: no two agents of a component claim one place for longer than 2B.
+I4: no two agents of a component claim one place for longer than 2B; under leaders and trees, no two
+that hear each other.
 I6: no agent that news reaches within a bound changes its role more than 3 times after a fault.
 I7: no agent changes its place in a settled team in which every agent is in its place; where frames
 are lost, each agent may once.
@@ -84,7 +85,7 @@ class Invariants:
     def __init__(self, scenario: Scenario, hovering: HoveringVehicles) -> None:
         self.tallies = {name: InvariantTally() for name in ("I2", "I3", "I4", "I6", "I7")}
         self._connectivity, self._load = Connectivity(scenario), RadioLoad()
-        self._hovering = hovering
+        self._hovering, self._local = hovering, scenario.control.allocation == "structure"
         self._watchers = Watchers(["proximity" in each.sensors for each in scenario.vehicles])
         self._boot_s = scenario.fleet.boot_s
         self._fault_s = 0.0
@@ -210,6 +211,8 @@ class Invariants:
         if last is not None and not last.same_as(found):
             self._restart_premises(tick.time_s)
             self._before = last.hops, last.loss
+        if self._local and len(self._claims):
+            self._shared = self._find_shared(self._members)
         team = int(np.count_nonzero(tick.alive))
         self._twice_s = 2.0 * self._connectivity.dissemination_s(team, found.hops, found.loss)
         # Agents wait for those whom they heard before as long as news may come from there.
@@ -293,13 +296,31 @@ class Invariants:
         return Breaches(vertices, wrong)
 
     def _find_shared(self, members: list[list[int]]) -> list[bool]:
-        """Return for each agent whether another agent of its component claims its place."""
+        """Return for each agent whether another agent that need know it claims its place.
+
+        Under leaders and trees an agent knows the claims of those that it hears. Under the
+        assignment it knows those of its whole component.
+        """
         shared = [False] * len(self._claims)
         for rows in members:
             held = Counter(self._claims[row] for row in rows)
             for row in rows:
-                shared[row] = self._claims[row][0] >= 0 and held[self._claims[row]] > 1
+                claim = self._claims[row]
+                twice = claim[0] >= 0 and held[claim] > 1
+                shared[row] = twice and (not self._local or self._hears_rival(row, rows))
         return shared
+
+    def _hears_rival(self, row: int, rows: list[int]) -> bool:
+        """Whether an agent of the component that it hears, and that hears it, claims its place."""
+        if self._components is None:
+            return False
+        hears = self._components.hears
+        return any(
+            other != row
+            and self._claims[other] == self._claims[row]
+            and bool(hears[row, other] and hears[other, row])
+            for other in rows
+        )
 
     def _count_lasting(self, time_s: float) -> int:
         """Return the number of agents that have shared their present place for longer than 2B."""
