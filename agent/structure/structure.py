@@ -42,6 +42,8 @@ from agent.structure.view import View
 DECISION_HZ = 10.0
 PATIENCE_S = 0.3
 """So long an agent without a number stays where it is: most have one by then, and need not turn."""
+CERTAIN_S = 1.0
+"""A leader leaves its vertex, or returns to it, once it has been taken, or free, for so long."""
 FAR_M = 2.5
 """Within this distance of its place an agent flies there even if it lies beyond the tail."""
 
@@ -68,6 +70,8 @@ class Structure:
         self._occupied = OccupiedSlots(points, "proximity" in setup.vehicle.sensors)
         self._leader: Leader | None = None
         self._followed = False
+        self._misplaced_since_s: float | None = None
+        """Since when the leader stands in a vertex that is taken, or beside a free one [s]."""
         self._started_s = now_s
         self._next_decision_s = now_s
         self._blocked: frozenset[Place] = frozenset()
@@ -104,8 +108,9 @@ class Structure:
             ]
             leading = self._election.key if self.claim.vertex == v else None
             deposed = tree.follow_root(view.now_s, followers, leading, view.timing)
-            near = [each for each in followers if each.heard.age_s < view.timing.parent_s]
-            tree.choose_parent(view.here, senses.velocity, near, senses.link.reach_m)
+            reach_m, parent_s = senses.link.reach_m, view.timing.parent_s
+            if not tree.stands_still(view.now_s, parent_s):
+                tree.choose_parent(view.here, senses.velocity, followers, reach_m, parent_s)
             self._slow.keep_to(v, tree)
             if leading is not None and deposed:
                 self._step_down(view, v)
@@ -137,13 +142,21 @@ class Structure:
     def _decide_as_leader(self, view: View) -> None:
         """Stand in the vertex, or while a vehicle has taken it, in the queue (E18)."""
         claim = self.claim
-        if self._map.vertex_places[claim.vertex] not in view.blocked:
-            if claim.number > 0:
+        taken, in_queue = self._map.vertex_places[claim.vertex] in view.blocked, claim.number > 0
+        if taken == in_queue:
+            self._misplaced_since_s = None
+            if in_queue:
+                self._numbers.keep_up(view, claim)
+            return
+        # What is seen flickers while teams meet again; a leader that followed it would too.
+        if self._misplaced_since_s is None:
+            self._misplaced_since_s = view.now_s
+        elif view.now_s - self._misplaced_since_s >= CERTAIN_S:
+            self._misplaced_since_s = None
+            if taken:
+                self._numbers.take_first(view, claim)
+            else:
                 claim.lead(claim.vertex, view.to_vertex(claim.vertex), view.now_s)
-        elif claim.number < 1:
-            self._numbers.take_first(view, claim)
-        else:
-            self._numbers.keep_up(view, claim)
 
     def _decide_as_member(self, view: View) -> None:
         claim = self.claim

@@ -11,7 +11,7 @@ of a lower tier, and what goes to it is sent to the parent.
 """
 
 from collections.abc import Collection
-from math import dist, hypot
+from math import dist, hypot, inf
 from typing import NamedTuple
 
 from agent.controller import Heard
@@ -26,6 +26,11 @@ for another before its parent is lost, and keeps the present one longer than it 
 LEAVING = 2
 APART_MPS = 0.05
 """Two agents that part more slowly than this stay where they are."""
+KEPT = 3.0
+"""The present parent counts as LEAVING after so many times the silence of a new one: links that go
+down for a moment make no agent change its parent to and fro."""
+STILL = 0.8
+"""The version stands still when it has not gone on for this part of a parent's silence."""
 MAX_TIER = 1000
 VOID_KEPT = 32
 
@@ -104,12 +109,26 @@ class Tree:
         while len(self._void) > VOID_KEPT:
             del self._void[next(iter(self._void))]
 
-    def choose_parent(
-        self, here: Vector, velocity: Vector, followers: list[Follower], reach_m: float
-    ) -> None:
-        """Choose the parent. followers: agents heard lately enough to be one.
+    def stands_still(self, now_s: float, parent_s: float) -> bool:
+        """Whether the root's version does not go on, so that no parent is better than the present.
 
-        here, velocity: own [m, m/s; world frame]; reach_m: the range as measured [m].
+        If agents went on to choose among each other, their tiers would count up in loops.
+        """
+        led = self.root is not None and self.root.id == self._own_id
+        return self.parent >= 0 and not led and now_s - self.advanced_s > STILL * parent_s
+
+    def choose_parent(
+        self,
+        here: Vector,
+        velocity: Vector,
+        followers: list[Follower],
+        reach_m: float,
+        parent_s: float = inf,
+    ) -> None:
+        """Choose the parent. followers: the agents heard.
+
+        here, velocity: own [m, m/s; world frame]; reach_m: the range as measured [m]; parent_s:
+        after a longer silence only the present parent is still one, if there is no better [s].
         """
         if self.root is None or self.root.id == self._own_id:
             self.parent, self.tier = -1, (-1 if self.root is None else 0)
@@ -120,7 +139,9 @@ class Tree:
             heard, branch = each
             current = heard.id == self.parent
             horizon_s = PARENT_STAYS_S if current else NEW_PARENT_STAYS_S
-            far = LEAVING if _leaves(here, velocity, heard, horizon_s, reach_m) else 0
+            silent = heard.age_s >= KEPT * parent_s  # of the present parent alone
+            leaves = silent or _leaves(here, velocity, heard, horizon_s, reach_m)
+            far = LEAVING if leaves else 0
             deaf = 0 if heard.hears_me else 1
             above = position_of.get(branch.parent)
             to_its_parent = dist(heard.position, above) if above is not None else 0.0
@@ -130,6 +151,7 @@ class Tree:
             each
             for each in followers
             if each.branch.root == self.root
+            and (each.heard.age_s < parent_s or each.heard.id == self.parent)
             and 0 <= each.branch.tier < MAX_TIER
             and each.branch.parent != self._own_id
         ]

@@ -149,7 +149,7 @@ class View:
 
     def target(self, claim: Claim) -> OwnTarget | None:
         """Return where the claim's holder flies; None where there is no such place."""
-        if claim.leads and self.map.vertex_places[claim.vertex] not in self.blocked:
+        if claim.leads and claim.number < 1:
             slot = self.map.vertex_slot(claim.vertex)
             place = self.map.vertex_places[claim.vertex]
             return OwnTarget(place, slot, True) if slot is not None else None
