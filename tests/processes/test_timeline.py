@@ -69,7 +69,7 @@ def test_killed_agents_restart_as_new_processes(start: Start, timeline: Write, r
 def test_agents_join_and_leave(start: Start, timeline: Write, run: Path) -> None:
     places = "{ kind = 'list', positions_m = [[-4.2, 0.3, 0], [-5.1, 0, 0]] }"
     joins = f"at_s = 5\njoin = {{ count = 2, start = {places} }}"
-    summary = summary_after(start, timeline(18.0, joins, "at_s = 10\nleave = [0, 3]"), run)
+    summary = summary_after(start, timeline(20.0, joins, "at_s = 10\nleave = [0, 3]"), run)
     assert process_events(run) == [
         (5.0, "join", 4, True),
         (5.0, "join", 5, True),
