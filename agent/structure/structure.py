@@ -1,8 +1,8 @@
 """The Q-structure of one agent: what it says of itself, what it makes of what others say.
 
-At 10 Hz it follows the trees of all vertices, and decides on its queue, its number and the lead of
-a vertex. What is urgent goes into its beacons (:class:`~agent.messages.Standing`). What is slow
-goes into summaries on the multihop channel, sooner while there is news.
+Each tick it follows the trees of all vertices. At 10 Hz it decides on its queue, its number and the
+lead of a vertex. What is urgent goes into its beacons (:class:`~agent.messages.Standing`); what is
+slow goes into summaries on the multihop channel, sooner while there is news.
 """
 
 from math import dist, inf
@@ -76,7 +76,6 @@ class Structure:
         self._next_decision_s = now_s
         self._blocked: frozenset[Place] = frozenset()
         self._view: View | None = None
-        self._own: OwnTarget | None = None
 
     @property
     def blocked(self) -> tuple[Place, ...]:
@@ -85,15 +84,14 @@ class Structure:
 
     def update(self, senses: Senses, mission: Flown) -> OwnTarget | None:
         """Return the own target now; None for an agent without a place."""
+        view = self._view = self._look(senses, mission)
         self._slow.hear(senses.summaries, self.trees, senses.now_s)
+        view.summaries = self._slow.summaries
+        self.follow_trees(view, senses)
         if senses.now_s >= self._next_decision_s:
             self._next_decision_s = senses.now_s + 1.0 / DECISION_HZ - 1e-9
-            view = self._view = self._look(senses, mission)
-            view.summaries = self._slow.summaries
-            self.follow_trees(view, senses)
             self._decide(view, senses, mission)
-            self._own = self._target(view)
-        return self._own
+        return self._target(view)
 
     def _look(self, senses: Senses, mission: Flown) -> View:
         around, frame = senses.neighbours, mission.frame
