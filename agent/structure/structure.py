@@ -1,8 +1,9 @@
 """The Q-structure of one agent: what it says of itself, what it makes of what others say.
 
-Each tick it follows the trees of all vertices. At 10 Hz it decides on its queue, its number and the
-lead of a vertex. What is urgent goes into its beacons (:class:`~agent.messages.Standing`); what is
-slow goes into summaries on the multihop channel, sooner while there is news.
+At 10 Hz it decides on its queue, its number and the lead of a vertex, and follows the trees of all
+vertices; until it has a place, each tick. What is urgent goes into its beacons
+(:class:`~agent.messages.Standing`). What is slow goes into summaries on the multihop channel,
+sooner while there is news.
 """
 
 from math import dist, inf
@@ -76,6 +77,7 @@ class Structure:
         self._next_decision_s = now_s
         self._blocked: frozenset[Place] = frozenset()
         self._view: View | None = None
+        self._own: OwnTarget | None = None
 
     @property
     def blocked(self) -> tuple[Place, ...]:
@@ -84,14 +86,18 @@ class Structure:
 
     def update(self, senses: Senses, mission: Flown) -> OwnTarget | None:
         """Return the own target now; None for an agent without a place."""
-        view = self._view = self._look(senses, mission)
         self._slow.hear(senses.summaries, self.trees, senses.now_s)
+        decides = senses.now_s >= self._next_decision_s
+        if not decides and self.claim.ranked and self._own is not None:
+            return self._own
+        view = self._view = self._look(senses, mission)
         view.summaries = self._slow.summaries
         self.follow_trees(view, senses)
-        if senses.now_s >= self._next_decision_s:
+        if decides:
             self._next_decision_s = senses.now_s + 1.0 / DECISION_HZ - 1e-9
             self._decide(view, senses, mission)
-        return self._target(view)
+        self._own = self._target(view)
+        return self._own
 
     def _look(self, senses: Senses, mission: Flown) -> View:
         around, frame = senses.neighbours, mission.frame

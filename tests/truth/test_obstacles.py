@@ -5,7 +5,7 @@ from math import cos, radians, sin
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tests.truth.shapes import any_shape, surface, triples
@@ -39,6 +39,7 @@ def test_distances_along_the_axes(shape, point, metres):
     assert distances([shape], point).distance[0, 0] == pytest.approx(metres)
 
 
+@example(Sphere(centre_m=(0.0, 0.0, 0.0), radius_m=1.0), (0.0, 0.0, 1.1473756936625458e-160), 0)
 @given(any_shape, triples, st.integers(0, 2**32))
 def test_the_distance_is_that_of_the_nearest_surface_point(shape, point, seed):
     samples = surface(shape, np.random.default_rng(seed), 300)

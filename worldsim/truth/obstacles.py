@@ -19,6 +19,9 @@ from worldsim.truth.vehicle import Floats
 BISECTIONS = 48
 """Halvings of a line of some centimetres; the result is finer than a float can tell."""
 
+LEAST_LENGTH_M = 1e-150
+"""The square of a shorter vector is no longer exact."""
+
 
 class SurfaceDistances(NamedTuple):
     """Distances of P points from the surfaces of M obstacles.
@@ -201,8 +204,8 @@ def _from_corner(beyond: tuple[Floats, ...]) -> tuple[Floats, list[Floats]]:
 
 
 def _unit(vector: Floats, length: Floats) -> Floats:
-    """Return unit vectors; straight up for those of no length."""
-    sound = (length > 0.0)[:, :, None]
+    """Return unit vectors; straight up for those of no length that can be told."""
+    sound = (length > LEAST_LENGTH_M)[:, :, None]
     scaled: Floats = vector / np.where(sound, length[:, :, None], 1.0)
     return np.where(sound | np.isnan(vector), scaled, (0.0, 0.0, 1.0))
 
