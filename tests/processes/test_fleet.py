@@ -238,7 +238,8 @@ def test_a_stopped_netem_is_named_not_the_host(start: Start, scenario: Write, ru
     os.kill(pids(run)["netem"], signal.SIGSTOP)
     fleet.wait_for_output("netem was stopped by a signal at ", 5.0)
     os.kill(pids(run)["netem"], signal.SIGCONT)
-    assert fleet.status(20.0) in (1, 3), fleet.text
+    # A stop that ends at once may leave the run sound; a long one does not.
+    assert fleet.status(20.0) in (0, 1, 3), fleet.text
     assert "the host was too slow" not in fleet.text
     summary = summary_of(run)
     if summary["outcome"] == "inconclusive":
