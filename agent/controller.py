@@ -84,6 +84,13 @@ class Flown(NamedTuple):
     frame: Frame  # the target's frame at present
 
 
+class HeardFrame(NamedTuple):
+    """The frame of a team whose mission the agent does not know."""
+
+    key: int  # of the mission
+    frame: Frame  # at present
+
+
 class Senses(msgspec.Struct, frozen=True, gc=False):
     """Everything that a controller decides on."""
 
@@ -103,6 +110,8 @@ class Senses(msgspec.Struct, frozen=True, gc=False):
     summaries: tuple[HeardSummary, ...] = ()  # heard since the last step
     obstacles: tuple[Vector, ...] = ()
     """Near points of obstacles, relative to the own centre [m; world axes]."""
+    heard_frame: HeardFrame | None = None
+    """Without a mission: the frame that a neighbour with a tier reported last, for up to 5 s."""
 
 
 class Words(NamedTuple):

@@ -220,6 +220,7 @@ class Agent:
             link=self._link,
             summaries=tuple(each for heard in summaries.values() for each in heard),
             obstacles=self._obstacles(observation),
+            heard_frame=self._missions.heard_frame_at(now_s),
         )
 
     def _obstacles(self, observation: Observation) -> tuple[Vector, ...]:

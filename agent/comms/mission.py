@@ -11,7 +11,8 @@ flies an older one or none.
 An agent that has the mission computes the frame from its path, and reports the frame at the time of
 each beacon. An agent of an older mission that has only heard of the frame passes on the report
 unchanged, with its stamp, down the tiers. The newest stamp wins, and each agent extrapolates the
-frame from there. To an agent without a mission a frame means nothing.
+frame from there. An agent without a mission only keeps pace with a frame that it hears from a
+neighbour with a tier, and passes nothing on.
 
 A key heard by radio may not run ahead of the time (``is_plausible``), so whatever key a member
 invents, the operator's next mission has a higher one. Every mission passes the one check of
@@ -24,7 +25,8 @@ from __future__ import annotations
 from typing import NamedTuple, assert_never
 
 from agent.codec import RejectedError, decode, decode_formation, encode, encode_formation
-from agent.controller import Flown
+from agent.comms.reported_frame import FrameFromTiers, ReportedFrame, check_stamp
+from agent.controller import Flown, HeardFrame
 from agent.messages import (
     AGENT_IDS,
     AT_HOME,
@@ -58,8 +60,6 @@ DEAF_S = 0.5
 DEAF_AFTER_REJECTION_S = 10.0
 """How long the pieces of a sender are ignored after a mission of it was taken, or rejected: it may
 not occupy a receiver with one mission after the other."""
-MAX_EXTRAPOLATION_S = 5.0
-"""A reported frame is extrapolated for this long; then it counts as at rest."""
 
 
 def last_version(time_s: float) -> int:
@@ -70,6 +70,11 @@ def last_version(time_s: float) -> int:
 def is_plausible(key: int, time_s: float) -> bool:
     """Whether a team can have a mission with this key at a time [s; Observation time]."""
     return key // KEYS_PER_VERSION <= last_version(time_s)
+
+
+def _check_key(key: int, time_s: float) -> None:
+    if not is_plausible(key, time_s):
+        raise RejectedError("mission", f"no team can have had so many missions: {key}")
 
 
 class _MissionData(Message, frozen=True):
@@ -85,25 +90,6 @@ class _Pieces(NamedTuple):
     key: int
     number: int  # of pieces in all
     parts: dict[int, bytes]
-
-
-class ReportedFrame:
-    """A frame known only from a beacon: its pose at a stamp, and its velocity then."""
-
-    def __init__(self, pose: Pose, drift: Drift | None) -> None:
-        self.pose = pose
-        self.drift = drift
-        self.rests = drift is None
-
-    def at(self, time_s: float) -> Frame:
-        """Return the frame at a time [s]."""
-        pose, drift = self.pose, self.drift
-        age_s = time_s - drift.stamp_s if drift is not None else 0.0
-        if drift is None or age_s > MAX_EXTRAPOLATION_S:
-            return Frame(pose[:3], pose.yaw)
-        t, velocity = max(0.0, age_s), (drift.x, drift.y, drift.z)
-        origin = (pose.x + t * drift.x, pose.y + t * drift.y, pose.z + t * drift.z)
-        return Frame(origin, pose.yaw + t * drift.yaw_rate, velocity, drift.yaw_rate)
 
 
 class Missions:
@@ -134,6 +120,7 @@ class Missions:
         self._path = path
         self._frame: Track | ReportedFrame = Track(path)
         self._resting: tuple[Frame, Pose] | None = None
+        self._from_tiers = FrameFromTiers()
         self.frame_key = NO_MISSION
         self.flown: Flown | None = None
         if formation is not None:
@@ -151,6 +138,10 @@ class Missions:
             self.flown = self.flown._replace(frame=self._frame.at(time_s))
         return self.flown
 
+    def heard_frame_at(self, time_s: float) -> HeardFrame | None:
+        """Return the frame that an agent without a mission keeps pace with at a time [s]."""
+        return self._from_tiers.at(time_s) if self.flown is None else None
+
     def accept_order(self, mission: Mission) -> None:
         """Take an operator's order; raise RejectedError for an old key or an invalid formation."""
         version = max(self.key, 0) // KEYS_PER_VERSION + 1
@@ -166,8 +157,7 @@ class Missions:
             return
         if now_s < self._deaf_until_s.get(sender, 0.0):
             return
-        if not is_plausible(piece.key, now_s):
-            raise RejectedError("mission", f"no team can have had so many missions: {piece.key}")
+        _check_key(piece.key, now_s)
         collected = self._pieces.get(sender)
         if collected is None or collected.key != piece.key or collected.number != piece.count:
             collected = self._pieces[sender] = _Pieces(piece.key, piece.count, {})
@@ -193,13 +183,16 @@ class Missions:
         """Take the frame from a beacon if it is newer, before its mission has arrived.
 
         So a moving frame spreads down the tiers at the local channel's rate. An agent without a
-        mission has nothing to fly in it, and ignores it. Raises RejectedError for a frame with a
-        stamp later than the beacon's, or of an impossible mission.
+        mission keeps it apart: it reports no frame. Raises RejectedError for a frame with a stamp
+        later than the beacon's, or of an impossible mission.
         """
-        if self.flown is None or not self._is_newer(beacon):
+        if self.flown is None:
+            _check_key(beacon.frame_key, beacon.stamp_s)
+            self._from_tiers.receive(beacon)
             return
-        if beacon.drift is not None and beacon.drift.stamp_s > beacon.stamp_s:
-            raise RejectedError("future", "the frame's stamp is later than the beacon's")
+        if not self._is_newer(beacon):
+            return
+        check_stamp(beacon)
         ahead = beacon.frame_key // KEYS_PER_VERSION - self.flown.key // KEYS_PER_VERSION
         if ahead > FRAME_VERSIONS_AHEAD:
             detail = f"a frame {ahead} missions ahead of the one flown; the mission comes first"

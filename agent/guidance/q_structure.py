@@ -4,7 +4,7 @@ Target-on-queue (Algorithm 1, at 5 Hz), bobber (Algorithm 2), constellation-agen
 potentials (18)-(28), then move or turn. All numbers are plain floats.
 """
 
-from math import pi, radians, sqrt
+from math import dist, pi, radians, sqrt
 
 from agent.config import AgentSetup
 from agent.controller import Intent, Senses
@@ -12,17 +12,19 @@ from agent.guidance.bobber import CastZone, bobber, cast_reach, cast_zone
 from agent.guidance.cone import cone_of
 from agent.guidance.constellation import avoidance_of
 from agent.guidance.deadlock_escape import DeadlockEscape
+from agent.guidance.held_point import HeldPoint
 from agent.guidance.movement import saturated, steer
 from agent.guidance.place_selection import place_selection
 from agent.guidance.potential import Potential
 from agent.guidance.slot_attitude import AttitudeAtSlot
 from agent.messages import ZERO, Vector
+from agent.places.place_points import OwnTarget
 from agent.qstructure.target_frame import Frame
 
 GAIN = 2.0
 """c of (28) [1/s]."""
-
-AT_REST = Frame()
+GIVES_WAY_M = 0.01
+"""An agent without a mission holds no point from which others push it by more than this."""
 
 
 class QStructure:
@@ -38,17 +40,19 @@ class QStructure:
         self._attitude = AttitudeAtSlot(vehicle)
         self._potential = Potential(control.separation_m)
         self._places = place_selection(setup)
+        self._held = HeldPoint()
         self._avoidance = avoidance_of(control.avoidance, control.safety_m)
         self._escape = DeadlockEscape(setup.id)
 
     def decide(self, senses: Senses) -> Intent:
         """Return the intent; an agent without a place stays where it is and gives way."""
-        q, own, mission = senses.position, self._places.select(senses), senses.mission
-        frame = mission.frame if mission is not None else AT_REST
-        q_toq = frame.to_world(own.slot.point) if own is not None else q
+        q, own = senses.position, self._places.select(senses)
+        q_toq, frame = self._destination(senses, own)
         zone = self._zone_within(senses.link.reach_m)
         q_tg = bobber(q, senses.yaw, _aim_point(q_toq, frame), zone)
         x, y, z = self._potential.omega(q, q_tg, senses.neighbours)
+        if senses.mission is None and _pushed_m(q, q_tg, (x, y, z)) > GIVES_WAY_M:
+            self._held.give_way()
         escape = self._escape.direction(senses, q_toq)
         if senses.obstacles and not self._escape.rounds_obstacle:
             a, b, c = self._obstacle_term(senses)
@@ -75,6 +79,13 @@ class QStructure:
             words=self._places.words(senses.now_s),
         )
 
+    def _destination(self, senses: Senses, own: OwnTarget | None) -> tuple[Vector, Frame]:
+        """Return where to fly in the end [m; world frame], and the frame in which that rests."""
+        if senses.mission is None:
+            return self._held.target(senses)
+        frame = senses.mission.frame
+        return frame.to_world(own.slot.point) if own is not None else senses.position, frame
+
     def _zone_within(self, heard_m: float) -> CastZone:
         """Return the cast-zone where others were heard from so far at most [m] (E20)."""
         reach = cast_reach(self._control, heard_m, self._max_speed / GAIN)
@@ -94,6 +105,11 @@ class QStructure:
         v = self._max_speed
         escaping = (wanted[0] + v * escape[0], wanted[1] + v * escape[1], wanted[2] + v * escape[2])
         return saturated(escaping, self._max_speed, self._max_climb)
+
+
+def _pushed_m(q: Vector, q_tg: Vector, omega: Vector) -> float:
+    """Return the neighbours' share of Omega [m]."""
+    return dist((q[0] - q_tg[0], q[1] - q_tg[1], q[2] - q_tg[2]), omega)
 
 
 def _aim_point(q_toq: Vector, frame: Frame) -> Vector:

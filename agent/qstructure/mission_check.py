@@ -5,7 +5,7 @@ flies in every team: a slot lies within REACH_M of the frame's origin and the fr
 of the world's, so no slot leaves the world, whichever formation meets whichever frame.
 """
 
-from math import dist
+from math import dist, hypot
 
 from agent.messages import (
     MAX_SPEED_MPS,
@@ -14,8 +14,10 @@ from agent.messages import (
     AllocationKind,
     Drift,
     FramePath,
+    Vector,
 )
 from agent.qstructure.formation import Formation
+from agent.qstructure.target_frame import Frame
 
 LEAST_LEG_M = 1e-3
 LEAST_TURN_RPS = 1e-4
@@ -53,6 +55,12 @@ def check_drift(formation: Formation, drift: Drift, agents: int) -> None:
     turning_mps = abs(drift.yaw_rate) * formation.reach_m(agents)
     if turning_mps > MAX_SPEED_MPS:
         raise MissionError("frame", _too_fast(turning_mps))
+
+
+def can_hold(frame: Frame, point: Vector) -> bool:
+    """Whether a mission could have a slot at a point [m; frame] of a frame that moves so."""
+    reach_m = hypot(*point)
+    return reach_m <= REACH_M and abs(frame.yaw_rate) * reach_m <= MAX_SPEED_MPS
 
 
 def _check_reach(formation: Formation, agents: int) -> None:

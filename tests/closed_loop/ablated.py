@@ -8,13 +8,12 @@ from agent.structure.structure import Structure
 
 
 class _Distressed(Structure):
-    """A structure without tiers: whoever is no root is always in distress."""
+    """A structure without tiers: nobody states one, not even a root."""
 
     def follow_trees(self, view, senses):
         super().follow_trees(view, senses)
         for tree in self.trees:
-            if tree.parent >= 0:
-                tree.parent = tree.tier = -1
+            tree.parent = tree.tier = -1
 
 
 class _Mute(Structure):

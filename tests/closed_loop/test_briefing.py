@@ -1,20 +1,34 @@
-"""Knowledge comes by radio: who is not briefed flies no mission before it has heard one."""
+"""Knowledge comes by radio: who is not briefed flies no mission before it has heard one.
+
+Until then it keeps pace with the frame that comes down the tiers.
+"""
 
 from itertools import chain
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from agent.messages import NO_MISSION
+from agent.messages import DISTRESS, NO_MISSION
+from agent.qstructure.frame_path import Track
 from tests.closed_loop.test_faults import BAD, TickList, check_safety, scenario, violated
+from tests.closed_loop.test_roles import line
 from worldsim.engine.virtual import Flight, fly
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
+from worldsim.scenario.target_frame import path_of
 
 CLEAN: dict[str, str] = {}
 MOVES = {"frame": "{ waypoints_m = [[0, 0, 0], [9, 0, 0]], speed_mps = 0.2, start_s = 2 }"}
 APART = "join = { count = 1, start = { kind = 'list', positions_m = [[-3, 3, 0]] } }"
 JOINER = 9
+STRAIGHT = "{ waypoints_m = [[0, 0, 0], [9, 0, 0]], speed_mps = 0.3, start_s = 4 }"
+TURNING = (
+    "{ waypoints_m = [[0, 0, 0], [4, 0, 0], [4, 4, 0]], speed_mps = 0.3, start_s = 4,"
+    " yaw = 'path', turn_dps = 4 }"
+)
+ONLY_THE_FRAME = {"fleet.briefed": "[0]", "comms.multihop_hz": "0"}
+WITHOUT_TIERS = {"control.controller": "tests.closed_loop.ablated:WithoutTiers"}
 BOOTED_S = 16.0
 """When an agent that joins at 15 s steps first [s]."""
 
@@ -43,6 +57,17 @@ def moved_m(ticks: list[Tick], agent: int) -> float:
     path = np.array([tick.position[agent] for tick in ticks])
     path = path[~np.isnan(path[:, 0])]
     return float(np.linalg.norm(path - path[0], axis=1).max())
+
+
+def moved_in_frame(flown: Scenario, ticks: list[Tick], from_s: float) -> NDArray[np.float64]:
+    """Return how far each agent's vehicle moves in the moving frame from a time on [m]."""
+    track = Track(path_of(flown.frame))
+    later = [tick for tick in ticks if tick.time_s >= from_s]
+    points = np.array(
+        [[track.at(tick.time_s).to_frame(tuple(at)) for at in tick.position] for tick in later]
+    )
+    moved: NDArray[np.float64] = np.linalg.norm(points - points[0], axis=2).max(axis=0)
+    return moved
 
 
 @pytest.mark.parametrize(("radio", "within_s"), [(CLEAN, 1.5), (BAD, 5.0)], ids=["clean", "bad"])
@@ -75,14 +100,9 @@ def test_an_agent_that_restarts_alone_knows_nothing_of_the_mission_it_flew() -> 
     assert flown == {NO_MISSION}
 
 
-@pytest.mark.parametrize(
-    "radio", [deaf_and_mute(JOINER), {"comms.multihop_hz": "0"}], ids=["100 % loss", "multihop off"]
-)
-def test_a_joiner_that_cannot_hear_the_mission_stays_where_it_joined(
-    radio: dict[str, str],
-) -> None:
+def test_a_joiner_that_hears_nothing_stays_where_it_joined() -> None:
     expected = {"expect.reform_within_s": "20"}
-    flown = scenario(1, 30, f"at_s = 1, {APART}", **radio, **MOVES, **expected)
+    flown = scenario(1, 30, f"at_s = 1, {APART}", **deaf_and_mute(JOINER), **MOVES, **expected)
     flight, ticks = recorded(flown)
     assert moved_m(ticks, JOINER) <= 0.1
     assert moved_m(ticks, 0) > 3.0
@@ -92,6 +112,56 @@ def test_a_joiner_that_cannot_hear_the_mission_stays_where_it_joined(
     assert (phase.converge_s, phase.residual_m, joined.reformed_s) == (None, None, None)
     missed = flight.loop.judge.shortcomings().missed
     assert missed == ["converge pyramidal-wedge", "reform_within_s"]
+
+
+@pytest.mark.parametrize("path", [STRAIGHT, TURNING], ids=["straight", "turning"])
+def test_without_the_mission_agents_keep_their_place_beside_the_team(path: str) -> None:
+    flown = scenario(1, 28, frame=path, **ONLY_THE_FRAME)
+    _, ticks = recorded(flown)
+    assert moved_in_frame(flown, ticks, from_s=4.0)[1:].max() < 0.5
+    last = ticks[-1]
+    assert last.mission.tolist() == [0] + [NO_MISSION] * 8
+    assert last.place[1:].tolist() == [[-1, -1]] * 8
+    assert last.hierarchy.role[1:].tolist() == [DISTRESS] * 8
+
+
+def test_without_tiers_the_team_leaves_them_behind() -> None:
+    flown = scenario(1, 24, frame=STRAIGHT, **ONLY_THE_FRAME, **WITHOUT_TIERS)
+    _, ticks = recorded(flown)
+    assert moved_in_frame(flown, ticks, from_s=4.0)[1:].min() > 5.0
+
+
+def test_a_joiner_behind_a_moving_team_keeps_up_until_the_mission_reaches_it() -> None:
+    """The multihop channel fails for as long as a joiner that hovers needs to be out of range."""
+    outage = "at_s = 9, netem = { multihop = { loss_percent = 100 } }, for_s = 13"
+    join = "at_s = 9, join = { count = 1, start = { kind = 'list', positions_m = [[-4, 0, 0]] } }"
+    path = "{ waypoints_m = [[0, 0, 0], [4.5, 0, 0]], speed_mps = 0.3, start_s = 10 }"
+    radio = {"netem.range_m": "4", "netem.loss_percent": "50"}
+    flight, ticks = recorded(scenario(1, 34, outage, join, frame=path, **radio))
+    assert 22.0 <= learned_s(ticks, JOINER) <= 24.0
+    (joined,) = flight.loop.judge.recoveries
+    assert joined.reformed_s is not None
+
+
+@pytest.mark.parametrize("start_s", [4, 1000], ids=["moving", "at rest"])
+def test_without_the_mission_an_agent_gives_up_the_point_that_a_member_needs(start_s: int) -> None:
+    path = f"{{ waypoints_m = [[0, 0, 0], [9, 0, 0]], speed_mps = 0.3, start_s = {start_s} }}"
+    fleet = line([2.0, 0.0], 6.0, frame=path, **ONLY_THE_FRAME)
+    while fleet.loop.world.time_s < 16.0:
+        fleet.slot()
+    assert fleet.loop.figures.slot_error[0] < 0.05
+    apart = fleet.loop.world.vehicles.position[1] - fleet.loop.world.vehicles.position[0]
+    assert 0.25 < np.linalg.norm(apart) < 1.0
+
+
+def test_in_distress_with_a_mission_an_agent_keeps_to_its_frame_and_claims_nothing() -> None:
+    flown = scenario(1, 20, frame=STRAIGHT, **WITHOUT_TIERS)
+    _, ticks = recorded(flown)
+    distressed = ticks[-1].hierarchy.role == DISTRESS
+    assert distressed.sum() == 8
+    claims = [tick.place[distressed].tolist() for tick in ticks]
+    assert all(claim == [[-1, -1]] * 8 for claim in claims)
+    assert moved_in_frame(flown, ticks, from_s=14.0)[distressed].max() < 0.3
 
 
 def test_an_operators_mission_reaches_a_team_of_which_nobody_was_briefed() -> None:
