@@ -12,7 +12,7 @@ from agent.messages import NO_MISSION, Beacon, Drift, Pose
 from agent.qstructure.target_frame import Frame
 
 MAX_EXTRAPOLATION_S = 5.0
-"""A reported frame is extrapolated for this long; then it counts as at rest."""
+"""A reported frame is extrapolated for this long; then it counts as at rest where it is."""
 
 
 class ReportedFrame:
@@ -26,12 +26,15 @@ class ReportedFrame:
     def at(self, time_s: float) -> Frame:
         """Return the frame at a time [s]."""
         pose, drift = self.pose, self.drift
-        age_s = time_s - drift.stamp_s if drift is not None else 0.0
-        if drift is None or age_s > MAX_EXTRAPOLATION_S:
+        if drift is None:
             return Frame(pose[:3], pose.yaw)
-        t, velocity = max(0.0, age_s), (drift.x, drift.y, drift.z)
+        age_s = time_s - drift.stamp_s
+        t = min(max(0.0, age_s), MAX_EXTRAPOLATION_S)
         origin = (pose.x + t * drift.x, pose.y + t * drift.y, pose.z + t * drift.z)
-        return Frame(origin, pose.yaw + t * drift.yaw_rate, velocity, drift.yaw_rate)
+        yaw = pose.yaw + t * drift.yaw_rate
+        if age_s > MAX_EXTRAPOLATION_S:
+            return Frame(origin, yaw)
+        return Frame(origin, yaw, (drift.x, drift.y, drift.z), drift.yaw_rate)
 
 
 class _Report(NamedTuple):

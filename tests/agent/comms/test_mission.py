@@ -5,6 +5,7 @@ import pytest
 
 from agent.codec import RejectedError, encode_formation
 from agent.comms.mission import KEYS_PER_VERSION, Missions
+from agent.comms.reported_frame import MAX_EXTRAPOLATION_S
 from agent.messages import AT_HOME, HOME, NO_MISSION, Drift, FramePath, Mission, Pose
 from agent.qstructure.formation import FormationSpec
 from tests.agent.comms.builders import beacon
@@ -77,6 +78,15 @@ def test_with_an_older_mission_the_stamped_frame_is_flown_until_its_mission_come
     briefed.receive_frame(beacon(1, 1, NOW_S, mission=SECOND, frame_key=SECOND, **DRIFTING))
     assert (briefed.key, briefed.frame_key) == (0, SECOND)
     assert briefed.flown_at(NOW_S + 2.0).frame.origin == (8.0, 0.0, 0.0)
+
+
+def test_a_frame_that_is_heard_of_no_more_comes_to_rest_where_it_was_last_expected(briefed):
+    briefed.receive_frame(beacon(1, 1, NOW_S, mission=SECOND, frame_key=SECOND, **DRIFTING))
+    moving = briefed.flown_at(NOW_S + MAX_EXTRAPOLATION_S).frame
+    resting = briefed.flown_at(NOW_S + MAX_EXTRAPOLATION_S + 60.0).frame
+    assert moving.moves
+    assert not resting.moves
+    assert resting.origin == moving.origin == (9.5, 0.0, 0.0)
 
 
 def test_a_beacon_of_an_agent_without_a_mission_changes_nothing(briefed):
