@@ -15,6 +15,8 @@ from __future__ import annotations
 import sys
 from array import array
 from collections import Counter
+from math import inf
+from operator import add
 from typing import NamedTuple
 
 from agent.messages import MAX_LABELS_B, MAX_TEAM, Summary
@@ -73,6 +75,10 @@ class Census:
         """When a member that has been silent for too long was last asked for [s]."""
         self._from = 0
         self._changed_s = 0.0
+        self._looked_s = inf
+        """T_lost before the last look for late members [s]."""
+        self._first_deadline_s = inf
+        """No member that may be asked for has an earlier deadline: see :meth:`_note_deadline`."""
 
     @property
     def most(self) -> int:
@@ -101,21 +107,22 @@ class Census:
         self._make_room(member + 1)
         label = int(stamp_s / QUANTUM_S) * CODES + code
         if label > self._labels[member]:
-            self._set(member, label, stamp_s)
             self._lag_s[member] *= 1.0 - LAG_SMOOTHING
+            self._set(member, label, stamp_s)
 
     def merge(self, summary: Summary, stamp_s: float, now_s: float) -> None:
         """Take the labels of another agent, as they were at its stamp [s]."""
         greatest = int(stamp_s / QUANTUM_S) * CODES + CODES - 1
         for member, label in summary.news:
             if member < self._ids and label != UNKNOWN:
-                self._make_room(member + 1)
                 self._compare(member, greatest - label, now_s)
         if summary.labels:
             self._merge_run(summary.first, summary.labels, greatest, now_s)
 
     def _compare(self, member: int, label: int, now_s: float) -> None:
         """Take a later label of a member; answer a much older one."""
+        if member >= len(self._labels):
+            self._make_room(member + 1)
         if label > self._labels[member] and member != self._own:
             self._expect_later(member, now_s - label // CODES * QUANTUM_S)
             self._set(member, label, now_s)
@@ -130,12 +137,23 @@ class Census:
     def ask(self, now_s: float, lost_s: float) -> None:
         """Ask for members that have been silent for too long. lost_s: T_lost of a neighbour [s]."""
         oldest_s = now_s - lost_s
-        forgotten = int((oldest_s - FORGOTTEN_S) / QUANTUM_S) * CODES
+        if self._looked_s <= oldest_s <= self._first_deadline_s:
+            return
+        self._looked_s, self._first_deadline_s = oldest_s, inf
+        forgotten = max(0, int((oldest_s - FORGOTTEN_S) / QUANTUM_S) * CODES)
         for member, label in enumerate(self._labels):
-            late = label and label * LABEL_S < oldest_s - LAGS * self._lag_s[member]
-            if late and label > forgotten and now_s - self._asked_s.get(member, 0.0) >= ASK_S:
+            if label <= forgotten:
+                continue
+            late = self._note_deadline(member) < oldest_s
+            if late and now_s - self._asked_s.get(member, 0.0) >= ASK_S:
                 self._asked_s[member] = now_s
                 self._changed.add(member)
+
+    def _note_deadline(self, member: int) -> float:
+        """Return when a member's label has to become later, but for T_lost [s]; keep the first."""
+        deadline_s = self._labels[member] * LABEL_S + LAGS * self._lag_s[member]
+        self._first_deadline_s = min(self._first_deadline_s, deadline_s)
+        return deadline_s
 
     def _merge_run(self, first: int, labels: bytes, greatest: int, now_s: float) -> None:
         wire = _unpacked(labels)
@@ -143,9 +161,7 @@ class Census:
         self._make_room(end)
         limit = greatest - WORTH_QUANTA * CODES
         known = self._labels[first:end]
-        later = [
-            k for k, (w, mine) in enumerate(zip(wire, known, strict=False)) if w + mine < limit
-        ]
+        later = [k for k, both in enumerate(map(add, wire, known)) if both < limit]
         for k in later:
             if wire[k] != UNKNOWN:
                 self._adopt(first + k, greatest - wire[k], now_s)
@@ -164,6 +180,7 @@ class Census:
             if member != self._own:
                 self._changed_s = max(self._changed_s, now_s)
         self._labels[member] = label
+        self._note_deadline(member)
 
     def population(self, now_s: float, lost_s: float, queues: int, vertices: int) -> Population:
         """Return who is there now. lost_s: T_lost of a neighbour, and time for an answer [s]."""

@@ -24,6 +24,8 @@ class Convergecast:
     def __init__(self, own_id: int) -> None:
         self._own_id = own_id
         self._reports: dict[int, tuple[float, TreeReport]] = {}
+        self._parts: list[Subtree] = []
+        self._total: Subtree | None = None
 
     def hear(self, sender: int, report: TreeReport, stamp_s: float) -> None:
         """Take an agent's report; one that names another parent ends what it told before.
@@ -46,6 +48,18 @@ class Convergecast:
     def followers(self) -> list[Subtree]:
         """Return the present reports of the followers."""
         return [report.up for _, report in self._reports.values() if report.up is not None]
+
+    def total(self, own: Subtree | None, queues: int) -> Subtree:
+        """Return the sum of the followers' reports and the own part: the same one while they last.
+
+        queues: number of queues that begin at the vertex.
+        """
+        parts = self.followers()
+        if own is not None:
+            parts.append(own)
+        if self._total is None or parts != self._parts:
+            self._parts, self._total = parts, joined(parts, queues)
+        return self._total
 
 
 def joined(parts: Iterable[Subtree], queues: int) -> Subtree:

@@ -1,5 +1,6 @@
 """Time limits of the Q-structure, derived from the radio as an agent measures it."""
 
+from functools import lru_cache
 from math import log
 from typing import NamedTuple
 
@@ -13,6 +14,8 @@ LEAST_LOSS = 1e-3
 ANSWER_S = 0.15
 """An answer waits so long for the next summary [s]."""
 MOST_LOSS = 0.95
+LINKS_KEPT = 512
+"""An agent measures its link now and then, and needs the limits in each step."""
 
 
 class Timing(NamedTuple):
@@ -33,6 +36,7 @@ class Timing(NamedTuple):
     resettle_s: float  # the same later, when a wrong order would move vehicles for nothing
 
 
+@lru_cache(LINKS_KEPT)
 def timing_of(link: Link, beacon_period_s: float) -> Timing:
     """Return the time limits for a radio as measured. beacon_period_s: of the local channel."""
     latency, loss = link.latency_s, min(link.loss, MOST_LOSS)

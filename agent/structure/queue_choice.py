@@ -5,11 +5,11 @@ then on only a leader moves it (queue level of Fig. 3). An agent that could leav
 tiers: a candidate, with the extra way that it would have.
 """
 
+from collections.abc import Sequence
 from math import inf
 
 from agent.messages import MAX_TEAM, Candidate, Order
 from agent.structure.claim import NO_QUEUE, Claim
-from agent.structure.transfers import transfers
 from agent.structure.view import View, leads
 
 OFFER_S = 0.5
@@ -77,7 +77,7 @@ class QueueChoice:
         """Return the extra way to each queue that the own one may give to."""
         if claim.queue == NO_QUEUE or claim.leads or claim.swapping or claim.pushes(view.now_s):
             return ()
-        takers = transfers(view.map, view.counts, view.wanted).get(claim.queue)
+        takers = view.transfers.get(claim.queue)
         if takers is None:
             return ()
         asked = (claim.queue, claim.number, tuple(view.counts), view.wanted)
@@ -86,7 +86,7 @@ class QueueChoice:
             self._offers = self._ways(view, claim, takers)
         return self._offers
 
-    def _ways(self, view: View, claim: Claim, takers: list[int]) -> tuple[Candidate, ...]:
+    def _ways(self, view: View, claim: Claim, takers: Sequence[int]) -> tuple[Candidate, ...]:
         """Return the extra way to each queue that takes members."""
         own_m = view.distance(claim.queue, claim.number)
         if own_m == inf:  # no number, or one that a full queue has no place for

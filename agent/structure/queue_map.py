@@ -6,13 +6,16 @@ first vertex, its *home*. A number is a place's rank, counted from the first ran
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from math import dist
+from math import dist, inf
 from typing import NamedTuple
 
 from agent.messages import MAX_TEAM, Place, Vector
 from agent.qstructure.formation import NO_PLACES, Formation, Slot
 
 MAPS_KEPT = 16
+SPARSE = 8
+"""The nearest slot is looked for among each so many first."""
+LEAST_STEP_M = 1e-6
 
 
 class Nearest(NamedTuple):
@@ -20,6 +23,38 @@ class Nearest(NamedTuple):
 
     number: int
     away_m: float
+
+
+class Row:
+    """The slots of a queue's members in their order."""
+
+    def __init__(self, slots: Iterable[Slot] = ()) -> None:
+        self.slots: list[Slot] = []
+        self._longest_m = LEAST_STEP_M
+        """No slot is farther from the next one [m]."""
+        for slot in slots:
+            self.append(slot)
+
+    def append(self, slot: Slot) -> None:
+        """Add the next member's slot."""
+        if self.slots:
+            self._longest_m = max(self._longest_m, dist(self.slots[-1].point, slot.point))
+        self.slots.append(slot)
+
+    def nearest(self, first: int, here: Vector) -> Nearest | None:
+        """Return the nearest of the first members. here [m; target's frame].
+
+        The slots next to a far one are far, too: they are left out.
+        """
+        slots, end = self.slots, min(first, len(self.slots))
+        near_m = min([dist(slots[k].point, here) for k in range(0, end, SPARSE)], default=inf)
+        found, k = None, 0
+        while k < end:
+            away_m = dist(slots[k].point, here)
+            if away_m < near_m or (found is None and away_m == near_m):
+                found, near_m = k, away_m
+            k += max(1, int((away_m - near_m) / self._longest_m))
+        return Nearest(found + 1, near_m) if found is not None else None
 
 
 class QueueMap:
@@ -42,9 +77,14 @@ class QueueMap:
         self.closed = [queue.closed for queue in formation.queues]
         self._common = frozenset(formation.common)
         self._first_rank = [len(queue.stations) for queue in formation.queues]
-        self._open_slots: list[list[Slot]] = [[] for _ in numbers]
+        self._vertex_slots = [
+            formation.slot_at(place.queue, formation.queues[place.queue].stations[place.rank])
+            for place in self.vertex_places
+        ]
+        self._open_rows = [Row() for _ in numbers]
         self.members = lru_cache(maxsize=64)(self._members)
-        self._slots_between = lru_cache(maxsize=64)(self._measured_between)
+        self.blocked_numbers = lru_cache(maxsize=64)(self._blocked_numbers)
+        self._closed_row = lru_cache(maxsize=64)(self._measured_row)
 
     def is_common(self, vertex: int) -> bool:
         """Whether several queues share a vertex."""
@@ -73,22 +113,9 @@ class QueueMap:
                 wanted[through[0]] += 1
         return tuple(wanted)
 
-    def blocked_numbers(self, queue: int, blocked: Iterable[Place]) -> frozenset[int]:
-        """Return the numbers of a queue's members whose places are blocked."""
-        return frozenset(
-            [
-                number
-                for place in blocked
-                if place.queue == queue and (number := self.number(place)) > 0
-            ]
-        )
-
     def vertex_slot(self, vertex: int) -> Slot | None:
         """Return a vertex's slot."""
-        place = self.vertex_places[vertex]
-        return self.formation.slot_at(
-            place.queue, self.formation.queues[place.queue].stations[place.rank]
-        )
+        return self._vertex_slots[vertex]
 
     def slot(self, queue: int, number: int, members: int) -> Slot | None:
         """Return a member's slot; None where there is none.
@@ -97,39 +124,46 @@ class QueueMap:
         """
         if number < 1:
             return None
-        if self.closed[queue]:
-            room = self.formation.queues[queue].room or 0
-            slots = self._slots_between(queue, min(max(1, members), room))
-        else:
-            slots = self._slots_behind(queue, min(number, MAX_TEAM))
+        slots = self._row(queue, number, members).slots
         return slots[number - 1] if number <= len(slots) else None
 
     def nearest(self, queue: int, members: int, here: Vector) -> Nearest | None:
         """Return the nearest of a queue's first members. here [m; target's frame]."""
-        found = None
-        for number in range(1, max(members, 1) + 1):
-            slot = self.slot(queue, number, members)
+        first = max(members, 1)
+        return self._row(queue, first, members).nearest(first, here)
+
+    def _row(self, queue: int, number: int, members: int) -> Row:
+        """Return a queue's row, as far as a number if there are so many slots."""
+        if self.closed[queue]:
+            room = self.formation.queues[queue].room or 0
+            return self._closed_row(queue, min(max(1, members), room))
+        row = self._open_rows[queue]
+        if len(row.slots) < number:
+            self._extend(queue, row, min(number, MAX_TEAM))
+        return row
+
+    def _extend(self, queue: int, row: Row, count: int) -> None:
+        """Add slots to an open queue's row until there are so many, as far as there are any."""
+        while len(row.slots) < count:
+            slot = self.formation.slot(self.place(queue, len(row.slots) + 1), 0)
             if slot is None:
                 break
-            away_m = dist(slot.point, here)
-            if found is None or away_m < found.away_m:
-                found = Nearest(number, away_m)
-        return found
+            row.append(slot)
 
-    def _slots_behind(self, queue: int, count: int) -> list[Slot]:
-        """Return at least the first ``count`` slots of an open queue, as far as there are any."""
-        slots = self._open_slots[queue]
-        while len(slots) < count:
-            slot = self.formation.slot(self.place(queue, len(slots) + 1), 0)
-            if slot is None:
-                break
-            slots.append(slot)
-        return slots
-
-    def _measured_between(self, queue: int, members: int) -> list[Slot]:
+    def _measured_row(self, queue: int, members: int) -> Row:
         arc_lengths = self.formation.queues[queue].members(members)
         slots = [self.formation.slot_at(queue, s) for s in arc_lengths]
-        return [slot for slot in slots if slot is not None]
+        return Row([slot for slot in slots if slot is not None])
+
+    def _blocked_numbers(self, queue: int, blocked: frozenset[Place]) -> frozenset[int]:
+        """Return the numbers of a queue's members whose places are blocked."""
+        return frozenset(
+            [
+                number
+                for place in blocked
+                if place.queue == queue and (number := self.number(place)) > 0
+            ]
+        )
 
     def _members(self, agents: int, blocked: frozenset[Place] = NO_PLACES) -> tuple[int, ...]:
         """Return how many members each queue gets besides those in vertices, in a team."""

@@ -13,7 +13,7 @@ import msgspec
 from agent.controller import HeardSummary
 from agent.messages import MAX_PLACES, LeaderSummary, Place, Subtree, Summary, TreeReport
 from agent.structure.census import Census
-from agent.structure.convergecast import ROUNDS, Convergecast, joined
+from agent.structure.convergecast import ROUNDS, Convergecast
 from agent.structure.link_timing import Timing
 from agent.structure.queue_map import QueueMap
 from agent.structure.summary_frame import (
@@ -122,14 +122,14 @@ class SlowLayer:
         rounds = ROUNDS * max(1.0, self._map.vertices / VERTICES_A_ROUND)
         rounds_s = rounds * min(self._round_s, LONGEST_ROUND_S) / (1.0 - timing.loss)
         self._collected[vertex].forget(now_s - rounds_s - timing.latency_s)
-        parts = self._collected[vertex].followers()
-        found = joined([*parts, own] if own is not None else parts, len(homed))
+        found = self._collected[vertex].total(own, len(homed))
         near = [p for p in seen if p.queue in homed or self._map.vertex_of.get(p) == vertex]
         if near:
             places = sorted({*(Place(*place) for place in found.blocked), *near})[:MAX_PLACES]
             found = msgspec.structs.replace(found, blocked=tuple(places))
-        self._note_candidates(vertex, found)
-        self._subtrees[vertex] = found
+        if found is not self._subtrees[vertex]:
+            self._note_candidates(vertex, found)
+            self._subtrees[vertex] = found
         return found
 
     def _note_candidates(self, vertex: int, subtree: Subtree) -> None:

@@ -8,7 +8,6 @@ else with its place.
 from agent.controller import Heard
 from agent.messages import Swap
 from agent.structure.claim import Claim
-from agent.structure.transfers import transfers
 from agent.structure.view import View, leads
 
 GAIN_M2 = 0.5
@@ -108,7 +107,7 @@ class Swaps:
         """
         now_s, timing = view.now_s, view.timing
         waits = now_s < claim.no_swap_before_s or now_s - claim.since_s <= timing.hold_s
-        leaving = claim.queue in transfers(view.map, view.counts, view.wanted)
+        leaving = claim.queue in view.transfers
         if waits or leaving or claim.swapping or claim.pushes(now_s):
             return
         best: tuple[float, Heard] | None = None

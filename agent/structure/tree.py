@@ -11,8 +11,9 @@ of a lower tier, and what goes to it is sent to the parent.
 """
 
 from collections.abc import Collection
-from math import dist, hypot, inf
-from typing import NamedTuple
+from math import dist, inf
+
+import msgspec
 
 from agent.controller import Heard
 from agent.messages import Branch, RootKey, Vector
@@ -35,7 +36,7 @@ MAX_TIER = 1000
 VOID_KEPT = 32
 
 
-class Follower(NamedTuple):
+class Follower(msgspec.Struct, frozen=True, gc=False):
     """An agent heard, with its branch in this tree."""
 
     heard: Heard
@@ -90,8 +91,8 @@ class Tree:
             self._make_void(self.root)
             self.root = None
         latest = latest_version(now_s)
-        for _, branch in followers:
-            self._compare(branch, now_s, latest)
+        for each in followers:
+            self._compare(each.branch, now_s, latest)
         return self.root != leading
 
     def _compare(self, branch: Branch, now_s: float, latest: int) -> None:
@@ -130,40 +131,54 @@ class Tree:
         here, velocity: own [m, m/s; world frame]; reach_m: the range as measured [m]; parent_s:
         after a longer silence only the present parent is still one, if there is no better [s].
         """
-        if self.root is None or self.root.id == self._own_id:
-            self.parent, self.tier = -1, (-1 if self.root is None else 0)
+        root, own_id = self.root, self._own_id
+        if root is None or root.id == own_id:
+            self.parent, self.tier = -1, (-1 if root is None else 0)
             return
         position_of = {each.heard.id: each.heard.position for each in followers}
 
         def order(each: Follower) -> tuple[int, bool, float, int]:
-            heard, branch = each
+            heard, branch = each.heard, each.branch
             current = heard.id == self.parent
             horizon_s = PARENT_STAYS_S if current else NEW_PARENT_STAYS_S
             silent = heard.age_s >= KEPT * parent_s  # of the present parent alone
             leaves = silent or _leaves(here, velocity, heard, horizon_s, reach_m)
             far = LEAVING if leaves else 0
-            deaf = 0 if heard.hears_me else 1
             above = position_of.get(branch.parent)
             to_its_parent = dist(heard.position, above) if above is not None else 0.0
-            return (branch.tier + far + deaf, not current, to_its_parent, heard.id)
+            return (_least_tier(each) + far, not current, to_its_parent, heard.id)
 
         eligible = [
             each
             for each in followers
-            if each.branch.root == self.root
+            if each.branch.root == root
             and (each.heard.age_s < parent_s or each.heard.id == self.parent)
             and 0 <= each.branch.tier < MAX_TIER
-            and each.branch.parent != self._own_id
+            and each.branch.parent != own_id
         ]
-        best = min(eligible, key=order, default=None)
-        self.parent = best.heard.id if best is not None else -1
-        self.tier = best.branch.tier + 1 if best is not None else -1
+        best = None
+        for each in eligible:
+            if best is None or _least_tier(each) <= best[0][0]:
+                found = order(each), each.branch.tier
+                best = found if best is None else min(best, found)
+        self.parent = best[0][3] if best is not None else -1
+        self.tier = best[1] + 1 if best is not None else -1
+
+
+def _least_tier(each: Follower) -> int:
+    """Return the tier that an agent counts as if it stays in range."""
+    return each.branch.tier + (0 if each.heard.hears_me else 1)
 
 
 def _leaves(here: Vector, velocity: Vector, other: Heard, horizon_s: float, reach_m: float) -> bool:
     """Whether another agent leaves the range within a time, if both fly on as now."""
-    apart = [b - a for a, b in zip(here, other.position, strict=True)]
-    away_m = hypot(*apart)
-    rates = [v - u for u, v in zip(velocity, other.velocity, strict=True)]
-    rate_mps = sum(d * v for d, v in zip(apart, rates, strict=True)) / max(away_m, 1e-9)
+    (x, y, z), (there_x, there_y, there_z) = here, other.position
+    (u, v, w), (their_u, their_v, their_w) = velocity, other.velocity
+    away_m = dist(here, other.position)
+    opening = (
+        (there_x - x) * (their_u - u)
+        + (there_y - y) * (their_v - v)
+        + (there_z - z) * (their_w - w)
+    )
+    rate_mps = opening / max(away_m, 1e-9)
     return rate_mps > APART_MPS and away_m + horizon_s * rate_mps > reach_m

@@ -11,6 +11,7 @@ from agent.qstructure.target_frame import Frame
 from agent.structure.claim import Claim
 from agent.structure.link_timing import Timing
 from agent.structure.queue_map import QueueMap
+from agent.structure.transfers import transfers
 
 
 class View:
@@ -90,6 +91,11 @@ class View:
             if summary is None and self.map.vertex_places[v] not in self.blocked
         ]
         return self.map.with_vacancies(self.shares, self.counts, vacant)
+
+    @cached_property
+    def transfers(self) -> Mapping[int, Sequence[int]]:
+        """For each queue that is to give members away, how many each other one may take from it."""
+        return transfers(self.map, self.counts, self.wanted)
 
     def home_of(self, queue: int) -> LeaderSummary | None:
         """Return the summary of the leader of a queue's first vertex."""

@@ -3,11 +3,12 @@
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from agent.messages import Summary
 from agent.structure.census import (
+    ASK_S,
     FIRST_QUEUE,
     FIRST_VERTEX,
     LAGS,
@@ -224,3 +225,28 @@ def test_ids_beyond_the_greatest_are_not_counted():
     known.hear(MAX_LABELLED, NOW_S, FIRST_QUEUE)
     known.hear(MAX_LABELLED - 1, NOW_S, FIRST_QUEUE)
     assert counted(known).total == 1
+
+
+@settings(derandomize=True, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.lists(st.tuples(members, st.integers(0, 9)), max_size=4), st.floats(0.5, 5.0)),
+        max_size=30,
+    )
+)
+@example([([(1, 0)], 0.5), *[([], 0.5)] * 23, ([], 5.0)])
+def test_who_is_late_is_asked_for_whatever_was_asked_before(steps):
+    """T_lost may become longer and shorter."""
+    known, last_s = census(), {}
+    for step, (heard, lost_s) in enumerate(steps):
+        now_s = NOW_S + ASK_S * step
+        for member, ago in heard:
+            stamp_s = now_s - QUANTUM_S * ago
+            known.hear(member, stamp_s, FIRST_QUEUE)
+            last_s[member] = max(last_s.get(member, 0.0), stamp_s)
+        known.news(now_s)
+        known.ask(now_s, lost_s)
+        fresh = census(*[(member, stamp_s, FIRST_QUEUE) for member, stamp_s in last_s.items()])
+        fresh.news(now_s)
+        fresh.ask(now_s, lost_s)
+        assert known.news(now_s) == fresh.news(now_s)

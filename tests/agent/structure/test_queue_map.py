@@ -1,5 +1,7 @@
 """Numbers and places of the library's formations: open, closed and with several vertices."""
 
+from math import dist
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -93,7 +95,7 @@ def test_only_members_have_blocked_numbers(formation):
     vertices = formation.vertex_places
     behind = [formation.place(queue, 2) for queue in range(formation.queues)]
     for queue in range(formation.queues):
-        assert formation.blocked_numbers(queue, [*vertices, *behind]) == {2}
+        assert formation.blocked_numbers(queue, frozenset([*vertices, *behind])) == {2}
 
 
 @ALL
@@ -105,6 +107,21 @@ def test_the_nearest_place_is_the_nearest(formation):
             if slot is not None:
                 found = formation.nearest(queue, wanted, slot.point)
                 assert found.away_m == pytest.approx(0.0, abs=1e-9)
+
+
+@ALL
+@settings(derandomize=True, deadline=None, max_examples=30)
+@given(data=st.data())
+def test_no_place_is_nearer_than_the_nearest(formation, data):
+    """Of places at the same distance it is the first."""
+    coordinate = st.floats(-30.0, 30.0) | st.integers(-9, 9).map(float)
+    here = data.draw(st.tuples(coordinate, coordinate, coordinate))
+    members = data.draw(st.integers(1, 70))
+    for queue in range(formation.queues):
+        slots = [formation.slot(queue, number, members) for number in range(1, members + 1)]
+        ways_m = [dist(slot.point, here) for slot in slots if slot is not None]
+        found = formation.nearest(queue, members, here)
+        assert found == (ways_m.index(min(ways_m)) + 1, min(ways_m))
 
 
 def test_a_closed_queue_without_room_has_no_places():
