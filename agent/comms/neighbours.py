@@ -170,7 +170,9 @@ class Neighbours:
         if age_s > MAX_AGE_S:
             raise RejectedError("old", f"the stamp is {age_s:.3f} s old")
         # A fresh stamp is later than every own beacon; only an old one can contradict its echo.
-        if age_s > self._slack_s and self._contradicts_echo(beacon, own_sent_s):
+        echoed = self._echoed(beacon)
+        sent_s = own_sent_s.get(echoed, -inf) if echoed is not None else -inf
+        if age_s > self._slack_s and beacon.stamp_s + self._slack_s < sent_s:
             raise RejectedError("offset", "the stamp is older than a beacon that it echoes")
         latency_s = age_s if age_s > 0.0 else 0.0
         if known is not None:
@@ -180,7 +182,7 @@ class Neighbours:
             self._known[sender] = known
             self._put_in_order()
         self._quality.note(gap, latency_s)
-        if any(echoed == self._own_id for echoed, _ in beacon.echoes):
+        if echoed is not None:
             known.echoed_s = beacon.stamp_s
 
     def link(self, here: Vector) -> Link:
@@ -189,12 +191,12 @@ class Neighbours:
             self._quality.note_distance(known.beacon.id, dist(here, known.beacon.position))
         return self._quality.link()
 
-    def _contradicts_echo(self, beacon: Beacon, own_sent_s: dict[int, float]) -> bool:
-        """Whether a beacon echoes an own beacon that was sent after its stamp."""
-        for echoed, sequence in beacon.echoes:
-            if echoed == self._own_id:
-                return beacon.stamp_s + self._slack_s < own_sent_s.get(sequence, -inf)
-        return False
+    def _echoed(self, beacon: Beacon) -> int | None:
+        """Return the sequence of the own beacon that a beacon echoes, None for none."""
+        for heard, sequence in beacon.echoes:
+            if heard == self._own_id:
+                return sequence
+        return None
 
     @property
     def ids(self) -> Collection[int]:

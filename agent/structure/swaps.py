@@ -6,7 +6,7 @@ else with its place.
 """
 
 from agent.controller import Heard
-from agent.messages import Swap
+from agent.messages import Swap, Vector
 from agent.structure.claim import Claim
 from agent.structure.view import View, leads
 
@@ -85,7 +85,7 @@ class Swaps:
                 continue
             if claim.proposal is not None and not self._yields(claim.proposal, other):
                 continue
-            gain = self._gain(view, claim, other)
+            gain = _gain(view, view.point(claim.queue, claim.number), other)
             if gain > ACCEPTED_SHARE * GAIN_M2 and (best is None or gain > best[0]):
                 best = gain, other
         if best is None or best[1].place is None:
@@ -110,11 +110,12 @@ class Swaps:
         leaving = claim.queue in view.transfers
         if waits or leaving or claim.swapping or claim.pushes(now_s):
             return
+        mine = view.point(claim.queue, claim.number)
         best: tuple[float, Heard] | None = None
         for other in view.heard:
             if not self._may_swap(view, other):
                 continue
-            gain = self._gain(view, claim, other)
+            gain = _gain(view, mine, other)
             if gain > GAIN_M2 and (best is None or gain > best[0]):
                 best = gain, other
         if best is not None and best[1].place is not None:
@@ -129,20 +130,23 @@ class Swaps:
         busy = standing.proposal is not None or standing.reservation is not None
         return not busy and other.age_s <= FRESH_S + view.timing.latency_s
 
-    def _gain(self, view: View, claim: Claim, other: Heard) -> float:
-        """Return by how much a swap lowers the sum of squared distances [m^2]."""
-        mine = view.point(claim.queue, claim.number)
-        theirs = view.point(*_numbered(view, other))
-        if mine is None or theirs is None:
-            return 0.0
-        return 2.0 * sum(
-            (q - p) * (b - a)
-            for q, p, a, b in zip(view.here, other.position, mine, theirs, strict=True)
-        )
-
     def _take(self, view: View, claim: Claim, place: tuple[int, int]) -> None:
         queue, number = place[0], view.map.number(place)
         claim.take(queue, number, view.distance(queue, number), view.now_s)
+
+
+def _gain(view: View, mine: Vector | None, other: Heard) -> float:
+    """Return by how much a swap lowers the sum of squared distances [m^2].
+
+    mine: the own place [m; world frame], None where there is none.
+    """
+    theirs = view.point(*_numbered(view, other))
+    if mine is None or theirs is None:
+        return 0.0
+    return 2.0 * sum(
+        (q - p) * (b - a)
+        for q, p, a, b in zip(view.here, other.position, mine, theirs, strict=True)
+    )
 
 
 def _numbered(view: View, other: Heard) -> tuple[int, int]:

@@ -15,6 +15,8 @@ def transfers(
     several leaders each transfer has one giver, so that no two leaders fill one gap.
     """
     missing = [share - count for share, count in zip(shares, counts, strict=True)]
+    if not any(missing):
+        return {}
     if len(set(formation.home)) == 1:
         takers = [max(0, each) for each in missing]
         return {giver: takers for giver, each in enumerate(missing) if each < 0 and any(takers)}
