@@ -20,17 +20,15 @@ from operator import add
 from typing import NamedTuple
 
 from agent.messages import MAX_LABELS_B, MAX_TEAM, Summary
+from agent.structure.label_code import FIRST_VERTEX, queue_of
 
 QUANTUM_S = 0.25
 """Resolution of a label's time [s]."""
 CODES = 256
+"""Number of codes: see :mod:`agent.structure.label_code`."""
 UNKNOWN = 0xFFFF
 """The label on the radio of a member of which nothing is known."""
 MAX_QUANTA = 254
-UNPLACED = 1
-"""Code of a member without a queue."""
-FIRST_QUEUE, FIRST_VERTEX = 2, 128
-"""Codes of the members of queue j, and of the holder of vertex v, are these plus j or v."""
 WORTH_QUANTA = 2
 """A repeated label is taken if it is so much later: to take each would cost time for nothing."""
 LAG_SMOOTHING = 0.25
@@ -184,20 +182,21 @@ class Census:
 
     def population(self, now_s: float, lost_s: float, queues: int, vertices: int) -> Population:
         """Return who is there now. lost_s: T_lost of a neighbour, and time for an answer [s]."""
-        codes = Counter(self._codes(now_s, lost_s))
-        return Population(
-            total=codes.total(),
-            members=tuple([codes[FIRST_QUEUE + j] for j in range(queues)]),
-            holders=tuple([codes[FIRST_VERTEX + v] for v in range(vertices)]),
-            changed_s=self._changed_s,
-        )
+        codes = Counter([code for code, _ in self.present(now_s, lost_s)])
+        members, holders = [0] * queues, [0] * vertices
+        for code, number in codes.items():
+            if (queue := queue_of(code, queues)) >= 0:
+                members[queue] += number
+            elif FIRST_VERTEX <= code < FIRST_VERTEX + vertices:
+                holders[code - FIRST_VERTEX] += number
+        return Population(codes.total(), tuple(members), tuple(holders), self._changed_s)
 
-    def _codes(self, now_s: float, lost_s: float) -> list[int]:
-        """Return the code of each member that is there."""
+    def present(self, now_s: float, lost_s: float) -> list[tuple[int, int]]:
+        """Return each member that is there with its code before it. lost_s: as above [s]."""
         oldest_s = now_s - lost_s - QUANTUM_S
         return [
-            label % CODES
-            for label, lag_s in zip(self._labels, self._lag_s, strict=True)
+            (label % CODES, member)
+            for member, (label, lag_s) in enumerate(zip(self._labels, self._lag_s, strict=True))
             if label and label * LABEL_S >= oldest_s - LAGS * lag_s
         ]
 

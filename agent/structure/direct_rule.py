@@ -5,12 +5,13 @@ hears also hears all. Otherwise agents of two minds take each other's places. Le
 vertex has no leader the rule does not apply, for the others may have to order somebody there.
 """
 
-from math import dist
+from math import dist, inf
 
 from agent.assignment.allocation import own_place
 from agent.controller import Peer
 from agent.messages import Place
 from agent.structure.claim import Claim
+from agent.structure.link_timing import Timing
 from agent.structure.view import View, leads
 
 ENTER_S = 0.4
@@ -30,7 +31,8 @@ class DirectRule:
         self._ids: tuple[int, ...] = ()
         self._same_since_s = now_s
         self._full_since_s: float | None = None
-        self._short_since_s: float | None = None
+        self._short_since_s = self._uneven_since_s = inf
+        """Since when members are missing, and since when some hear fewer than others [s]."""
         self._next_choice_s = now_s
         self.applies = False
         self.heard = 1
@@ -43,28 +45,29 @@ class DirectRule:
     def update(self, view: View, claim: Claim) -> None:
         """Decide anew whether the rule applies."""
         timing, now_s = view.timing, view.now_s
-        within_s = max(LEAST_HEARD_S, 2.0 * (timing.parent_s - timing.latency_s)) + timing.latency_s
+        within_s = self._within_s(timing)
         members = [h for h in view.heard if h.age_s < within_s]
         ids = tuple([h.id for h in members])
         if ids != self._ids:
             self._ids, self._same_since_s = ids, now_s
         self.heard = len(ids) + 1
         short = view.total == 0 or self.heard < view.total or not _all_led(view)
-        short = short or any(
-            h.standing is not None and h.standing.heard < view.total for h in members
-        )
-        full = not short and self.heard == view.total
+        least = min([h.standing.heard for h in members if h.standing is not None], default=0)
         if self.applies:
-            self._leave(short, now_s)
+            self._leave(view, short=short, uneven=least < self.heard)
         else:
-            self._enter(full, view, claim)
+            self._enter(not short and self.heard == view.total <= max(least, 1), view, claim)
 
-    def _leave(self, short: bool, now_s: float) -> None:
-        if not short:
-            self._short_since_s = None
-        elif self._short_since_s is None:
-            self._short_since_s = now_s
-        elif now_s - self._short_since_s > LEAVE_S:
+    def _within_s(self, timing: Timing) -> float:
+        """Return how recently a member must have been heard to count [s]."""
+        return max(LEAST_HEARD_S, 2.0 * (timing.parent_s - timing.latency_s)) + timing.latency_s
+
+    def _leave(self, view: View, *, short: bool, uneven: bool) -> None:
+        """End the rule. Members that nobody hears any more are lost soon: then it goes on."""
+        self._short_since_s = _since(self._short_since_s, view.now_s, holds=short)
+        self._uneven_since_s = _since(self._uneven_since_s, view.now_s, holds=uneven)
+        short_s, uneven_s = view.now_s - self._short_since_s, view.now_s - self._uneven_since_s
+        if short_s > LEAVE_S + view.timing.lost_s or uneven_s > LEAVE_S:
             self.applies, self._full_since_s = False, None
 
     def _enter(self, full: bool, view: View, claim: Claim) -> None:
@@ -77,8 +80,13 @@ class DirectRule:
         # the first choice is direct already.
         since_s = self._full_since_s if claim.ranked else self._same_since_s
         if view.now_s - since_s > ENTER_S + view.timing.latency_s and not claim.swapping:
-            self.applies, self._short_since_s = True, None
+            self.applies = True
+            self._short_since_s = self._uneven_since_s = inf
             claim.push_until_s = view.now_s
+
+    def all_hear_the_same(self, view: View) -> bool:
+        """Whether everyone heard hears as many members as the own agent."""
+        return all(h.standing is None or h.standing.heard == self.heard for h in view.heard)
 
     @property
     def is_near(self) -> bool:
@@ -125,21 +133,35 @@ class DirectRule:
     def choose(self, view: View, claim: Claim) -> None:
         """Take the place that the assignment over all members gives."""
         now_s = view.now_s
-        if now_s < self._next_choice_s or self.heard != view.total:
+        if now_s < self._next_choice_s or not self._is_all(view):
             return
         self._next_choice_s = now_s + 1.0 / CHOICE_HZ - 1e-9
         if claim.number > 0 and now_s - claim.since_s < view.timing.hold_s:
             return
-        place = self._assigned(view, claim)
+        place = self._assigned(view, claim, self.heard)
         if place is not None:
             self._take(view, claim, place)
 
-    def _assigned(self, view: View, claim: Claim) -> Place | None:
+    def _is_all(self, view: View) -> bool:
+        """Whether those heard are the team: as the leader says, or since the others are lost."""
+        lost_s = view.timing.lost_s - self._within_s(view.timing)
+        return self.heard == view.total or (
+            view.now_s - self._same_since_s > lost_s and self.all_hear_the_same(view)
+        )
+
+    def succeeds(self, view: View, claim: Claim, vertex: int) -> bool:
+        """Whether the assignment over all that are heard gives the own agent a vertex."""
+        vertex_place = view.map.vertex_places[vertex]
+        return self._assigned(view, claim, self.heard, election=True) == vertex_place
+
+    def _assigned(
+        self, view: View, claim: Claim, members: int, *, election: bool = False
+    ) -> Place | None:
         """Return the own place among all members; None where the election comes first."""
-        layout = view.map.formation.layout(view.total, view.blocked)
+        layout = view.map.formation.layout(members, view.blocked)
         held = {h.place for h in view.heard if leads(h) and h.place is not None}
         places = [place for place in layout.places if place not in held]
-        if any(place in view.map.vertex_of for place in places):
+        if not election and any(place in view.map.vertex_of for place in places):
             return None  # a vertex without a leader
         team = self._team(view, claim)
         if len(places) > len(team):
@@ -157,6 +179,11 @@ class DirectRule:
         queue, number = place.queue, view.map.number(place)
         if (queue, number) != (claim.queue, claim.number):
             claim.take(queue, number, view.distance(queue, number), view.now_s)
+
+
+def _since(since_s: float, now_s: float, *, holds: bool) -> float:
+    """Return since when something holds [s]; infinite where it does not."""
+    return min(since_s, now_s) if holds else inf
 
 
 def _all_led(view: View) -> bool:

@@ -9,6 +9,7 @@ from math import inf
 from agent.controller import Heard
 from agent.messages import LeaderSummary, RootKey
 from agent.structure.claim import Claim
+from agent.structure.direct_rule import DirectRule
 from agent.structure.tree import Tree
 from agent.structure.view import View, leads, queue_of
 
@@ -37,13 +38,18 @@ class Election:
             if summary is not None:
                 self._last[v] = summary
 
-    def stand(self, view: View, claim: Claim, trees: list[Tree]) -> bool:
-        """Take the lead of a vertex of the own queue that has no leader; return whether it did."""
+    def stand(
+        self, view: View, claim: Claim, trees: list[Tree], direct: DirectRule | None = None
+    ) -> bool:
+        """Take the lead of a vertex of the own queue that has no leader; return whether it did.
+
+        direct: given where it applies; then the assignment finds the successor.
+        """
         for v in view.map.vertices_of[claim.queue]:
             if (
                 trees[v].root is None
                 and not self._is_led(view, v)
-                and self._is_next(view, claim, trees[v], v)
+                and self._is_next(view, claim, trees[v], v, direct)
             ):
                 self._lead(view, claim, trees[v], v)
                 return True
@@ -52,12 +58,18 @@ class Election:
     def _is_led(self, view: View, vertex: int) -> bool:
         return any(h.standing is not None and h.standing.leads == vertex for h in view.heard)
 
-    def _is_next(self, view: View, claim: Claim, tree: Tree, vertex: int) -> bool:
+    def _is_next(
+        self, view: View, claim: Claim, tree: Tree, vertex: int, direct: DirectRule | None
+    ) -> bool:
         now_s, timing = view.now_s, view.timing
         if claim.number < 1:
             listen_s = timing.listen_s if view.heard else ALONE_S
             return now_s - self._started_s >= listen_s and self._is_nearest(view, vertex)
         wait_s = timing.lost_s + self._turn_s(view, claim, vertex)
+        if direct is not None:
+            if now_s - tree.advanced_s > timing.lost_s and direct.succeeds(view, claim, vertex):
+                return True
+            wait_s += TURN_S + TURN_LATENCIES * timing.latency_s
         return now_s - tree.advanced_s > wait_s and self._is_first(view, claim, vertex)
 
     def _is_nearest(self, view: View, vertex: int) -> bool:

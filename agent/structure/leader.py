@@ -57,16 +57,17 @@ class Leader:
         self._ordered_s = -1e9
         self._expected: list[int] | None = None
         self._uneven_s: float | None = None
+        self._steady_s: float | None = None
 
     def summary(
         self, view: View, population: Population, subtree: Subtree, blocked: frozenset[Place]
     ) -> LeaderSummary:
         """Return the summary for now. subtree: what came up the tiers, the own part included."""
         steady = self._is_steady(view, population)
-        self._go = self._go or steady
-        self._follow_up(view, population)
+        followed = self._follow_up(view, population)
         if steady and self._expected is None:
             self._give_orders(view, population, subtree, blocked)
+        self._go = self._go or followed or (steady and self._may_go(view, population))
         homed = view.map.homed[self.vertex]
         return LeaderSummary(
             root=self._key,
@@ -100,14 +101,22 @@ class Leader:
         beyond = total / (len(view.heard) + 1) - 2.0
         return view.timing.settle_s + min(MOST_BEYOND_S, BEYOND_S * max(0.0, beyond))
 
-    def _follow_up(self, view: View, population: Population) -> None:
+    def _may_go(self, view: View, population: Population) -> bool:
+        """Whether numbers may be taken: the queues are even, or have had the time for it."""
+        self._steady_s = self._steady_s if self._steady_s is not None else view.now_s
+        even = self._uneven_s is None and self._expected is None
+        wait_s = COLLECTED_S + COLLECTED_LATENCIES * view.timing.latency_s
+        return even or view.now_s - self._steady_s > wait_s
+
+    def _follow_up(self, view: View, population: Population) -> bool:
         """Take orders back once they have been followed, or have had the time for it."""
         if self._expected is None:
-            return
+            return False
         wait_s = FOLLOWED_S + FOLLOWED_LATENCIES * view.timing.latency_s + 2.0 * self._round_s
         followed = list(population.members) == self._expected
         if followed or view.now_s - self._ordered_s > wait_s:
             self._expected, self._orders = None, ()
+        return followed
 
     def _give_orders(
         self, view: View, population: Population, subtree: Subtree, blocked: frozenset[Place]
@@ -123,15 +132,16 @@ class Leader:
         given = transfers(view.map, counts, shares)
         homed = view.map.homed[self.vertex]
         own = {j: given[j] for j in homed if j in given}
-        if not own:
+        if not own or (not vacant and _all_hear_all(view, population)):
             self._uneven_s = None
             return
         if self._uneven_s is None:
             self._uneven_s = view.now_s
         spare = {j: counts[j] - shares[j] for j in own}
         offered = {j: _offered(subtree, homed.index(j)) for j in own}
-        orders = _cheapest(own, spare, offered)
-        complete = all(
+        orders = _cheapest(own, dict(spare), offered)
+        lacking = sum(max(0, share - n) for share, n in zip(shares, counts, strict=True))
+        complete = len(orders) >= min(sum(spare.values()), lacking, MAX_ORDERS) and all(
             len({each.agent for each in offered[j]}) >= min(CANDIDATES, spare[j]) for j in own
         )
         wait_s = COLLECTED_S + COLLECTED_LATENCIES * view.timing.latency_s + self._round_s
@@ -145,6 +155,13 @@ class Leader:
         for order in orders:
             self._expected[order.queue] -= 1
             self._expected[order.to] += 1
+
+
+def _all_hear_all(view: View, population: Population) -> bool:
+    """Whether the whole team hears the whole team, so that the direct rule gives the queues."""
+    return len(view.heard) + 1 == population.total and all(
+        h.standing is not None and h.standing.heard >= population.total for h in view.heard
+    )
 
 
 def _offered(subtree: Subtree, index: int) -> Sequence[Candidate]:

@@ -39,6 +39,8 @@ class Numbers:
         self._holder: dict[tuple[int, int], int] = {}
         """Who was last heard to claim it."""
         self._first_count, self._first_s = 0, 0.0
+        self._unequal_s = inf
+        """Since when the agent has known of fewer or more members than the leader [s]."""
 
     def take_first(self, view: View, claim: Claim) -> None:
         """Take a number, once the leader has counted the team."""
@@ -46,16 +48,36 @@ class Numbers:
         if home is None or not home.go or view.now_s - self._started_s < view.timing.listen_s:
             return
         same = view.same_queue(claim.queue)
+        joins = self._joins_late(view, claim)
+        if not joins and self._waits(view, claim.queue, same):
+            return
         known = (view.counts[claim.queue], view.shares[claim.queue], len(same) + 1)
         self._first_count = max(known)
-        first = self._first_s == 0.0
         self._first_s = self._first_s or view.now_s
-        late_s = LATE_S + LATE_LATENCIES * view.timing.latency_s
-        late = first and view.now_s - self._started_s > late_s
-        if claim.ranked or late:
+        if joins:
             self._join(view, claim)
         else:
             self._claim(view, claim, self._by_distance(view, claim, same))
+
+    def _joins_late(self, view: View, claim: Claim) -> bool:
+        """Whether the others have their numbers already. Who led for a moment has had none yet."""
+        if self._first_s > 0.0:
+            return claim.ranked
+        late_s = LATE_S + LATE_LATENCIES * view.timing.latency_s
+        return view.now_s - self._started_s > late_s
+
+    def _waits(self, view: View, queue: int, same: list[Heard]) -> bool:
+        """Whether the agent waits until it knows of as many members as the leader."""
+        count = view.counts[queue]
+        if len(view.order) == count or len(same) + 1 >= count or self._stands(view, queue):
+            return False
+        self._unequal_s = min(self._unequal_s, view.now_s)
+        return view.now_s - self._unequal_s < view.timing.resettle_s
+
+    def _stands(self, view: View, queue: int) -> bool:
+        """Whether the agent stands in a place of the queue by chance."""
+        standing = view.nearest_number(queue, max(1, view.shares[queue]))
+        return view.distance(queue, standing) < STANDS_M
 
     def _join(self, view: View, claim: Claim) -> None:
         """Take the nearest number of a queue that stands already, and push."""
@@ -87,14 +109,15 @@ class Numbers:
         count = view.counts[queue]
         if view.map.closed[queue]:
             return view.nearest_number(queue, max(count, share)), max(count, share)
+        if len(view.order) == count and self._own_id in view.order:
+            return 1 + view.order.index(self._own_id), max(count, share)
         vertex = view.map.home[queue]
         own = (view.to_vertex(vertex), self._own_id)
         nearer = sum((view.to_vertex(vertex, h.position), h.id) < own for h in same)
         if complete:
             return 1 + nearer, max(count, share)
-        standing = view.nearest_number(queue, share)
-        if view.distance(queue, standing) < STANDS_M:
-            return standing, share
+        if self._stands(view, queue):
+            return view.nearest_number(queue, share), share
         home = view.home_of(queue)
         bins = home.histogram if home is not None else b""
         if not sum(bins):

@@ -132,6 +132,23 @@ class QueueMap:
         first = max(members, 1)
         return self._row(queue, first, members).nearest(first, here)
 
+    def along(self, queue: int, members: int, here: Vector) -> float:
+        """Return where a point lies along a queue: 0 beside its home, k beside its k-th member.
+
+        Before the home and beyond the last of so many members the line goes straight on. here [m;
+        target's frame].
+        """
+        row = self._row(queue, max(members, 1), members).slots[: max(members, 1)]
+        points = [self.vertex_points[self.home[queue]], *(slot.point for slot in row)]
+        k = min(range(len(points)), key=lambda n: dist(points[n], here))
+        before, behind = max(k - 1, 0), min(k + 1, len(points) - 1)
+        step = [b - a for a, b in zip(points[before], points[behind], strict=True)]
+        length2 = sum(each * each for each in step)
+        if length2 == 0.0:
+            return float(k)
+        ahead = sum((h - p) * s for h, p, s in zip(here, points[k], step, strict=True))
+        return k + (behind - before) * ahead / length2
+
     def _row(self, queue: int, number: int, members: int) -> Row:
         """Return a queue's row, as far as a number if there are so many slots."""
         if self.closed[queue]:

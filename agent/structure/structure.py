@@ -6,6 +6,7 @@ vertices; until it has a place, each tick. What is urgent goes into its beacons
 sooner while there is news.
 """
 
+from collections.abc import Sequence
 from math import dist, inf
 
 from agent.config import AgentSetup
@@ -25,11 +26,11 @@ from agent.messages import (
 from agent.places.occupied_slots import OccupiedSlots
 from agent.places.place_points import OwnTarget, PlacePoints
 from agent.qstructure.formation import Slot
-from agent.structure.census import FIRST_QUEUE, FIRST_VERTEX, UNPLACED, Census, Population
 from agent.structure.claim import NO_QUEUE, Claim
 from agent.structure.convergecast import own_part
 from agent.structure.direct_rule import DirectRule
 from agent.structure.election import Election
+from agent.structure.head_count import HeadCount
 from agent.structure.leader import Leader
 from agent.structure.link_timing import timing_of
 from agent.structure.numbers import STANDS_M, Numbers
@@ -59,9 +60,12 @@ class Structure:
         self._round_s = 1.0 / setup.comms.multihop_hz if setup.comms.multihop_hz > 0.0 else inf
         self.claim = Claim(now_s)
         self.trees = [Tree(own_id, now_s) for _ in range(formation.vertices)]
-        self.census = Census(own_id, setup.ids)
+        self._head_count = HeadCount(own_id, formation, setup.ids)
         self._most_members = min(setup.ids, MAX_TEAM)
-        self._slow = SlowLayer(own_id, mission, formation, self.census, self._round_s)
+        self._order: Sequence[int] = ()
+        """The known members of the own queue, in their order along it, until the agent has a number
+        there."""
+        self._slow = SlowLayer(own_id, mission, formation, self._head_count.census, self._round_s)
         self._queue_choice = QueueChoice(own_id)
         self._election = Election(own_id, now_s)
         self._numbers = Numbers(own_id, now_s)
@@ -128,12 +132,14 @@ class Structure:
         self._election.key, self._leader, self._slow.news = None, None, True
 
     def _decide(self, view: View, senses: Senses, mission: Flown) -> None:
-        self._count(view)
+        self._head_count.note(view, self.claim)
         self._election.note(view)
         self._update_blocked(view, senses, mission)
         self._direct.update(view, self.claim)
         if self.claim.queue == NO_QUEUE and not self.claim.leads:
             self._queue_choice.choose(view, self.claim)
+        if self.claim.number < 1 and not self.claim.leads:
+            view.order = self._order = self._head_count.order(view, self.claim.queue)
         if not self.claim.leads:
             self._decide_as_member(view)
         else:
@@ -166,11 +172,12 @@ class Structure:
 
     def _decide_as_member(self, view: View) -> None:
         claim = self.claim
-        if self._election.stand(view, claim, self.trees):
+        direct = self._direct if self._direct.applies else None
+        if self._election.stand(view, claim, self.trees, direct):
             key = self._election.key
             if key is not None:
                 self._leader = Leader(claim.vertex, key, view.now_s, self._round_s)
-                self.census.hear(self._own_id, view.now_s, self._own_code())
+                self._head_count.note_own(view, claim)
             self._slow.news = True
         elif self._direct.applies:
             self._direct.choose(view, claim)
@@ -181,32 +188,6 @@ class Structure:
                 self._numbers.take_first(view, claim)
         elif not self._swaps.proceed(view, claim) and not self._numbers.keep_up(view, claim):
             self._swaps.propose(view, claim)
-
-    def _count(self, view: View) -> None:
-        """Bring the census up to date with the members heard directly, and the own label."""
-        for heard in view.heard:
-            stamp_s = view.now_s - heard.age_s
-            self.census.hear(heard.id, stamp_s, self._code_of(heard))
-        self.census.hear(self._own_id, view.now_s, self._own_code())
-        self.census.ask(view.now_s, view.timing.lost_s)
-
-    def _code_of(self, heard: Heard) -> int:
-        standing = heard.standing
-        if standing is None:
-            return UNPLACED
-        return self._code(standing.leads, standing.queue, heard.place)
-
-    def _own_code(self) -> int:
-        claim = self.claim
-        place = self._map.place(claim.queue, claim.number) if claim.number > 0 else None
-        return self._code(claim.vertex, claim.queue, place)
-
-    def _code(self, vertex: int, queue: int, place: Place | None) -> int:
-        """Return a label's code; a leader that stands in its queue counts in its queue."""
-        in_queue = place is not None and place not in self._map.vertex_of
-        if 0 <= vertex < self._map.vertices and not in_queue:
-            return FIRST_VERTEX + vertex
-        return FIRST_QUEUE + queue if 0 <= queue < self._map.queues else UNPLACED
 
     @property
     def agents(self) -> int:
@@ -237,6 +218,7 @@ class Structure:
         if claim.queue == NO_QUEUE:
             return None
         slot = self._standing_slot(view, claim.queue) or self._guessed_slot(view)
+        slot = slot or self._slot_by_order(view, claim.queue)
         if slot is None and view.now_s - self._started_s < PATIENCE_S:
             return None
         if slot is None:
@@ -255,6 +237,13 @@ class Structure:
     def _guessed_slot(self, view: View) -> Slot | None:
         place = self._direct.guess(view, self.claim)
         return self._map.formation.slot(place, len(view.around) + 1) if place is not None else None
+
+    def _slot_by_order(self, view: View, queue: int) -> Slot | None:
+        """Return the slot that the agent gets if no more members turn up; None where unknown."""
+        if self._map.closed[queue] or self._own_id not in self._order:
+            return None
+        number = 1 + self._order.index(self._own_id)
+        return self._map.slot(queue, number, view.extent(queue, number))
 
     def _shortened(self, view: View, own: OwnTarget | None) -> OwnTarget | None:
         """Return the target for now: a push may lead past the tail, which is no place to fly to."""
@@ -278,7 +267,11 @@ class Structure:
             if leads and self._leader is not None:
                 # Only what is seen goes down, not what came down before: that would never end.
                 blocked = frozenset([Place(*place) for place in subtree.blocked])
-                population = self._population(view)
+                population = self._head_count.population(
+                    view,
+                    self._direct.heard,
+                    all_hear_the_same=self._direct.all_hear_the_same(view),
+                )
                 self._slow.publish(v, self._leader.summary(view, population, subtree, blocked))
 
     def _own_part(self, view: View, vertex: int) -> Subtree | None:
@@ -288,10 +281,6 @@ class Structure:
             return None
         offers = () if self._direct.applies else self._queue_choice.candidates(view, claim)
         return own_part(homed, claim.queue, claim.number, view.to_vertex(vertex), offers)
-
-    def _population(self, view: View) -> Population:
-        lost_s = view.timing.lost_s + view.timing.answer_s
-        return self.census.population(view.now_s, lost_s, self._map.queues, self._map.vertices)
 
     def summary(self, now_s: float) -> Summary | None:
         """Return what is due on the multihop channel, None where nothing is."""
@@ -336,6 +325,7 @@ class Structure:
             pushes=claim.pushes(now_s),
             proposal=claim.proposal,
             reservation=claim.reservation,
+            code=self._head_count.code,
         )
 
 

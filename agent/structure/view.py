@@ -37,6 +37,8 @@ class View:
         self.timing: Timing
         self.summaries: Sequence[LeaderSummary | None] = ()
         self.blocked: frozenset[Place] = frozenset()
+        self.order: Sequence[int] = ()
+        """The known members of the own queue along it, for an agent without a number."""
         self.origin = frame.to_frame(here)
 
     @cached_property

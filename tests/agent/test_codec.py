@@ -93,6 +93,7 @@ STANDING = Standing(
     pushes=False,
     proposal=Swap(partner=2, place=(1, 2), other=(1, 3)),
     reservation=None,
+    code=5,
 )
 SUMMARY = Summary(
     mission=7,
@@ -254,6 +255,7 @@ standings = st.builds(
     pushes=st.booleans(),
     proposal=st.none() | swaps,
     reservation=st.none() | swaps,
+    code=st.integers(0, 255),
 )
 leader_summaries = st.builds(
     LeaderSummary,

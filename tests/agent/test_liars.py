@@ -24,7 +24,7 @@ from agent.messages import (
     Summary,
 )
 from agent.qstructure.formation import FormationSpec
-from agent.structure.census import FIRST_QUEUE
+from agent.structure.label_code import FIRST_QUEUE
 from netem.wire.channels import LOCAL, MULTIHOP
 from tests.agent.comms.builders import beacon, gossip, record
 from tests.agent.structure.builders import standing

@@ -63,6 +63,7 @@ EXTREME = OwnState(
         pushes=True,
         proposal=SWAP,
         reservation=SWAP,
+        code=255,
     ),
 )
 

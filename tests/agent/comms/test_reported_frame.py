@@ -15,7 +15,7 @@ ALONG_X = (0.3, 0.0, 0.0, 0.0)
 def standing(*tiers):
     """Return the standing of an agent with these tiers in the trees; None: of no known root."""
     branches = [None if tier is None else Branch(RootKey(0, 2), 1, tier, -1) for tier in tiers]
-    return Standing(tuple(branches), -1, 0, 1, False, None, None)
+    return Standing(tuple(branches), -1, 0, 1, False, None, None, 1)
 
 
 def report(sender, stamp_s, x_m, drift=ALONG_X, **fields):

@@ -7,6 +7,7 @@ from agent.messages import ZERO, LeaderSummary, RootKey, Standing, Subtree
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
 from agent.qstructure.target_frame import Frame
+from agent.structure.label_code import FIRST_QUEUE, UNPLACED, of_vertex
 from agent.structure.link_timing import timing_of
 from agent.structure.queue_map import QueueMap
 from agent.structure.view import View
@@ -49,6 +50,8 @@ def library(path):
 
 def standing(**fields):
     """Return a standing; by default of a member of the first queue that knows no root."""
+    leads, queue = fields.get("leads", -1), fields.get("queue", 0)
+    code = of_vertex(leads) if leads >= 0 else FIRST_QUEUE + queue if queue >= 0 else UNPLACED
     defaults = {
         "branches": (),
         "leads": -1,
@@ -57,6 +60,7 @@ def standing(**fields):
         "pushes": False,
         "proposal": None,
         "reservation": None,
+        "code": code,
     }
     return Standing(**{**defaults, **fields})
 

@@ -121,6 +121,7 @@ class Team:
         member.words = member.structure.words(self.now_s)
         member.summaries = []
         if own is None:
+            member.place = None
             return
         member.changes += member.place is not None and own.place != member.place
         member.place = own.place

@@ -9,8 +9,6 @@ from hypothesis import strategies as st
 from agent.messages import Summary
 from agent.structure.census import (
     ASK_S,
-    FIRST_QUEUE,
-    FIRST_VERTEX,
     LAGS,
     MAX_LABELLED,
     MAX_QUANTA,
@@ -18,9 +16,9 @@ from agent.structure.census import (
     QUANTUM_S,
     SHARED_LABELS,
     UNKNOWN,
-    UNPLACED,
     Census,
 )
+from agent.structure.label_code import FIRST_QUEUE, FIRST_VERTEX, UNPLACED
 
 OWN, IDS = 0, 40
 LOST_S = 1.5

@@ -81,7 +81,9 @@ def test_it_ends_while_a_vertex_has_no_leader():
     other = leader_summary(total=TEAM, counts=(0,))
     flight = Flight(pair)
     assert flight.run(1.0, neighbours(4, 4, 4), [told(), other])
-    assert not flight.run(LEAVE_S + 2.0 * TICK_S, neighbours(4, 4, 4), [told(), None])
+    lost_s = 1.5
+    assert flight.run(LEAVE_S + lost_s - TICK_S, neighbours(4, 4, 4), [told(), None])
+    assert not flight.run(3.0 * TICK_S, neighbours(4, 4, 4), [told(), None])
 
 
 def test_no_swap_under_way_is_cut_short():
@@ -105,6 +107,30 @@ def test_each_takes_another_place_of_the_layout_and_the_leader_keeps_its_own():
                 rule.choose(seen, claim)
         chosen[own] = claim.number
     assert chosen == {2: 3, 3: 1, 4: 2}
+
+
+def test_the_assignment_names_one_successor_of_a_leader():
+    numbers = {2: 3, 3: 1, 4: 2}
+    at = {k: (-float(number), 0.0, 0.0) for k, number in numbers.items()}
+    named = []
+    for own, number in numbers.items():
+        others = [heard(k, at[k], LINE.place(0, numbers[k]), heard=3) for k in at if k != own]
+        rule, seen = DirectRule(own, 0.0), view(LINE, 1.0, others, at=at[own], summaries=[None])
+        claim = Claim(-9.0)
+        claim.take(0, number, 0.0, -9.0)
+        rule.update(seen, claim)
+        named += [own] * rule.succeeds(seen, claim, 0)
+    assert named == [3]
+
+
+def test_those_left_choose_anew_once_the_others_are_lost_though_the_leader_counts_them_still():
+    flight = Flight()
+    assert flight.run(1.0, neighbours(4, 4, 4))
+    left = neighbours(3, 3, 3)[:2]
+    flight.run(1.0, left)
+    assert flight.claim.number == 3, "they may be heard again"
+    flight.run(1.0, left)
+    assert flight.claim.number == 2
 
 
 def test_two_leaders_of_one_vertex_leave_the_places_as_they_are():

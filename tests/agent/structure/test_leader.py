@@ -154,6 +154,36 @@ def test_orders_that_nobody_follows_are_given_anew():
     assert found.orders == first
 
 
+def test_go_waits_until_the_first_orders_have_been_followed():
+    flight = Flight(TWO)
+    assert len(flight.until_orders(population(5, 1))) == 2
+    assert not flight.ask(population(5, 1)).go
+    assert not flight.ask(population(4, 2)).go
+    assert flight.ask(population(3, 3)).go
+
+
+def test_go_comes_without_candidates_too():
+    flight = Flight(TWO)
+    nobody = offers(TWO, (0, 0))
+    while not flight.ask(population(5, 1), nobody).go:
+        assert flight.now_s < 3.0
+
+
+def test_as_many_are_ordered_at_once_as_offer_themselves_in_time():
+    counts = (7, 1)
+    flight = Flight(TWO, neighbours=[heard(k) for k in range(2, 8)])
+    few = offers(TWO, counts, 2)
+    assert not any(flight.ask(population(*counts), few).orders for _ in range(9))
+    assert len(flight.until_orders(population(*counts), 0.1)) == 3
+
+
+def test_where_all_hear_all_the_direct_rule_gives_the_queues_and_not_the_leader():
+    around = [heard(k, heard=7) for k in range(2, 8)]
+    assert Flight(TWO, neighbours=around).until_orders(population(5, 1)) == ()
+    one_hears_less = [*around[1:], heard(2, heard=6)]
+    assert len(Flight(TWO, neighbours=one_hears_less).until_orders(population(5, 1))) == 2
+
+
 def test_no_order_while_the_counts_change():
     flight = Flight(TWO)
     for k in range(100):

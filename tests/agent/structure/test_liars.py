@@ -17,8 +17,6 @@ from agent.messages import (
     TreeReport,
 )
 from agent.structure.census import (
-    FIRST_QUEUE,
-    FIRST_VERTEX,
     LAGS,
     MAX_LAG_S,
     QUANTUM_S,
@@ -26,6 +24,7 @@ from agent.structure.census import (
 )
 from agent.structure.claim import Claim
 from agent.structure.election import Election
+from agent.structure.label_code import FIRST_QUEUE, FIRST_VERTEX
 from agent.structure.numbers import Numbers
 from agent.structure.slow_layer import SlowLayer
 from agent.structure.swaps import Swaps

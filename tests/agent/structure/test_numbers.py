@@ -191,6 +191,42 @@ def test_a_number_taken_by_a_body_is_left_and_skipped():
     assert sorted(Queue(members, blocked=blocked).run(15.0)) == [1, 3, 5, 6]
 
 
+def test_the_first_numbers_follow_the_order_that_all_know():
+    """Each hears nobody, and still all take different numbers."""
+    order = [7, 2, 9, 4]
+    told = leader_summary(total=5, counts=(4,), highest=(0,), histogram=b"\x01" * 16)
+    for number, own_id in enumerate(order, 1):
+        each = Ranked(own_id, 3.0)
+        each.numbers = Numbers(own_id, -1.0)
+        seen = view(LINE, 0.0, at=each.at, summaries=[told])
+        seen.order = order
+        each.decide(seen)
+        assert each.claim.number == number
+
+
+def test_an_agent_that_knows_of_fewer_members_than_the_leader_waits_but_not_for_ever():
+    each = Ranked(2, 3.5)
+    each.numbers = Numbers(2, -1.0)
+    told = leader_summary(total=5, counts=(4,), highest=(0,), histogram=b"\x01" * 16)
+    for tick in range(30):
+        seen = view(LINE, TICK_S * tick, at=each.at, summaries=[told])
+        seen.order = [7, 2]
+        each.decide(seen)
+        assert (each.claim.number > 0) == (TICK_S * tick >= seen.timing.resettle_s - 1e-9)
+
+
+def test_who_led_for_a_moment_before_the_others_had_numbers_does_not_push():
+    each = Ranked(2, 3.0)
+    each.numbers = Numbers(2, -1.0)
+    each.claim.lead(0, 3.0, -0.5)
+    each.claim.give_up(0, -0.4)
+    told = leader_summary(total=3, counts=(2,), highest=(0,))
+    seen = view(LINE, 0.0, at=each.at, summaries=[told])
+    seen.order = [5, 2]
+    each.decide(seen)
+    assert (each.claim.number, each.claim.pushes(0.1)) == (2, False)
+
+
 def test_nobody_takes_a_number_before_the_leader_says_go():
     each = Ranked(2, 3.0)
     each.numbers = Numbers(2, -1.0)

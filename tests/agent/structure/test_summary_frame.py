@@ -27,8 +27,9 @@ from agent.messages import (
 )
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
-from agent.structure.census import FIRST_QUEUE, NEWS, Census
+from agent.structure.census import NEWS, Census
 from agent.structure.convergecast import ROUNDS
+from agent.structure.label_code import FIRST_QUEUE
 from agent.structure.link_timing import timing_of
 from agent.structure.queue_map import QueueMap
 from agent.structure.slow_layer import VERTICES_A_ROUND, SlowLayer
