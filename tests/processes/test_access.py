@@ -156,7 +156,7 @@ def test_the_passwords_are_deleted_at_the_end_of_the_run(
     start: Callable[..., Started], scenario: Callable[[float], str], tmp_path: Path
 ) -> None:
     run = tmp_path / "run"
-    fleet = start(*QSWARM, "run", scenario(3.0), "--no-recording", "--out", str(run))
+    fleet = start(*QSWARM, "run", scenario(2.0), "--no-recording", "--out", str(run))
     fleet.wait_for_output("least separation")
     assert (run / "users").exists()
     assert fleet.status(15.0) in (0, 1, 3)
