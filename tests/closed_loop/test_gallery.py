@@ -18,6 +18,8 @@ DEPLOY = Path(__file__).parents[2] / "deploy"
 GALLERY = {file.stem: file for file in sorted((DEPLOY / "scenarios").glob("*.toml"))}
 LARGE = 13
 """From this number of agents on, a run takes too long for a test."""
+FLOWN_ELSEWHERE = ("wedge-9", "field-6")
+"""test_wedge.py and test_moving.py fly these with several seeds, the file's own one too."""
 
 
 def scenario(name: str) -> Scenario:
@@ -39,7 +41,9 @@ def formation(name: str) -> Formation:
     return Formation(scenario(name).formation, scenario(name).control.spacing_m)
 
 
-SMALL = [name for name in GALLERY if scenario(name).fleet.agents < LARGE and name != "wedge-9"]
+SMALL = [
+    name for name in GALLERY if scenario(name).fleet.agents < LARGE and name not in FLOWN_ELSEWHERE
+]
 
 
 @pytest.mark.parametrize("name", GALLERY)

@@ -46,6 +46,7 @@ def test_the_wedge_passes_a_field_of_obstacles_and_reforms(seed, mode):
     assert judge.min_separation_m >= 0.25
     assert judge.phases[0].residual_m < 0.1
     assert judge.turns_over_limit_fraction <= 0.05
+    assert all(row.ticks and not row.violations for row in judge.invariants().values())
 
 
 @pytest.mark.parametrize("mode", ["stuck", "silent", "wrong"])

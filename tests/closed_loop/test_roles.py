@@ -95,11 +95,11 @@ def root_of(telemetry, agent):
 
 def wedge_without(place, seed, **overrides):
     """Fly the wedge; at 10 s the agent in a place dies. Return the fleet and the other agents."""
-    fleet = VirtualFleet(load(WEDGE, {"seed": str(seed), "duration_s": "40", **overrides}))
+    fleet = VirtualFleet(load(WEDGE, {"seed": str(seed), "duration_s": "35", **overrides}))
     fly(fleet, 10.0)
     dead = [tuple(each.place) for each in telemetry_of(fleet)].index(place)
     fleet.loop.effects.record_exit(dead, signal=9, status=None)
-    fly(fleet, 30.0)
+    fly(fleet, 25.0)
     living = [agent for agent in range(9) if agent != dead]
     return fleet, living
 
@@ -132,12 +132,12 @@ def test_the_team_skips_the_slot_of_a_dead_member(place):
 
 
 def with_losses(seed, agents, killed, spacing_m=1.0):
-    """Fly a wedge of which some agents die at 15 s, for 50 s."""
+    """Fly a wedge of which some agents die at 15 s, for 40 s."""
     event = f"[{{ at_s = 15.0, kill = ['{killed}'] }}]"
-    given = {"fleet.agents": str(agents), "event": event, "duration_s": "50"}
+    given = {"fleet.agents": str(agents), "event": event, "duration_s": "40"}
     given |= {"control.spacing_m": str(spacing_m), "netem.range_m": "12"}
     fleet = VirtualFleet(load(WEDGE, {"seed": str(seed), **given}))
-    fly(fleet, 50.0)
+    fly(fleet, 40.0)
     return fleet
 
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.commands.conftest import Command
+
 PROGRAM = """
 import sys
 from worldsim.commands.app import command
@@ -51,12 +53,7 @@ COMMANDS = [
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_help_of_a_command_has_examples(name: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, name, "--help"],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={"PYTHONPATH": str(Path(__file__).parents[2])},
-    )
-    assert f"Examples:\n    qswarm {name}" in done.stdout
+def test_the_help_of_a_command_has_examples(qswarm: Command, name: str) -> None:
+    printed = qswarm(name, "--help")
+    assert printed.status == 0
+    assert f"Examples:\n    qswarm {name}" in printed.out

@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 
 from tests.commands.conftest import Command
+from tests.small_scenario import SMALL
+from worldsim.commands.app import command
 from worldsim.results.output_streams import SafeStream, escaped
 
 PROGRESS = re.compile(r"[0-9.]+ of 0\.3 s simulated\n")
@@ -151,10 +153,18 @@ def test_control_characters_of_a_path_and_a_name_are_escaped() -> None:
     assert len(ended.stderr.splitlines()) == 1
 
 
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recorded run, whose summary each test writes anew."""
+    folder = tmp_path_factory.mktemp("recorded")
+    (folder / "small.toml").write_text(SMALL)
+    assert command(["sim", str(folder / "small.toml"), "--out", str(folder / "out")]) == 0
+    return folder / "out"
+
+
 @pytest.mark.parametrize("content", ["[" * 100_000, '{"a":' * 100_000, "\x00", "[]", "3"])
-def test_a_summary_that_is_none_is_one_line(small: Path, qswarm: Command, content: str) -> None:
-    assert qswarm("sim", small, "--out", "out").status == 0
-    Path("out/summary.json").write_text(content)
-    ended = qswarm("verify", "out")
+def test_a_summary_that_is_none_is_one_line(recorded: Path, qswarm: Command, content: str) -> None:
+    (recorded / "summary.json").write_text(content)
+    ended = qswarm("verify", recorded)
     assert ended.status != 0
     assert "Traceback" not in ended.err + ended.out

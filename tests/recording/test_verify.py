@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from shutil import copy
 from typing import Any
 
 import msgspec
@@ -16,12 +17,20 @@ from worldsim.results.verdict_text import verified
 from worldsim.scenario.tables import Scenario
 
 
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Judge]:
+    """A recording of a run that converged, and its judge."""
+    file, scenario = tmp_path_factory.mktemp("recorded") / "run.rrd", wedge(4)
+    recorder = RunRecorder(file, scenario, "verified", mode="virtual")
+    return file, record(recorder, scenario, list(straight_flight(scenario)))
+
+
 @pytest.fixture
-def judge(tmp_path: Path) -> Judge:
-    """A recorded run in ``tmp_path`` that converged, without a summary."""
-    scenario = wedge(4)
-    recorder = RunRecorder(tmp_path / "run.rrd", scenario, "verified", mode="virtual")
-    return record(recorder, scenario, list(straight_flight(scenario)))
+def judge(tmp_path: Path, recorded: tuple[Path, Judge]) -> Judge:
+    """The recorded run in ``tmp_path``, without a summary."""
+    file, judge = recorded
+    copy(file, tmp_path)
+    return judge
 
 
 def summary_of(judge: Judge, scenario: Scenario | None = None) -> dict[str, Any]:
