@@ -76,7 +76,9 @@ class Census:
         self._looked_s = inf
         """T_lost before the last look for late members [s]."""
         self._first_deadline_s = inf
-        """No member that may be asked for has an earlier deadline: see :meth:`_note_deadline`."""
+        """T_lost before the first time at which a member may have become late since [s]."""
+        self._next_ask_s = inf
+        """When to ask again for a member that was late then [s]."""
 
     @property
     def most(self) -> int:
@@ -135,23 +137,27 @@ class Census:
     def ask(self, now_s: float, lost_s: float) -> None:
         """Ask for members that have been silent for too long. lost_s: T_lost of a neighbour [s]."""
         oldest_s = now_s - lost_s
-        if self._looked_s <= oldest_s <= self._first_deadline_s:
+        same_are_late = self._looked_s <= oldest_s <= self._first_deadline_s
+        if same_are_late and now_s < self._next_ask_s:
             return
-        self._looked_s, self._first_deadline_s = oldest_s, inf
+        self._looked_s, self._first_deadline_s, self._next_ask_s = oldest_s, inf, inf
         forgotten = max(0, int((oldest_s - FORGOTTEN_S) / QUANTUM_S) * CODES)
         for member, label in enumerate(self._labels):
             if label <= forgotten:
                 continue
-            late = self._note_deadline(member) < oldest_s
-            if late and now_s - self._asked_s.get(member, 0.0) >= ASK_S:
-                self._asked_s[member] = now_s
-                self._changed.add(member)
+            deadline_s = label * LABEL_S + LAGS * self._lag_s[member]
+            if deadline_s >= oldest_s:
+                self._first_deadline_s = min(self._first_deadline_s, deadline_s)
+            else:
+                self._ask_for(member, now_s)
 
-    def _note_deadline(self, member: int) -> float:
-        """Return when a member's label has to become later, but for T_lost [s]; keep the first."""
-        deadline_s = self._labels[member] * LABEL_S + LAGS * self._lag_s[member]
-        self._first_deadline_s = min(self._first_deadline_s, deadline_s)
-        return deadline_s
+    def _ask_for(self, member: int, now_s: float) -> None:
+        """Ask for a late member, unless that was done of late."""
+        asked_s = self._asked_s.get(member, 0.0)
+        if now_s - asked_s >= ASK_S:
+            asked_s = self._asked_s[member] = now_s
+            self._changed.add(member)
+        self._next_ask_s = min(self._next_ask_s, asked_s + ASK_S - 1e-9)
 
     def _merge_run(self, first: int, labels: bytes, greatest: int, now_s: float) -> None:
         wire = _unpacked(labels)
@@ -178,7 +184,8 @@ class Census:
             if member != self._own:
                 self._changed_s = max(self._changed_s, now_s)
         self._labels[member] = label
-        self._note_deadline(member)
+        deadline_s = label * LABEL_S + LAGS * self._lag_s[member]
+        self._first_deadline_s = min(self._first_deadline_s, deadline_s)
 
     def population(self, now_s: float, lost_s: float, queues: int, vertices: int) -> Population:
         """Return who is there now. lost_s: T_lost of a neighbour, and time for an answer [s]."""
