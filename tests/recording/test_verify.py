@@ -52,6 +52,7 @@ def summary_of(judge: Judge, scenario: Scenario | None = None) -> dict[str, Any]
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "invariants": msgspec.to_builtins(judge.invariants()),
+        "sub_formations": [queues.row for queues in judge.sub_formations],
         "recoveries": [],
         "encounters": [],
         "packets": list(straight_flight(flown))[-1].packets,

@@ -23,7 +23,13 @@ from worldsim.scenario.library import SCENARIOS
 
 KEYS = {
     *("schema", "scenario", "seed", "mode", "agents", "duration_s", "outcome", "expectations"),
-    *("min_separation_m", "min_obstacle_distance_m", "phases", "turns_over_limit_fraction"),
+    *(
+        "min_separation_m",
+        "min_obstacle_distance_m",
+        "phases",
+        "sub_formations",
+        "turns_over_limit_fraction",
+    ),
     *("packets", "invariants", "late_tick_fraction", "real_time_factor", "trace_sha256"),
     *("direct_links", "needed_links", "bytes_per_s"),
     *("version", "commit", "commit_dirty", "python", "packages", "host"),
@@ -57,6 +63,7 @@ def test_it_has_every_key_of_the_contract(run: FinishedRun) -> None:
         "residual_m",
         "queues_converge_s",
     }
+    assert made["sub_formations"][0].keys() == {"formation", "from_s", "stands_s", "lead_s"}
     assert json.loads(json.dumps(made, allow_nan=False)) == made
     assert {key: made[key] for key in provenance()} == provenance()  # type: ignore[literal-required]
 

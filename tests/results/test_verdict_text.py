@@ -43,6 +43,14 @@ def test_a_run_that_passes(summary: Summary) -> None:
     assert outcome == "pass  runs/small/summary.json"
 
 
+def test_queues_that_stood_long_before_the_whole_are_told(summary: Summary) -> None:
+    row = {"formation": "vee", "from_s": 0.0, "stands_s": {"Q1": 3.0}, "lead_s": 17.54}
+    told = "  vee: each queue stood in its line 17.5 s before the whole"
+    assert told in text(summary, sub_formations=[row])
+    for lead_s in (None, 1.2):
+        assert text(summary, sub_formations=[{**row, "lead_s": lead_s}]) == text(summary)
+
+
 def test_the_viewer_is_named_where_there_is_a_recording(summary: Summary) -> None:
     *_, outcome, hint = verdict(summary, FOLDER, recorded=True).splitlines()
     assert (outcome, hint) == ("pass  runs/small/run.rrd", "view it: qswarm view runs/small")

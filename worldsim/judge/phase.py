@@ -111,7 +111,7 @@ class Phase:
         """
         turned = (self.frame(tick.time_s).yaw, 0.0, 0.0)
         found: dict[int, float] = {}
-        for row, slot in self._own_slots(tick).items():
+        for row, slot in self.own_slots(tick).items():
             errors = [
                 abs(remainder(wanted + turn - float(flown), tau))
                 for wanted, turn, flown in zip(
@@ -144,7 +144,7 @@ class Phase:
 
         The result is kept while slots and frame stay the same.
         """
-        slots, frame = self._own_slots(tick), self.frame(tick.time_s)
+        slots, frame = self.own_slots(tick), self.frame(tick.time_s)
         if slots is not self._positions.slots or frame is not self._positions.frame:
             position = np.full(tick.position.shape, np.inf)
             for row, slot in slots.items():
@@ -152,7 +152,7 @@ class Phase:
             self._positions = _SlotPositions(slots=slots, frame=frame, position=position)
         return self._positions.position
 
-    def _own_slots(self, tick: Tick) -> SlotsByRow:
+    def own_slots(self, tick: Tick) -> SlotsByRow:
         """Return the slot of each agent that is the only one to claim a valid one.
 
         The result is kept until a claim changes, or an agent goes.

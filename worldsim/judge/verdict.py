@@ -40,6 +40,7 @@ from worldsim.judge.run_events import (
     SensorChanged,
     SlotChanged,
 )
+from worldsim.judge.sub_formations import SubFormations
 from worldsim.judge.tick import Packets, Tick
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.target_frame import path_of
@@ -96,6 +97,7 @@ class Judge:
         formation = formation_of(scenario.formation, scenario.control.spacing_m)
         self.phases = [Phase(formation, 0.0, path_of(scenario.frame))]
         self.queues = [QueueConvergence(self.phases[0])]
+        self.sub_formations = [SubFormations(self.phases[0])]
         self._hovering = HoveringVehicles(scenario.control.spacing_m)
         self._recoveries = Recoveries(self._hovering)
         self._without_room: list[Restarted | Joined] = []
@@ -157,6 +159,7 @@ class Judge:
         in_place = phase.see(tick.time_s, np.where(tick.alive, error, np.nan))
         if self._attitudes is not None:
             self._attitudes.see(tick, phase, error)
+        self.sub_formations[-1].see(tick)
         self._recoveries.see(tick, phase, in_place)
         if self._allocation is not None:
             self._allocation.see(tick, phase, in_place)
@@ -227,6 +230,7 @@ class Judge:
         formation = formation_of(event.tables, self._scenario.control.spacing_m)
         self.phases.append(Phase(formation, event.t_s, event.path, event.mission))
         self.queues.append(QueueConvergence(self.phases[-1]))
+        self.sub_formations.append(SubFormations(self.phases[-1]))
         if self._attitudes is not None:
             self._attitudes.open_phase()
 

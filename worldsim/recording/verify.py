@@ -32,6 +32,8 @@ HELD, NOT_HELD, UNREADABLE, INCONCLUSIVE = 0, 1, 2, 3
 TIME_SLACK_S = 1e-9
 ABSENT = "no such key"
 """Stands for a value that is not there."""
+ADDED_LATER = ("sub_formations",)
+"""Keys that an older summary lacks."""
 MAX_NAMED = 4
 """Of more differences, the first are named."""
 MAX_REASON = 300
@@ -187,6 +189,7 @@ def _figures(readback: Readback, judge: Judge) -> dict[str, Any]:
         "min_separation_m": judge.min_separation_m,
         "min_obstacle_distance_m": judge.min_obstacle_distance_m,
         "phases": [asdict(phase) for phase in _phases(judge)],
+        "sub_formations": [queues.row for queues in judge.sub_formations],
         "recoveries": [msgspec.structs.asdict(recovery) for recovery in judge.recoveries],
         "encounters": [msgspec.to_builtins(each) for each in judge.clearance.encounters],
         "attitude_error_deg": judge.attitude_error_deg,
@@ -258,7 +261,7 @@ def _differences(summary: Any, judged: Verification) -> Iterator[Difference]:
     """Yield the figures that differ; a figure that the summary lacks differs too."""
     for key, recorded in judged.figures.items():
         summarised = _value_at(summary, key)
-        if summarised == ABSENT and recorded == []:
+        if summarised == ABSENT and (recorded == [] or key in ADDED_LATER):
             continue  # an older summary has no such list
         if key == "packets" and isinstance(summarised, dict):
             summarised = {name: summarised[name] for name in recorded if name in summarised}

@@ -61,6 +61,7 @@ class Row(TypedDict):
     converge_s: float | None  # of several formations the slowest
     residual_m: float | None  # of several formations the largest
     turns_over_limit_fraction: float | None
+    sub_formations_lead_s: float | None  # of several formations the shortest
     real_time_factor: float | None
     trace_sha256: str | None
 
@@ -74,6 +75,7 @@ class ScenarioRow(TypedDict("Outcomes", {"pass": int, "fail": int, "inconclusive
     converge_s: Spread | None
     residual_m: Spread | None
     turns_over_limit_fraction: Spread | None
+    sub_formations_lead_s: Spread | None
 
 
 class Overall(Provenance):
@@ -129,6 +131,7 @@ def _failed_row(run: FailedRun) -> Row:
         "converge_s": None,
         "residual_m": None,
         "turns_over_limit_fraction": None,
+        "sub_formations_lead_s": None,
         "real_time_factor": None,
         "trace_sha256": None,
     }
@@ -147,6 +150,7 @@ def _summary_row(result: Result) -> Row:
         "converge_s": _worst([phase["converge_s"] for phase in phases]),
         "residual_m": _worst([phase["residual_m"] for phase in phases]),
         "turns_over_limit_fraction": summary["turns_over_limit_fraction"],
+        "sub_formations_lead_s": _least([each["lead_s"] for each in summary["sub_formations"]]),
         "real_time_factor": summary["real_time_factor"],
         "trace_sha256": summary["trace_sha256"],
     }
@@ -165,12 +169,17 @@ def _of_scenario(name: str, rows: list[Row]) -> ScenarioRow:
         "converge_s": _spread([row["converge_s"] for row in own]),
         "residual_m": _spread([row["residual_m"] for row in own]),
         "turns_over_limit_fraction": _spread([row["turns_over_limit_fraction"] for row in own]),
+        "sub_formations_lead_s": _spread([row["sub_formations_lead_s"] for row in own]),
     }
 
 
 def _worst(values: list[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return max(known) if len(known) == len(values) and known else None
+
+
+def _least(values: list[float | None]) -> float | None:
+    return min((value for value in values if value is not None), default=None)
 
 
 def _spread(values: list[float | None]) -> Spread | None:

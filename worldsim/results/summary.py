@@ -13,6 +13,7 @@ import msgspec
 from netem.messages import MediumCounters
 from worldsim.engine.counters import Links
 from worldsim.engine.step import SlotLoop
+from worldsim.judge.sub_formations import SubFormationsRow
 from worldsim.judge.verdict import Expectation, Judge
 from worldsim.results.expectation_text import (
     Circumstances,
@@ -138,6 +139,7 @@ class Summary(Provenance):
     min_separation_m: float | None  # centre to centre, swept between ticks
     min_obstacle_distance_m: float | None  # vehicle centre to surface
     phases: list[PhaseRow]  # one for each formation, in order
+    sub_formations: list[SubFormationsRow]  # one for each formation, in order
     recoveries: list[RecoveryRow]
     encounters: list[EncounterRow]
     attitude_error_deg: float | None  # largest at the last tick
@@ -176,6 +178,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "min_separation_m": judge.min_separation_m,
         "min_obstacle_distance_m": judge.min_obstacle_distance_m,
         "phases": _phase_rows(judge),
+        "sub_formations": [queues.row for queues in judge.sub_formations],
         "recoveries": _recovery_rows(judge),
         "encounters": _encounter_rows(judge),
         "attitude_error_deg": judge.attitude_error_deg,

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from worldsim.judge.sub_formations import SubFormationsRow
 from worldsim.recording.layout import SUMMARY_FILE
 from worldsim.results.expectation_text import (
     Circumstances,
@@ -28,6 +29,8 @@ CAUSE_WORDS = {
     "incarnation": "of a process that was replaced",
 }
 """Causes of rejection in words; the others are words already."""
+LEAD_TOLD_S = 5.0
+"""From this lead on, the verdict tells that queues stood before the whole formation [s]."""
 METRES_FROM_M = 0.1
 """From this slot error on, it is shown in metres."""
 
@@ -39,6 +42,7 @@ def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
         *_expectations(summary["expectations"], _circumstances(summary)),
         *_encounters(summary["encounters"]),
         f"  {_accuracy(summary)}",
+        *_sub_formations(summary["sub_formations"]),
         *_delivery(summary["delivery"]),
         *_rejected(summary["rejected_by_cause"]),
         _outcome(summary, folder / ("run.rrd" if recorded else "summary.json")),
@@ -141,6 +145,15 @@ def _accuracy(summary: Summary) -> str:
     return f"largest slot error at the end: {error}; steps over the turn limit: {_percent(turns)}"
 
 
+def _sub_formations(rows: list[SubFormationsRow]) -> list[str]:
+    """Return a line for each formation of which the queues stood long before the whole."""
+    return [
+        f"  {row['formation']}: each queue stood in its line {lead_s:.1f} s before the whole"
+        for row in rows
+        if (lead_s := row["lead_s"]) is not None and lead_s >= LEAD_TOLD_S
+    ]
+
+
 def _delivery(delivery: DeliveryRow | None) -> list[str]:
     """Return a line on how much later than due frames were used; none if not measured."""
     if delivery is None:
@@ -177,10 +190,13 @@ def _run(row: Row, width: int) -> str:
 
 
 def _scenario(scenario: ScenarioRow) -> list[str]:
-    spreads = (
+    spreads = [
         ("separation", scenario["min_separation_m"], "m", 3),
         ("converged in", scenario["converge_s"], "s", 2),
-    )
+    ]
+    lead = scenario["sub_formations_lead_s"]
+    if lead is not None and lead["median"] >= LEAD_TOLD_S:
+        spreads.append(("queues' lead", lead, "s", 2))
     doubtful = f", {scenario['inconclusive']} inconclusive" if scenario["inconclusive"] else ""
     made = _counted(scenario["runs"], "run")
     return [
