@@ -10,7 +10,7 @@ from zlib import crc32
 import msgpack
 import msgspec
 
-from agent.messages import MAX_PIECES, PIECE_B, Beacon, Command, Gossip, Observation
+from agent.messages import MAX_PIECES, PIECE_B, Beacon, Command, Gossip, Observation, Summary
 from agent.qstructure.expression import MAX_EXPRESSION_LENGTH
 from agent.qstructure.formation import FormationSpec
 from netem.wire.channels import MAX_PAYLOAD_B
@@ -33,8 +33,18 @@ class RejectedError(ValueError):
 
 
 def encode(message: msgspec.Struct) -> bytes:
-    """Encode any message as msgpack."""
-    return _encode(message)
+    """Encode any message as msgpack; a summary that says nothing of lines, without that field."""
+    data = _encode(message)
+    summary = message.summary if isinstance(message, Gossip) else message
+    if isinstance(summary, Summary) and summary.lines is None:
+        return _without_last_field(data, len(_encode(summary)))
+    return data
+
+
+def _without_last_field(data: bytes, array_b: int) -> bytes:
+    """Return data that ends with an array of some bytes, without the array's last field, a nil."""
+    head = len(data) - array_b
+    return data[:head] + bytes([data[head] - 1]) + data[head + 1 : -1]
 
 
 def add_checksum(data: bytes) -> bytes:

@@ -162,6 +162,8 @@ class Control(Table, frozen=True):
     for comparison, by every agent alike, which knows all members (E24).
     clearance_m: distance from a vehicle's centre to an obstacle's surface that the safety filter
     keeps. ``cast_far_m`` left out follows from the range heard (E20).
+    gather: whether the members of a queue form its line where they are, before it flies to its
+    vertex; for the controller "q_structure" under the allocation "structure".
     """
 
     controller: Annotated[str, Meta(min_length=1, max_length=200)] = "q_structure"
@@ -173,6 +175,7 @@ class Control(Table, frozen=True):
     cast_far_m: Positive | None = None
     avoidance: AvoidanceKind = "constellation"
     allocation: AllocationKind = "structure"
+    gather: bool = False
 
 
 class Comms(Table, frozen=True):

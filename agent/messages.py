@@ -321,8 +321,51 @@ class TreeReport(Message, frozen=True):
     up: Subtree | None
 
 
+QueueIndex = Annotated[int, Meta(ge=0, lt=2**15)]
+Centimetres = Annotated[int, Meta(ge=-(2**31), lt=2**31)]
+MAX_CENTISECONDS = 2**32 - 1
+Centiseconds = Annotated[int, Meta(ge=0, le=MAX_CENTISECONDS)]
+"""A time, or a leader's version [10 ms]."""
+MAX_LINES = 64
+"""Most lines, and most parts of them, in one frame."""
+
+
+class Line(NamedTuple):
+    """The line in which a queue's members gather: its places, displaced until it flies to them."""
+
+    queue: QueueIndex
+    version: Centiseconds  # the leader's time at the last change
+    x: Centimetres  # displacement [cm; target's frame]
+    y: Centimetres
+    z: Centimetres
+    leaves: Centiseconds  # when the displacement begins to shrink
+    arrives: Centiseconds  # when it is zero
+
+
+class LinePart(NamedTuple):
+    """What an agent reports up the tiers of a queue's members that gather."""
+
+    queue: QueueIndex
+    parent: ParentId
+    members: Members  # that may gather
+    ready: Members  # in their places of the line, or not to be waited for
+    x: Centimetres  # mean displacement of ``members`` from their slots [cm; target's frame]
+    y: Centimetres
+    z: Centimetres
+
+
+class Lines(Message, frozen=True):
+    """What an agent says of queues whose members gather."""
+
+    lines: Annotated[tuple[Line, ...], Meta(max_length=MAX_LINES)]
+    parts: Annotated[tuple[LinePart, ...], Meta(max_length=MAX_LINES)]
+
+
 class Summary(Message, frozen=True):
-    """What is slow of the Q-structure, for the multihop channel."""
+    """What is slow of the Q-structure, for the multihop channel.
+
+    ``lines`` is left out on the wire where it is None; see agent.codec.encode.
+    """
 
     mission: Count  # key of the mission that it is about
     first: AgentId  # the id of the first label
@@ -331,6 +374,7 @@ class Summary(Message, frozen=True):
     news: Annotated[tuple[tuple[AgentId, Label], ...], Meta(max_length=64)]
     """Labels that changed since the sender's last frame."""
     trees: Annotated[tuple[TreeReport, ...], Meta(max_length=MAX_VERTICES)]
+    lines: Lines | None = None
 
 
 class Beacon(Message, frozen=True):

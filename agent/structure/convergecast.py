@@ -1,6 +1,7 @@
 """What goes up a tree: each agent adds its own part to its followers' and tells its parent."""
 
 from collections.abc import Iterable, Sequence
+from typing import Generic, TypeVar
 
 from agent.messages import (
     MAX_CANDIDATES,
@@ -9,7 +10,6 @@ from agent.messages import (
     Candidate,
     Place,
     Subtree,
-    TreeReport,
 )
 from agent.structure import histogram
 from agent.structure.leader import CANDIDATES
@@ -17,17 +17,18 @@ from agent.structure.leader import CANDIDATES
 ROUNDS = 4.0
 """A follower's report holds for so many rounds at no loss."""
 
+Part = TypeVar("Part")
+"""What one agent reports of itself and of those that follow it."""
 
-class Convergecast:
+
+class Followers(Generic[Part]):
     """One agent's reports from its followers in one tree."""
 
     def __init__(self, own_id: int) -> None:
         self._own_id = own_id
-        self._reports: dict[int, tuple[float, TreeReport]] = {}
-        self._parts: list[Subtree] = []
-        self._total: Subtree | None = None
+        self._reports: dict[int, tuple[float, Part]] = {}
 
-    def hear(self, sender: int, report: TreeReport, stamp_s: float) -> None:
+    def hear(self, sender: int, parent: int, part: Part | None, stamp_s: float) -> None:
         """Take an agent's report; one that names another parent ends what it told before.
 
         A report that was overtaken on its way counts for nothing. One whose part that goes up had
@@ -36,18 +37,27 @@ class Convergecast:
         known = self._reports.get(sender)
         if known is not None and known[0] > stamp_s:
             return
-        if report.parent != self._own_id:
+        if parent != self._own_id:
             self._reports.pop(sender, None)
-        elif report.up is not None:
-            self._reports[sender] = (stamp_s, report)
+        elif part is not None:
+            self._reports[sender] = (stamp_s, part)
 
     def forget(self, oldest_s: float) -> None:
         """Drop reports with a stamp before that time [s]."""
         self._reports = {s: kept for s, kept in self._reports.items() if kept[0] >= oldest_s}
 
-    def followers(self) -> list[Subtree]:
+    def followers(self) -> list[Part]:
         """Return the present reports of the followers."""
-        return [report.up for _, report in self._reports.values() if report.up is not None]
+        return [part for _, part in self._reports.values()]
+
+
+class Convergecast(Followers[Subtree]):
+    """One agent's reports on the subtrees below it in one tree."""
+
+    def __init__(self, own_id: int) -> None:
+        super().__init__(own_id)
+        self._parts: list[Subtree] = []
+        self._total: Subtree | None = None
 
     def total(self, own: Subtree | None, queues: int) -> Subtree:
         """Return the sum of the followers' reports and the own part: the same one while they last.

@@ -5,6 +5,7 @@ hears also hears all. Otherwise agents of two minds take each other's places. Le
 vertex has no leader the rule does not apply, for the others may have to order somebody there.
 """
 
+from collections import Counter
 from math import dist, inf
 
 from agent.assignment.allocation import own_place
@@ -164,6 +165,10 @@ class DirectRule:
         if not election and any(place in view.map.vertex_of for place in places):
             return None  # a vertex without a leader
         team = self._team(view, claim)
+        if view.gathering and _is_divided(view, team, places):
+            own = claim.queue if claim.queue in view.gathering else None
+            places = [p for p in places if _group(view, p) == own]
+            team = [peer for peer in team if _group(view, peer.place) == own]
         if len(places) > len(team):
             return None  # two lead one vertex: one of them will make way
         points = [view.frame.to_world(layout.slots[place].point) for place in places]
@@ -184,6 +189,22 @@ class DirectRule:
 def _since(since_s: float, now_s: float, *, holds: bool) -> float:
     """Return since when something holds [s]; infinite where it does not."""
     return min(since_s, now_s) if holds else inf
+
+
+def _is_divided(view: View, team: list[Peer], places: list[Place]) -> bool:
+    """Whether each displaced queue has as many members as places.
+
+    Then it keeps them, and they exchange places among themselves: compared with a place of another
+    queue, they are not where their own one is.
+    """
+    held = Counter(_group(view, peer.place) for peer in team)
+    asked = Counter(_group(view, place) for place in places)
+    return all(held[queue] == asked[queue] for queue in view.gathering)
+
+
+def _group(view: View, place: Place | None) -> int | None:
+    """Return the queue of a place if it is displaced, None for all others."""
+    return place.queue if place is not None and place.queue in view.gathering else None
 
 
 def _all_led(view: View) -> bool:

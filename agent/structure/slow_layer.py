@@ -14,6 +14,7 @@ from agent.controller import HeardSummary
 from agent.messages import MAX_PLACES, LeaderSummary, Place, Subtree, Summary, TreeReport
 from agent.structure.census import Census
 from agent.structure.convergecast import ROUNDS, Convergecast
+from agent.structure.gathering import Gathering
 from agent.structure.link_timing import Timing
 from agent.structure.queue_map import QueueMap
 from agent.structure.summary_frame import (
@@ -45,10 +46,17 @@ class SlowLayer:
     """
 
     def __init__(
-        self, own_id: int, mission: int, formation: QueueMap, census: Census, round_s: float
+        self,
+        own_id: int,
+        mission: int,
+        formation: QueueMap,
+        census: Census,
+        round_s: float,
+        *,
+        gathering: Gathering | None = None,
     ) -> None:
         self._mission, self._map, self._census = mission, formation, census
-        self._round_s = round_s
+        self._round_s, self._gathering = round_s, gathering
         vertices = range(formation.vertices)
         self.summaries: list[LeaderSummary | None] = [None for _ in vertices]
         self.news = True
@@ -68,9 +76,12 @@ class SlowLayer:
             if summary.mission != self._mission:
                 continue
             self._census.merge(summary, stamp_s, now_s)
+            if self._gathering is not None and summary.lines is not None:
+                self._gathering.hear(sender, summary.lines, stamp_s, now_s)
             for report in summary.trees:
                 if report.vertex < len(trees):
-                    self._collected[report.vertex].hear(sender, report, stamp_s)
+                    collected = self._collected[report.vertex]
+                    collected.hear(sender, report.parent, report.up, stamp_s)
                     self._take_down(report, trees[report.vertex], now_s)
 
     def _take_down(self, report: TreeReport, tree: Tree, now_s: float) -> None:
@@ -119,9 +130,7 @@ class SlowLayer:
         taken by unidentified vehicles.
         """
         homed = self._map.homed[vertex]
-        rounds = ROUNDS * max(1.0, self._map.vertices / VERTICES_A_ROUND)
-        rounds_s = rounds * min(self._round_s, LONGEST_ROUND_S) / (1.0 - timing.loss)
-        self._collected[vertex].forget(now_s - rounds_s - timing.latency_s)
+        self._collected[vertex].forget(self.oldest_s(now_s, timing))
         found = self._collected[vertex].total(own, len(homed))
         near = [p for p in seen if p.queue in homed or self._map.vertex_of.get(p) == vertex]
         if near:
@@ -132,6 +141,12 @@ class SlowLayer:
             self._subtrees[vertex] = found
         return found
 
+    def oldest_s(self, now_s: float, timing: Timing) -> float:
+        """Return the stamp [s] before which a follower's report holds no longer."""
+        rounds = ROUNDS * max(1.0, self._map.vertices / VERTICES_A_ROUND)
+        rounds_s = rounds * min(self._round_s, LONGEST_ROUND_S) / (1.0 - timing.loss)
+        return now_s - rounds_s - timing.latency_s
+
     def _note_candidates(self, vertex: int, subtree: Subtree) -> None:
         """Report soon that an agent could leave its queue."""
         offered = {(each.agent, each.to) for queue in subtree.candidates for each in queue}
@@ -140,13 +155,16 @@ class SlowLayer:
 
     def due(self, trees: Sequence[Tree], timing: Timing, now_s: float) -> Summary | None:
         """Return what is due on the multihop channel, None where nothing is."""
-        if self.news or self._census.has_news:
+        gathering = self._gathering
+        if self.news or self._census.has_news or (gathering is not None and gathering.news):
             self._repeats = _enough_repeats(timing.loss)
         soon = self._repeats > 0 or self._turns.has_rest
         share = NEWS_SHARE if soon else 1.0
         if now_s - self._sent_s < share * self._round_s - 1e-6:
             return None
         self._sent_s, self.news = now_s, False
+        if gathering is not None:
+            gathering.news = False
         self._repeats = max(0, self._repeats - 1)
         self._begin_round(timing.loss, now_s)
         return self._filled([self._report(v, tree) for v, tree in enumerate(trees)], now_s)
@@ -161,16 +179,20 @@ class SlowLayer:
             self._labels = self._census.labels
 
     def _filled(self, reports: Sequence[TreeReport], now_s: float) -> Summary:
-        """Return a summary with as much as fits: reports first, then news, then labels."""
+        """Return a summary with as much as fits: reports first, then lines, news and labels."""
         known = [each for each in reports if each.tier >= 0]
         waiting_b = NEWS_B * self._census.news_number + LABEL_B * self._labels
         trees = self._turns.take(known, waiting_b)
         room_b = ROOM_B - length_of(trees)
+        lines = None
+        if self._gathering is not None:
+            lines, lines_b = self._gathering.wire(now_s, room_b // 2)
+            room_b -= lines_b
         news = self._census.news(now_s, news_that_fit(room_b, self._labels))
         room_b -= NEWS_B * len(news)
         first, labels = self._census.wire(now_s, min(self._labels, room_b // LABEL_B))
         self._labels -= len(labels) // LABEL_B
-        return Summary(mission=self._mission, first=first, labels=labels, news=news, trees=trees)
+        return Summary(self._mission, first, labels, news, trees, lines)
 
     def _report(self, vertex: int, tree: Tree) -> TreeReport:
         return TreeReport(

@@ -30,6 +30,7 @@ from agent.structure.claim import NO_QUEUE, Claim
 from agent.structure.convergecast import own_part
 from agent.structure.direct_rule import DirectRule
 from agent.structure.election import Election
+from agent.structure.gathering import Gathering
 from agent.structure.head_count import HeadCount
 from agent.structure.leader import Leader
 from agent.structure.link_timing import timing_of
@@ -65,7 +66,11 @@ class Structure:
         self._order: Sequence[int] = ()
         """The known members of the own queue, in their order along it, until the agent has a number
         there."""
-        self._slow = SlowLayer(own_id, mission, formation, self._head_count.census, self._round_s)
+        self._gathering = Gathering(setup, formation) if setup.control.gather else None
+        census = self._head_count.census
+        self._slow = SlowLayer(
+            own_id, mission, formation, census, self._round_s, gathering=self._gathering
+        )
         self._queue_choice = QueueChoice(own_id)
         self._election = Election(own_id, now_s)
         self._numbers = Numbers(own_id, now_s)
@@ -93,7 +98,7 @@ class Structure:
         self._slow.hear(senses.summaries, self.trees, senses.now_s)
         decides = senses.now_s >= self._next_decision_s
         if not decides and self.claim.ranked and self._own is not None:
-            return self._own
+            return self._flown(senses.now_s)
         view = self._view = self._look(senses, mission)
         view.summaries = self._slow.summaries
         self.follow_trees(view, senses)
@@ -101,13 +106,21 @@ class Structure:
             self._next_decision_s = senses.now_s + 1.0 / DECISION_HZ - 1e-9
             self._decide(view, senses, mission)
         self._own = self._target(view)
-        return self._own
+        return self._flown(senses.now_s)
+
+    def _flown(self, now_s: float) -> OwnTarget | None:
+        """Return the own target, displaced while the members of the own queue gather."""
+        if self._own is None or self._gathering is None:
+            return self._own
+        return self._gathering.displaced(self._own, self.claim, now_s)
 
     def _look(self, senses: Senses, mission: Flown) -> View:
         around, frame = senses.neighbours, mission.frame
         view = View(senses.now_s, senses.position, around, mission.key, self._map, frame)
         view.timing = timing_of(senses.link, self._beacon_s)
         view.blocked = self._blocked
+        if self._gathering is not None:
+            view.gathering = self._gathering.queues(senses.now_s)
         return view
 
     def follow_trees(self, view: View, senses: Senses) -> None:
@@ -258,6 +271,9 @@ class Structure:
 
     def _report(self, view: View) -> None:
         """Bring up to date what goes up each tree; as a leader, the own summary."""
+        if self._gathering is not None:
+            oldest_s = self._slow.oldest_s(view.now_s, view.timing)
+            self._gathering.update(view, self.claim, self.trees, oldest_s)
         for v, tree in enumerate(self.trees):
             leads = self._leader is not None and self._leader.vertex == v
             if tree.parent < 0 and not leads:
@@ -272,7 +288,10 @@ class Structure:
                     self._direct.heard,
                     all_hear_the_same=self._direct.all_hear_the_same(view),
                 )
-                self._slow.publish(v, self._leader.summary(view, population, subtree, blocked))
+                summary = self._leader.summary(view, population, subtree, blocked)
+                self._slow.publish(v, summary)
+                if self._gathering is not None:
+                    self._gathering.lead(view, v, summary)
 
     def _own_part(self, view: View, vertex: int) -> Subtree | None:
         """Return the own part of what goes up a tree; None for a queue of another vertex."""

@@ -85,6 +85,8 @@ class Swaps:
                 continue
             if claim.proposal is not None and not self._yields(claim.proposal, other):
                 continue
+            if view.gathering and _apart(view, claim, other):
+                continue
             gain = _gain(view, view.point(claim.queue, claim.number), other)
             if gain > ACCEPTED_SHARE * GAIN_M2 and (best is None or gain > best[0]):
                 best = gain, other
@@ -113,7 +115,7 @@ class Swaps:
         mine = view.point(claim.queue, claim.number)
         best: tuple[float, Heard] | None = None
         for other in view.heard:
-            if not self._may_swap(view, other):
+            if not self._may_swap(view, other) or (view.gathering and _apart(view, claim, other)):
                 continue
             gain = _gain(view, mine, other)
             if gain > GAIN_M2 and (best is None or gain > best[0]):
@@ -147,6 +149,12 @@ def _gain(view: View, mine: Vector | None, other: Heard) -> float:
         (q - p) * (b - a)
         for q, p, a, b in zip(view.here, other.position, mine, theirs, strict=True)
     )
+
+
+def _apart(view: View, claim: Claim, other: Heard) -> bool:
+    """Whether the two are of different queues, one of which is displaced: so is what they gain."""
+    queues = {claim.queue, _numbered(view, other)[0]}
+    return len(queues) > 1 and not view.gathering.isdisjoint(queues)
 
 
 def _numbered(view: View, other: Heard) -> tuple[int, int]:

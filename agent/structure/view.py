@@ -19,6 +19,7 @@ class View:
 
     around: all neighbours; heard: those that fly the same mission. summaries: of each vertex's
     leader, None where none was heard. blocked: places that are not available (E18).
+    gathering: queues that are displaced.
     """
 
     def __init__(
@@ -39,6 +40,7 @@ class View:
         self.blocked: frozenset[Place] = frozenset()
         self.order: Sequence[int] = ()
         """The known members of the own queue along it, for an agent without a number."""
+        self.gathering: frozenset[int] = frozenset()
         self.origin = frame.to_frame(here)
 
     @cached_property

@@ -35,6 +35,9 @@ from agent.messages import (
     FramePath,
     Gossip,
     LeaderSummary,
+    Line,
+    LinePart,
+    Lines,
     Mission,
     Observation,
     Order,
@@ -286,6 +289,19 @@ reports = st.builds(
     down=st.none() | leader_summaries,
     up=st.none() | subtrees,
 )
+ways = dict.fromkeys("xyz", st.integers(-(2**31), 2**31 - 1))
+queues, times = st.integers(0, 2**15 - 1), st.integers(0, 2**32 - 1)
+lines = st.builds(
+    Lines,
+    lines=st.lists(
+        st.builds(Line, queue=queues, version=times, leaves=times, arrives=times, **ways),
+        max_size=3,
+    ).map(tuple),
+    parts=st.lists(
+        st.builds(LinePart, queue=queues, parent=parents, members=members, ready=members, **ways),
+        max_size=3,
+    ).map(tuple),
+)
 summaries = st.builds(
     Summary,
     mission=counts,
@@ -293,6 +309,7 @@ summaries = st.builds(
     labels=st.binary(max_size=64),
     news=st.lists(st.tuples(ids, st.integers(0, 2**16 - 1)), max_size=6).map(tuple),
     trees=st.lists(reports, max_size=2).map(tuple),
+    lines=st.none() | lines,
 )
 telemetries = st.builds(
     Telemetry,
@@ -402,6 +419,17 @@ def decoded_or_none(kind, data):
 @given(messages)
 def test_a_message_survives_its_codec(message):
     assert DECODE[type(message)](encode(message)) == message
+
+
+@settings(derandomize=True)
+@given(messages)
+def test_a_summary_without_lines_is_as_short_as_before_there_were_any(message):
+    """Without ``gather``, not one byte more is sent."""
+    plain = msgspec.to_builtins(message, builtin_types=(bytes,))
+    if isinstance(message, Gossip) and message.summary is not None:
+        *before, said = plain[-1]
+        plain[-1] = before if said is None else [*before, said]
+    assert encode(message) == msgspec.msgpack.encode(plain)
 
 
 @KINDS

@@ -91,6 +91,14 @@ def test_slots_of_the_oriented_curve_are_1_m_apart_along_it() -> None:
     assert along_m == pytest.approx(range(10), abs=0.001)
 
 
+def test_queues_that_gather_stand_long_before_the_whole_formation() -> None:
+    """Without gathering the lead is a few seconds: see docs/method.md."""
+    (queues,) = flown("gather-12").loop.judge.sub_formations
+    assert queues.lead_s is not None
+    assert queues.lead_s > 12.0
+    assert sorted(places("gather-12")) == sorted(formation("gather-12").layout(12).places)
+
+
 def test_a_flock_settles_at_about_spacing_m_between_neighbours() -> None:
     spacing_m = scenario("flocking-9").control.spacing_m
     position = flown("flocking-9").loop.world.vehicles.position.tolist()

@@ -100,7 +100,15 @@ def draft(draw: Draw, steps: int) -> Tables:
         made["control"]["allocation"] = "assignment"
     if draw.chance(0.1):
         made["expect"]["attitude_within_deg"] = draw.number(1.0, 180.0, 0)
+    if draw.chance(0.25):
+        made["control"]["gather"] = may_gather(made["control"])
     return made
+
+
+def may_gather(control: Tables) -> bool:
+    """Return whether queues may gather under a control table."""
+    by_leaders = control.get("allocation", "structure") == "structure"
+    return by_leaders and control.get("controller", "q_structure") == "q_structure"
 
 
 def briefed(draw: Draw, agents: int) -> list[int]:

@@ -12,6 +12,7 @@ from agent.controller import Senses, Words
 from agent.messages import (
     AGENT_IDS,
     MAX_CANDIDATES,
+    MAX_CENTISECONDS,
     MAX_COST_MM,
     MAX_ORDERS,
     MAX_PLACES,
@@ -22,6 +23,9 @@ from agent.messages import (
     Branch,
     Candidate,
     LeaderSummary,
+    Line,
+    LinePart,
+    Lines,
     Order,
     Place,
     RootKey,
@@ -60,7 +64,7 @@ class Lies:
 
     def __init__(self, own_id: int) -> None:
         self._own_id = own_id
-        self._random = Random(own_id)
+        self._random, self._line_random = Random(own_id), Random(f"lines of {own_id}")
 
     def words(self, senses: Senses) -> Words:
         """Return what the liar says now."""
@@ -94,7 +98,38 @@ class Lies:
             labels=labels if random.random() < 0.5 else bytes(len(labels)),
             news=tuple((self._id(senses), random.randrange(2**16)) for _ in range(8)),
             trees=tuple(self._report(senses, v) for v in range(self._among((1, 2)))),
+            lines=self.lines(senses),
         )
+
+    def lines(self, senses: Senses) -> Lines | None:
+        """Return lines that gather anywhere, for any time, and reports about them."""
+        draw = self._line_random
+        if draw.random() < 0.5:
+            return None
+        now, queues = version_at(senses.now_s), (0, 0, 1, 2, LAST_INDEX)
+        heard = [other.id for other in senses.neighbours]
+
+        def way() -> list[int]:
+            return [draw.choice((0, -300, 800, -90_000, 2**31 - 1)) for _ in range(3)]
+
+        def time() -> int:
+            return draw.choice((0, now, now + 50, now + 3000, MAX_CENTISECONDS))
+
+        lines = [
+            Line(draw.choice(queues), time(), *way(), time(), time())
+            for _ in range(draw.choice((0, 1, 4)))
+        ]
+        parts = [
+            LinePart(
+                draw.choice(queues),
+                draw.choice([-1, self._own_id, *heard]),
+                draw.choice((0, 1, 9, MAX_TEAM)),
+                draw.choice((0, 1, 9, MAX_TEAM)),
+                *way(),
+            )
+            for _ in range(draw.choice((0, 1, 4)))
+        ]
+        return Lines(tuple(lines), tuple(parts))
 
     def _report(self, senses: Senses, vertex: int) -> TreeReport:
         return TreeReport(

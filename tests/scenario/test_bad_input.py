@@ -54,6 +54,7 @@ OVERRIDDEN = [
     ("control.spacing_m", "0.45", "control.spacing_m", "at least 0.5"),
     ("control.cast_far_m", "0.06", "control.cast_far_m", "at least 2 cast_near_m = 0.1"),
     ("control.controller", "3", "control.controller", "text"),
+    ("control.gather", "yes", "control.gather", "true or false"),
     ("comms.local_hz", "40", "comms.local_hz", "at most fleet.tick_hz = 20"),
     ("vehicle.kind", "boat", "vehicle.kind", "'kinematic'"),
     ("vehicle.sensors", "['nose']", "vehicle.sensors[0]", "'proximity'"),

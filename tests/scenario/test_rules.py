@@ -132,3 +132,18 @@ def test_a_level_laser_has_one_ring() -> None:
     with pytest.raises(ScenarioError, match=r"sensor\.laser\.rings: 9 rings need elevation_deg"):
         wedge(sensor__laser__rings="9", sensor__laser__elevation_deg="0")
     assert wedge(sensor__laser__rings="9").sensor.laser.rings == 9
+
+
+@pytest.mark.parametrize(
+    ("keys", "why"),
+    [
+        ({"control__allocation": "assignment"}, "control.allocation = 'structure', which is"),
+        ({"control__controller": "flocking"}, "control.controller = 'q_structure', which is"),
+    ],
+)
+def test_only_queues_with_leaders_gather(keys: dict[str, str], why: str) -> None:
+    assert wedge(control__gather="true").control.gather
+    with pytest.raises(ScenarioError) as refused:
+        wedge(control__gather="true", **keys)
+    assert refused.value.key == "control.gather"
+    assert why in str(refused.value)

@@ -221,6 +221,18 @@ def _cast_zone_not_empty(scenario: Scenario) -> Problem | None:
     )
 
 
+def _gathers_in_the_structure(scenario: Scenario) -> Problem | None:
+    control = scenario.control
+    if not control.gather:
+        return None
+    for key, needed in (("controller", "q_structure"), ("allocation", "structure")):
+        given = getattr(control, key)
+        if given != needed:
+            detail = f"true needs control.{key} = {needed!r}, which is {given!r}"
+            return Problem("control.gather", detail)
+    return None
+
+
 def _rates_up_to_tick_rate(scenario: Scenario) -> Problem | None:
     comms, tick_hz = scenario.comms, scenario.fleet.tick_hz
     for name, rate in (("local_hz", comms.local_hz), ("multihop_hz", comms.multihop_hz)):
@@ -366,6 +378,7 @@ RULES = (
     _known_briefed,
     _known_links,
     _cast_zone_not_empty,
+    _gathers_in_the_structure,
     _rates_up_to_tick_rate,
     _laser_rings_apart,
     _frame_consistent,

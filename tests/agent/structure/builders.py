@@ -2,11 +2,13 @@
 
 import msgspec
 
+from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.controller import Heard, Link
 from agent.messages import ZERO, LeaderSummary, RootKey, Standing, Subtree
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
 from agent.qstructure.target_frame import Frame
+from agent.structure.gathering import Gathering
 from agent.structure.label_code import FIRST_QUEUE, UNPLACED, of_vertex
 from agent.structure.link_timing import timing_of
 from agent.structure.queue_map import QueueMap
@@ -111,6 +113,23 @@ def view(formation, now_s, neighbours=(), *, at=ZERO, link=None, summaries=None,
     made.summaries = summaries if summaries is not None else [None] * formation.vertices
     made.blocked = frozenset(blocked)
     return made
+
+
+def gathering(formation=LINE, own_id=1):
+    """Return an agent's part in gathering."""
+    setup = AgentSetup(
+        id=own_id,
+        incarnation=0,
+        tick_hz=20.0,
+        slots_per_tick=4,
+        command_ticks=2,
+        vehicle=Vehicle(),
+        fleet_max_speed_mps=0.5,
+        control=Control(gather=True),
+        comms=Comms(),
+        formation=FormationSpec("f", {}, ()),
+    )
+    return Gathering(setup, formation)
 
 
 def replace(struct, **fields):

@@ -49,7 +49,7 @@ class Member:
             command_ticks=2,
             vehicle=Vehicle(),
             fleet_max_speed_mps=SPEED_MPS,
-            control=Control(),
+            control=Control(gather=team.gather),
             comms=Comms(),
             formation=FormationSpec("f", {}, ()),
             ids=team.ids,
@@ -69,7 +69,10 @@ class Member:
 class Team:
     """Agents at given points, with a radio: range [m], loss, latency [s], and what it drops."""
 
-    def __init__(self, formation, points, seed=0, *, range_m=100.0, loss=0.0, latency_s=0.0):
+    def __init__(
+        self, formation, points, seed=0, *, range_m=100.0, loss=0.0, latency_s=0.0, gather=False
+    ):
+        self.gather = gather
         self.map, self.ids = formation, len(points) + 8
         self.mission = Flown(0, formation.formation, Frame())
         self.random = Random(seed)

@@ -3,7 +3,7 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agent.messages import MAX_CANDIDATES, MAX_PLACES, Candidate, Place, TreeReport
+from agent.messages import MAX_CANDIDATES, MAX_PLACES, Candidate, Place
 from agent.structure import histogram
 from agent.structure.convergecast import Convergecast, joined, own_part
 from tests.agent.structure.builders import subtree
@@ -18,10 +18,6 @@ parts = st.builds(
     candidates=st.tuples(*[st.lists(candidates, max_size=3).map(tuple)] * QUEUES),
     blocked=st.lists(st.tuples(st.integers(0, 1), st.integers(0, 9)), max_size=3).map(tuple),
 )
-
-
-def report(part, parent=OWN):
-    return TreeReport(vertex=0, tier=2, parent=parent, down=None, up=part)
 
 
 @settings(derandomize=True)
@@ -66,34 +62,34 @@ def test_the_part_of_an_agent_counts_in_its_own_queue():
 
 def test_a_follower_counts_once_and_not_after_it_left():
     known = Convergecast(OWN)
-    known.hear(3, report(subtree(highest=(1, 0))), 1.0)
-    known.hear(3, report(subtree(highest=(2, 0))), 2.0)
-    known.hear(4, report(subtree(highest=(3, 0))), 2.0)
+    known.hear(3, OWN, subtree(highest=(1, 0)), 1.0)
+    known.hear(3, OWN, subtree(highest=(2, 0)), 2.0)
+    known.hear(4, OWN, subtree(highest=(3, 0)), 2.0)
     assert [each.highest for each in known.followers()] == [(2, 0), (3, 0)]
-    known.hear(3, report(subtree(highest=(2, 0)), parent=4), 3.0)
+    known.hear(3, 4, subtree(highest=(2, 0)), 3.0)
     assert [each.highest for each in known.followers()] == [(3, 0)]
-    known.hear(4, report(None, parent=3), 3.0)
+    known.hear(4, 3, None, 3.0)
     assert known.followers() == []
 
 
 def test_a_report_without_room_for_what_goes_up_leaves_what_was_told():
     known = Convergecast(OWN)
-    known.hear(3, report(subtree(highest=(1, 0))), 1.0)
-    known.hear(3, report(None), 2.0)
+    known.hear(3, OWN, subtree(highest=(1, 0)), 1.0)
+    known.hear(3, OWN, None, 2.0)
     assert [each.highest for each in known.followers()] == [(1, 0)]
 
 
 def test_a_report_that_was_overtaken_counts_for_nothing():
     known = Convergecast(OWN)
-    known.hear(3, report(subtree(highest=(2, 0))), 2.0)
-    known.hear(3, report(subtree(highest=(1, 0))), 1.0)
-    known.hear(3, report(subtree(highest=(1, 0)), parent=4), 1.5)
+    known.hear(3, OWN, subtree(highest=(2, 0)), 2.0)
+    known.hear(3, OWN, subtree(highest=(1, 0)), 1.0)
+    known.hear(3, 4, subtree(highest=(1, 0)), 1.5)
     assert [each.highest for each in known.followers()] == [(2, 0)]
 
 
 def test_old_reports_are_forgotten():
     known = Convergecast(OWN)
-    known.hear(3, report(subtree(highest=(1, 0))), 1.0)
-    known.hear(4, report(subtree(highest=(2, 0))), 2.0)
+    known.hear(3, OWN, subtree(highest=(1, 0)), 1.0)
+    known.hear(4, OWN, subtree(highest=(2, 0)), 2.0)
     known.forget(1.5)
     assert [each.highest for each in known.followers()] == [(2, 0)]

@@ -56,9 +56,10 @@ class LyingStructure:
         return self._lies.words(self._senses)
 
 
+@pytest.mark.parametrize("gather", [False, True])
 @pytest.mark.parametrize(("name", "agents"), [("line", 6), ("wedge", 7), ("figure-1b", 7)])
-def test_lies_stop_nobody_and_a_team_forms_once_the_liar_is_silent(name, agents):
-    flown = team(MAPS[name], agents, loss=0.2)
+def test_lies_stop_nobody_and_a_team_forms_once_the_liar_is_silent(name, agents, gather):
+    flown = team(MAPS[name], agents, loss=0.2, gather=gather)
     flown.run(2.0)
     liar = flown.members[LIAR]
     liar.structure = LyingStructure(LIAR, liar.structure)

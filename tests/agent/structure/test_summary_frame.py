@@ -13,12 +13,15 @@ from agent.controller import HeardSummary, Link
 from agent.messages import (
     AGENT_IDS,
     MAX_CANDIDATES,
+    MAX_CENTISECONDS,
     MAX_ORDERS,
     MAX_PLACES,
     MAX_TEAM,
     MAX_VERTICES,
     Candidate,
     Gossip,
+    Line,
+    Lines,
     Order,
     Place,
     RootKey,
@@ -36,7 +39,14 @@ from agent.structure.slow_layer import VERTICES_A_ROUND, SlowLayer
 from agent.structure.summary_frame import SUMMARY_HEAD_B, ReportTurns
 from agent.structure.tree import Tree, version_at
 from netem.wire.channels import MAX_PAYLOAD_B
-from tests.agent.structure.builders import BEACON_S, leader_summary, rays, replace, subtree
+from tests.agent.structure.builders import (
+    BEACON_S,
+    gathering,
+    leader_summary,
+    rays,
+    replace,
+    subtree,
+)
 from tests.agent.structure.team import Team
 
 GREATEST = 2**53 - 1
@@ -81,7 +91,7 @@ def fans(vertices, queues):
     return QueueMap(Formation(FormationSpec("fans", points, specs), 1.0))
 
 
-def layer(report, vertices, members, changed):
+def layer(report, vertices, members, changed, gathering=None):
     """Return the slow layer of an agent that has so much to say. changed: members with news."""
     census = Census(0, MAX_TEAM + 1)
     for member in range(members):
@@ -91,7 +101,7 @@ def layer(report, vertices, members, changed):
     for member in range(members - changed, members):
         census.hear(member, 1001.0, FIRST_QUEUE + 1)
     formation = fans(vertices, len(report.up.highest))
-    made = SlowLayer(LAST_ID, GREATEST, formation, census, ROUND_S)
+    made = SlowLayer(LAST_ID, GREATEST, formation, census, ROUND_S, gathering=gathering)
     for v in range(vertices):
         made.publish(v, report.down)
         made.collect(v, report.up, (), START_S, CLEAN)
@@ -105,9 +115,10 @@ def trees(report, vertices):
     return found
 
 
-def timed(report, vertices, members, changed, seconds):
+def timed(report, vertices, members, changed, seconds, gathering=None):
     """Return the summaries of an agent in so many seconds, with the time of each [s]."""
-    slow, known = layer(report, vertices, members, changed), trees(report, vertices)
+    slow = layer(report, vertices, members, changed, gathering)
+    known = trees(report, vertices)
     times = [START_S + BEACON_S * tick for tick in range(round(seconds / BEACON_S))]
     due = [(now_s, slow.due(known, CLEAN, now_s)) for now_s in times]
     return [(now_s, summary) for now_s, summary in due if summary is not None]
@@ -188,6 +199,27 @@ def test_summaries_of_any_agent_fit_their_frames(vertices, members, changed, rep
         assert len(summary.news) <= NEWS
         payload = add_checksum(encode(Gossip(LAST_ID, 1e9, (), None, summary)))
         assert decode_gossip(payload).summary == summary
+
+
+@pytest.mark.parametrize(("queues", "vertices"), [(1, 3), (4, 3), (10, 1), (MOST_QUEUES, 1)])
+def test_what_is_said_of_lines_fits_beside_the_rest_and_each_line_is_said(queues, vertices):
+    report = greatest(queues)
+    gathers, longest = gathering(fans(vertices, queues)), 2**31 - 1
+    every = [
+        Line(j, version_at(START_S), longest, longest, longest, 0, MAX_CENTISECONDS)
+        for j in range(queues * vertices)
+    ]
+    for line in every:
+        gathers.hear(1, Lines((line,), ()), START_S, START_S)
+    found = [said for _, said in timed(report, vertices, 300, 100, 30.0, gathers)]
+    assert max(map(frame_b, found)) <= MAX_PAYLOAD_B
+    assert {line for each in found if each.lines for line in each.lines.lines} == {*every}
+    parts = [each for summary in found for each in summary.trees]
+    assert {each.vertex for each in parts if each.down == report.down} == {*range(vertices)}
+    assert {each.vertex for each in parts if each.up} == {*range(vertices)}
+    assert {each for summary in found for each, _ in summary.news} == {*range(200, 300)}
+    runs = [range(each.first, each.first + len(each.labels) // 2) for each in found]
+    assert {member for run in runs for member in run} == {*range(300)}
 
 
 def test_summaries_of_an_uneven_team_fit_their_frames():
