@@ -11,6 +11,7 @@ from math import dist, inf
 from agent.assignment.allocation import own_place
 from agent.controller import Peer
 from agent.messages import Place
+from agent.qstructure.formation import Slot
 from agent.structure.claim import Claim
 from agent.structure.link_timing import Timing
 from agent.structure.view import View, leads
@@ -39,7 +40,7 @@ class DirectRule:
         self.heard = 1
         self._guessed: tuple[int, ...] | None = None
         """Among which members the last guess was made."""
-        self._guess: Place | None = None
+        self._guess: Slot | None = None
         self._around: tuple[int, ...] = ()
         self._around_since_s = now_s
 
@@ -94,8 +95,8 @@ class DirectRule:
         """Whether all members are heard, so that the rule will apply if nothing changes."""
         return self._full_since_s is not None and not self.applies
 
-    def guess(self, view: View, claim: Claim) -> Place | None:
-        """Return the place that the assignment over all neighbours gives, without claiming it.
+    def guess(self, view: View) -> Slot | None:
+        """Return the slot that the assignment over all neighbours gives, without claiming it.
 
         Where they are the whole team this is the place that the agent will take, so that it flies
         there at once. None where a neighbour hears more, or where so many are heard that it takes
@@ -111,7 +112,9 @@ class DirectRule:
         settled = view.now_s - self._around_since_s >= GUESS_AFTER_S + view.timing.latency_s
         if settled and self._guessed != ids:
             self._guessed = ids
-            self._guess = self._likely_place(view)
+            place = self._likely_place(view)
+            made = view.map.formation
+            self._guess = made.slot(place, len(ids) + 1) if place is not None else None
         return self._guess
 
     def _likely_place(self, view: View) -> Place | None:

@@ -7,7 +7,7 @@ sooner while there is news.
 """
 
 from collections.abc import Sequence
-from math import dist, inf
+from math import inf
 
 from agent.config import AgentSetup
 from agent.controller import Flown, Heard, Senses
@@ -25,7 +25,6 @@ from agent.messages import (
 )
 from agent.places.occupied_slots import OccupiedSlots
 from agent.places.place_points import OwnTarget, PlacePoints
-from agent.qstructure.formation import Slot
 from agent.structure.claim import NO_QUEUE, Claim
 from agent.structure.convergecast import own_part
 from agent.structure.direct_rule import DirectRule
@@ -33,9 +32,10 @@ from agent.structure.election import Election
 from agent.structure.gathering import Gathering
 from agent.structure.head_count import HeadCount
 from agent.structure.leader import Leader
+from agent.structure.likely_slot import nearest_slot, slot_by_order, standing_slot
 from agent.structure.link_timing import timing_of
-from agent.structure.numbers import STANDS_M, Numbers
-from agent.structure.queue_choice import QueueChoice, likely_length
+from agent.structure.numbers import Numbers
+from agent.structure.queue_choice import QueueChoice
 from agent.structure.queue_map import QueueMap
 from agent.structure.slow_layer import SlowLayer
 from agent.structure.swaps import Swaps
@@ -100,7 +100,7 @@ class Structure:
         if not decides and self.claim.ranked and self._own is not None:
             return self._flown(senses.now_s)
         view = self._view = self._look(senses, mission)
-        view.summaries = self._slow.summaries
+        view.summaries, view.order = self._slow.summaries, self._order
         self.follow_trees(view, senses)
         if decides:
             self._next_decision_s = senses.now_s + 1.0 / DECISION_HZ - 1e-9
@@ -230,33 +230,13 @@ class Structure:
             return self._shortened(view, view.target(claim))
         if claim.queue == NO_QUEUE:
             return None
-        slot = self._standing_slot(view, claim.queue) or self._guessed_slot(view)
-        slot = slot or self._slot_by_order(view, claim.queue)
+        slot = standing_slot(view, claim.queue, self._most_members)
+        slot = slot or self._direct.guess(view)
+        slot = slot or slot_by_order(view, claim.queue, self._own_id)
         if slot is None and view.now_s - self._started_s < PATIENCE_S:
             return None
-        if slot is None:
-            number = view.nearest_number(claim.queue, likely_length(view))
-            slot = self._map.slot(claim.queue, number, view.extent(claim.queue, number))
+        slot = slot or nearest_slot(view, claim.queue)
         return OwnTarget(None, slot, False) if slot is not None else None
-
-    def _standing_slot(self, view: View, queue: int) -> Slot | None:
-        """Return the slot of a queue in which the agent stands by chance, None for none."""
-        number = view.nearest_number(queue, self._most_members)
-        slots = [self._map.slot(queue, number, view.extent(queue, number))]
-        slots += [self._map.vertex_slot(v) for v in self._map.vertices_of[queue]]
-        near = [each for each in slots if each and dist(each.point, view.origin) < STANDS_M]
-        return near[0] if near else None
-
-    def _guessed_slot(self, view: View) -> Slot | None:
-        place = self._direct.guess(view, self.claim)
-        return self._map.formation.slot(place, len(view.around) + 1) if place is not None else None
-
-    def _slot_by_order(self, view: View, queue: int) -> Slot | None:
-        """Return the slot that the agent gets if no more members turn up; None where unknown."""
-        if self._map.closed[queue] or self._own_id not in self._order:
-            return None
-        number = 1 + self._order.index(self._own_id)
-        return self._map.slot(queue, number, view.extent(queue, number))
 
     def _shortened(self, view: View, own: OwnTarget | None) -> OwnTarget | None:
         """Return the target for now: a push may lead past the tail, which is no place to fly to."""

@@ -1,0 +1,34 @@
+"""Where an agent without a number flies meanwhile: to the slot that it is likely to get."""
+
+from math import dist
+
+from agent.qstructure.formation import Slot
+from agent.structure.numbers import STANDS_M
+from agent.structure.queue_choice import likely_length
+from agent.structure.view import View
+
+
+def standing_slot(view: View, queue: int, members: int) -> Slot | None:
+    """Return the slot of a queue in which the agent stands by chance, None for none.
+
+    members: so many are looked at.
+    """
+    number = view.nearest_number(queue, members)
+    slots = [view.map.slot(queue, number, view.extent(queue, number))]
+    slots += [view.map.vertex_slot(v) for v in view.map.vertices_of[queue]]
+    near = [each for each in slots if each and dist(each.point, view.origin) < STANDS_M]
+    return near[0] if near else None
+
+
+def slot_by_order(view: View, queue: int, own_id: int) -> Slot | None:
+    """Return the slot that the agent gets if no more members turn up; None where unknown."""
+    if view.map.closed[queue] or own_id not in view.order:
+        return None
+    number = 1 + view.order.index(own_id)
+    return view.map.slot(queue, number, view.extent(queue, number))
+
+
+def nearest_slot(view: View, queue: int) -> Slot | None:
+    """Return the nearest slot of a queue that is likely to have a member."""
+    number = view.nearest_number(queue, likely_length(view))
+    return view.map.slot(queue, number, view.extent(queue, number))
