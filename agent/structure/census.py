@@ -15,6 +15,7 @@ from __future__ import annotations
 import sys
 from array import array
 from collections import Counter
+from collections.abc import Container
 from math import inf
 from operator import add
 from typing import NamedTuple
@@ -65,6 +66,8 @@ class Census:
         self._own = own_id
         self._ids = min(ids, MAX_LABELLED)
         self._labels: list[int] = []
+        self._codes = bytearray()
+        """The codes of the labels; 0 of a member of which nothing is known."""
         self._lag_s: list[float] = []
         """How old labels are when they arrive, by member [s]."""
         self._changed: set[int] = set()
@@ -73,12 +76,8 @@ class Census:
         """When a member that has been silent for too long was last asked for [s]."""
         self._from = 0
         self._changed_s = 0.0
-        self._looked_s = inf
-        """T_lost before the last look for late members [s]."""
-        self._first_deadline_s = inf
-        """T_lost before the first time at which a member may have become late since [s]."""
-        self._next_ask_s = inf
-        """When to ask again for a member that was late then [s]."""
+        self._deadline_s: list[float] = []
+        """T_lost before a member is late, by member [s]; infinite for one that is unknown."""
 
     @property
     def most(self) -> int:
@@ -113,9 +112,13 @@ class Census:
     def merge(self, summary: Summary, stamp_s: float, now_s: float) -> None:
         """Take the labels of another agent, as they were at its stamp [s]."""
         greatest = int(stamp_s / QUANTUM_S) * CODES + CODES - 1
-        for member, label in summary.news:
-            if member < self._ids and label != UNKNOWN:
-                self._compare(member, greatest - label, now_s)
+        known = len(self._labels)
+        for member, wire in summary.news:
+            label = greatest - wire
+            # Most news is known already: that has to cost little.
+            told = member < known and 0 <= self._labels[member] - label < WORTH_QUANTA * CODES
+            if not told and member < self._ids and wire != UNKNOWN:
+                self._compare(member, label, now_s)
         if summary.labels:
             self._merge_run(summary.first, summary.labels, greatest, now_s)
 
@@ -137,27 +140,14 @@ class Census:
     def ask(self, now_s: float, lost_s: float) -> None:
         """Ask for members that have been silent for too long. lost_s: T_lost of a neighbour [s]."""
         oldest_s = now_s - lost_s
-        same_are_late = self._looked_s <= oldest_s <= self._first_deadline_s
-        if same_are_late and now_s < self._next_ask_s:
+        if not self._deadline_s or min(self._deadline_s) >= oldest_s:
             return
-        self._looked_s, self._first_deadline_s, self._next_ask_s = oldest_s, inf, inf
-        forgotten = max(0, int((oldest_s - FORGOTTEN_S) / QUANTUM_S) * CODES)
-        for member, label in enumerate(self._labels):
-            if label <= forgotten:
-                continue
-            deadline_s = label * LABEL_S + LAGS * self._lag_s[member]
-            if deadline_s >= oldest_s:
-                self._first_deadline_s = min(self._first_deadline_s, deadline_s)
-            else:
-                self._ask_for(member, now_s)
-
-    def _ask_for(self, member: int, now_s: float) -> None:
-        """Ask for a late member, unless that was done of late."""
-        asked_s = self._asked_s.get(member, 0.0)
-        if now_s - asked_s >= ASK_S:
-            asked_s = self._asked_s[member] = now_s
-            self._changed.add(member)
-        self._next_ask_s = min(self._next_ask_s, asked_s + ASK_S - 1e-9)
+        forgotten = int((oldest_s - FORGOTTEN_S) / QUANTUM_S) * CODES
+        for member in [m for m, each_s in enumerate(self._deadline_s) if each_s < oldest_s]:
+            known = self._labels[member] > forgotten
+            if known and now_s - self._asked_s.get(member, 0.0) >= ASK_S:
+                self._asked_s[member] = now_s
+                self._changed.add(member)
 
     def _merge_run(self, first: int, labels: bytes, greatest: int, now_s: float) -> None:
         wire = _unpacked(labels)
@@ -179,13 +169,14 @@ class Census:
         self._set(member, label, now_s)
 
     def _set(self, member: int, label: int, now_s: float) -> None:
-        if label % CODES != self._labels[member] % CODES:
+        code = label % CODES
+        if code != self._codes[member]:
+            self._codes[member] = code
             self._changed.add(member)
             if member != self._own:
                 self._changed_s = max(self._changed_s, now_s)
         self._labels[member] = label
-        deadline_s = label * LABEL_S + LAGS * self._lag_s[member]
-        self._first_deadline_s = min(self._first_deadline_s, deadline_s)
+        self._deadline_s[member] = label * LABEL_S + LAGS * self._lag_s[member]
 
     def population(self, now_s: float, lost_s: float, queues: int, vertices: int) -> Population:
         """Return who is there now. lost_s: T_lost of a neighbour, and time for an answer [s]."""
@@ -198,13 +189,19 @@ class Census:
                 holders[code - FIRST_VERTEX] += number
         return Population(codes.total(), tuple(members), tuple(holders), self._changed_s)
 
-    def present(self, now_s: float, lost_s: float) -> list[tuple[int, int]]:
-        """Return each member that is there with its code before it. lost_s: as above [s]."""
+    def present(
+        self, now_s: float, lost_s: float, codes: Container[int] = range(1, CODES)
+    ) -> list[tuple[int, int]]:
+        """Return each member that is there, by code and id.
+
+        lost_s: as for the population [s]; codes: only of members with one of these.
+        """
         oldest_s = now_s - lost_s - QUANTUM_S
+        labels, lag_s = self._labels, self._lag_s
         return [
-            (label % CODES, member)
-            for member, (label, lag_s) in enumerate(zip(self._labels, self._lag_s, strict=True))
-            if label and label * LABEL_S >= oldest_s - LAGS * lag_s
+            (code, member)
+            for member, code in enumerate(self._codes)
+            if code in codes and labels[member] * LABEL_S >= oldest_s - LAGS * lag_s[member]
         ]
 
     def wire(self, now_s: float, most: int = SHARED_LABELS) -> tuple[int, bytes]:
@@ -225,7 +222,9 @@ class Census:
         missing = members - len(self._labels)
         if missing > 0:
             self._labels += [0] * missing
+            self._codes += bytes(missing)
             self._lag_s += [0.0] * missing
+            self._deadline_s += [inf] * missing
 
 
 def _on_the_radio(label: int, now_s: float) -> int:

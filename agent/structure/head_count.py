@@ -2,7 +2,7 @@
 
 from agent.structure.census import Census, Population
 from agent.structure.claim import NO_QUEUE, Claim
-from agent.structure.label_code import UNPLACED, LabelCodes, of_vertex, queue_of
+from agent.structure.label_code import UNPLACED, LabelCodes, codes_of, of_vertex, queue_of
 from agent.structure.queue_map import QueueMap
 from agent.structure.view import View
 
@@ -62,6 +62,5 @@ class HeadCount:
     def order(self, view: View, queue: int) -> list[int]:
         """Return the known members of a queue, in their order along it."""
         lost_s = view.timing.lost_s + view.timing.answer_s
-        present = self.census.present(view.now_s, lost_s)
-        queues = self._map.queues
-        return [member for code, member in sorted(present) if queue_of(code, queues) == queue]
+        codes = codes_of(queue, self._map.queues)
+        return [member for _, member in sorted(self.census.present(view.now_s, lost_s, codes))]

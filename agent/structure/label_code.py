@@ -6,6 +6,8 @@ straight queue this order makes the sum of the squared ways least: what a way ha
 is the same for each of its places.
 """
 
+from functools import lru_cache
+
 from agent.messages import Vector
 from agent.structure.queue_map import QueueMap
 
@@ -38,6 +40,12 @@ class LabelCodes:
 def of_vertex(vertex: int) -> int:
     """Return the code of the holder of a vertex."""
     return FIRST_VERTEX + vertex
+
+
+@lru_cache(maxsize=256)
+def codes_of(queue: int, queues: int) -> frozenset[int]:
+    """Return all codes of a queue in a formation of so many queues."""
+    return frozenset(range(FIRST_QUEUE + queue, FIRST_VERTEX, queues))
 
 
 def queue_of(code: int, queues: int) -> int:

@@ -1,7 +1,7 @@
 """The Q-structure of one agent: what it says of itself, what it makes of what others say.
 
 At 10 Hz it decides on its queue, its number and the lead of a vertex, and follows the trees of all
-vertices; until it has a place, each tick. What is urgent goes into its beacons
+vertices; at first these each tick. What is urgent goes into its beacons
 (:class:`~agent.messages.Standing`). What is slow goes into summaries on the multihop channel,
 sooner while there is news.
 """
@@ -47,6 +47,8 @@ PATIENCE_S = 0.3
 """So long an agent without a number stays where it is: most have one by then, and need not turn."""
 CERTAIN_S = 1.0
 """A leader leaves its vertex, or returns to it, once it has been taken, or free, for so long."""
+SETTLED_S = 1.0
+"""So long an agent without a number looks each tick, for much is new to it."""
 FAR_M = 2.5
 """Within this distance of its place an agent flies there even if it lies beyond the tail."""
 
@@ -97,7 +99,8 @@ class Structure:
         """Return the own target now; None for an agent without a place."""
         self._slow.hear(senses.summaries, self.trees, senses.now_s)
         decides = senses.now_s >= self._next_decision_s
-        if not decides and self.claim.ranked and self._own is not None:
+        settled = self.claim.ranked or senses.now_s - self._started_s > SETTLED_S
+        if not decides and settled and self._own is not None:
             return self._flown(senses.now_s)
         view = self._view = self._look(senses, mission)
         view.summaries, view.order = self._slow.summaries, self._order
