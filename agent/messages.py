@@ -273,7 +273,7 @@ class Candidate(NamedTuple):
     to: Index
 
 
-MAX_CANDIDATES = 8
+MAX_CANDIDATES = 16
 """Most candidates of a queue in one report."""
 MAX_ORDERS = 16
 """Most orders of a leader at one time."""

@@ -95,13 +95,17 @@ def joined(parts: Iterable[Subtree], queues: int) -> Subtree:
 
 
 def _cheapest(candidates: set[Candidate]) -> tuple[Candidate, ...]:
-    """Return the candidates with the least extra way to each other queue."""
+    """Return the candidates with the least extra way to each other queue.
+
+    The first to each queue come first: where the rest has no room, each queue still has some.
+    """
     kept: dict[int, list[Candidate]] = {}
     for each in sorted(candidates):
         to_it = kept.setdefault(each.to, [])
         if len(to_it) < CANDIDATES:
             to_it.append(each)
-    return tuple(sorted(each for to_it in kept.values() for each in to_it)[:MAX_CANDIDATES])
+    in_turn = sorted((k, each) for to_it in kept.values() for k, each in enumerate(to_it))
+    return tuple([each for _, each in in_turn[:MAX_CANDIDATES]])
 
 
 def own_part(

@@ -6,7 +6,9 @@ orders the candidates with the least extra way to change their queue, and gives 
 the counts have followed or the time for it is over.
 """
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from math import inf
 from typing import NamedTuple
 
 from agent.messages import (
@@ -32,7 +34,10 @@ BEYOND_S, MOST_BEYOND_S = 0.45, 1.2
 """The first counts must be steady for so much longer where the team is three times as large as
 those heard, four times and so on."""
 COLLECTED_S, COLLECTED_LATENCIES = 1.0, 4.0
-"""How long it waits for candidates to come up the tiers, if there are too few."""
+"""How long it waits for candidates to come up the tiers, if there are too few; and for even queues
+before it says go."""
+MOST_WAITS = 2.0
+"""Each order begins the wait before go anew, within so many times its length."""
 
 
 class Counted(NamedTuple):
@@ -40,6 +45,14 @@ class Counted(NamedTuple):
 
     total: int
     members: tuple[int, ...]
+
+
+class Unevenness(NamedTuple):
+    """How the members should be shared out, and what has to move for it."""
+
+    shares: Sequence[int]
+    takers: Mapping[int, list[int]]
+    """For each queue with too many members how many each other queue may take from it."""
 
 
 class Leader:
@@ -55,9 +68,11 @@ class Leader:
         self._order = version_at(now_s)
         self._orders: tuple[Order, ...] = ()
         self._ordered_s = -1e9
-        self._expected: list[int] | None = None
+        self._expected: tuple[tuple[int, int], ...] = ()
+        """Members of each queue before the orders, and after; empty without orders."""
         self._uneven_s: float | None = None
-        self._steady_s: float | None = None
+        self._steady_s = inf
+        """Since when the queues have been steady, but not even [s]."""
 
     def summary(
         self, view: View, population: Population, subtree: Subtree, blocked: frozenset[Place]
@@ -65,9 +80,11 @@ class Leader:
         """Return the summary for now. subtree: what came up the tiers, the own part included."""
         steady = self._is_steady(view, population)
         followed = self._follow_up(view, population)
-        if steady and self._expected is None:
-            self._give_orders(view, population, subtree, blocked)
-        self._go = self._go or followed or (steady and self._may_go(view, population))
+        uneven = _unevenness(view, population, blocked)
+        if steady and not self._expected:
+            self._give_orders(view, population.members, uneven, subtree)
+        if not self._go and (steady or followed):
+            self._go = self._may_go(view, uneven)
         homed = view.map.homed[self.vertex]
         return LeaderSummary(
             root=self._key,
@@ -101,48 +118,46 @@ class Leader:
         beyond = total / (len(view.heard) + 1) - 2.0
         return view.timing.settle_s + min(MOST_BEYOND_S, BEYOND_S * max(0.0, beyond))
 
-    def _may_go(self, view: View, population: Population) -> bool:
+    def _may_go(self, view: View, uneven: Unevenness) -> bool:
         """Whether numbers may be taken: the queues are even, or have had the time for it."""
-        self._steady_s = self._steady_s if self._steady_s is not None else view.now_s
-        even = self._uneven_s is None and self._expected is None
+        if not uneven.takers:
+            return True
+        self._steady_s = min(self._steady_s, view.now_s)
         wait_s = COLLECTED_S + COLLECTED_LATENCIES * view.timing.latency_s
-        return even or view.now_s - self._steady_s > wait_s
+        ordered_s = min(self._ordered_s, self._steady_s + MOST_WAITS * wait_s)
+        return view.now_s - max(self._steady_s, ordered_s) > wait_s
 
     def _follow_up(self, view: View, population: Population) -> bool:
         """Take orders back once they have been followed, or have had the time for it."""
-        if self._expected is None:
+        if not self._expected:
             return False
         wait_s = FOLLOWED_S + FOLLOWED_LATENCIES * view.timing.latency_s + 2.0 * self._round_s
-        followed = list(population.members) == self._expected
+        followed = all(
+            now >= after if after > before else now <= after
+            for now, (before, after) in zip(population.members, self._expected, strict=True)
+            if after != before
+        )
         if followed or view.now_s - self._ordered_s > wait_s:
-            self._expected, self._orders = None, ()
+            self._expected, self._orders = (), ()
         return followed
 
     def _give_orders(
-        self, view: View, population: Population, subtree: Subtree, blocked: frozenset[Place]
+        self, view: View, counts: Sequence[int], uneven: Unevenness, subtree: Subtree
     ) -> None:
-        counts = population.members
-        vacant = [
-            v
-            for v, place in enumerate(view.map.vertex_places)
-            if population.holders[v] == 0 and place not in blocked
-        ]
-        shares = view.map.members(population.total, blocked)
-        shares = view.map.with_vacancies(shares, counts, vacant)
-        given = transfers(view.map, counts, shares)
         homed = view.map.homed[self.vertex]
-        own = {j: given[j] for j in homed if j in given}
-        if not own or (not vacant and _all_hear_all(view, population)):
+        own = {j: uneven.takers[j] for j in homed if j in uneven.takers}
+        if not own:
             self._uneven_s = None
             return
         if self._uneven_s is None:
             self._uneven_s = view.now_s
-        spare = {j: counts[j] - shares[j] for j in own}
+        spare = {j: counts[j] - uneven.shares[j] for j in own}
         offered = {j: _offered(subtree, homed.index(j)) for j in own}
         orders = _cheapest(own, dict(spare), offered)
-        lacking = sum(max(0, share - n) for share, n in zip(shares, counts, strict=True))
-        complete = len(orders) >= min(sum(spare.values()), lacking, MAX_ORDERS) and all(
-            len({each.agent for each in offered[j]}) >= min(CANDIDATES, spare[j]) for j in own
+        asked = {j: min(CANDIDATES, number) for j, number in spare.items()}
+        lacking = sum(max(0, share - n) for share, n in zip(uneven.shares, counts, strict=True))
+        complete = len(orders) >= min(sum(asked.values()), lacking) and all(
+            len({each.agent for each in offered[j]}) >= asked[j] for j in own
         )
         wait_s = COLLECTED_S + COLLECTED_LATENCIES * view.timing.latency_s + self._round_s
         if orders and (complete or view.now_s - self._uneven_s > wait_s):
@@ -151,10 +166,23 @@ class Leader:
     def _issue(self, view: View, orders: list[Order], counts: Sequence[int]) -> None:
         self._order = max(self._order + 1, version_at(view.now_s))
         self._orders, self._ordered_s, self._uneven_s = tuple(orders), view.now_s, None
-        self._expected = list(counts)
-        for order in orders:
-            self._expected[order.queue] -= 1
-            self._expected[order.to] += 1
+        gained = Counter(order.to for order in orders)
+        gained.subtract(order.queue for order in orders)
+        self._expected = tuple([(n, n + gained[j]) for j, n in enumerate(counts)])
+
+
+def _unevenness(view: View, population: Population, blocked: frozenset[Place]) -> Unevenness:
+    """Return what is to be ordered; nothing where the direct rule gives the queues."""
+    vacant = [
+        v
+        for v, place in enumerate(view.map.vertex_places)
+        if population.holders[v] == 0 and place not in blocked
+    ]
+    shares = view.map.members(population.total, blocked)
+    if not vacant and _all_hear_all(view, population):
+        return Unevenness(shares, {})
+    shares = view.map.with_vacancies(shares, population.members, vacant)
+    return Unevenness(shares, transfers(view.map, population.members, shares))
 
 
 def _all_hear_all(view: View, population: Population) -> bool:

@@ -79,13 +79,13 @@ def _parts(report: TreeReport) -> list[TreeReport]:
 
 
 def _shortened(report: TreeReport, up: Subtree) -> TreeReport:
-    """Return a report with as many candidates of each queue as fit, the nearest first.
+    """Return a report with as many candidates of each queue as fit, the first ones.
 
     The others are reported once these have moved.
     """
     for number in range(MAX_CANDIDATES, 0, -1):
-        kept = tuple(sorted(each)[:number] for each in up.candidates)
-        short = msgspec.structs.replace(up, candidates=tuple(map(tuple, kept)))
+        kept = tuple(each[:number] for each in up.candidates)
+        short = msgspec.structs.replace(up, candidates=kept)
         report = msgspec.structs.replace(report, up=short)
         if len(encode(report)) <= LARGEST_REPORT_B:
             break

@@ -1,5 +1,7 @@
 """What goes up a tree: sums of the followers' parts, each follower once, by its latest report."""
 
+from collections import Counter
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -41,6 +43,14 @@ def test_a_sum_is_the_highest_the_nearest_and_all(given_):
         assert not offered or kept[0] == min(offered)
     assert set(found.blocked) <= {Place(*place) for part in given_ for place in part.blocked}
     assert len(found.blocked) <= MAX_PLACES
+
+
+def test_each_queue_keeps_candidates_however_far_it_is():
+    near = [Candidate(k, k, to) for k in range(30) for to in (1, 2, 3)]
+    far = [Candidate(1000 + k, k, 4) for k in range(30)]
+    kept = joined([subtree(highest=(0,), candidates=(tuple(near + far),))], 1).candidates[0]
+    assert {each.to for each in kept[:4]} == {1, 2, 3, 4}
+    assert min(Counter(each.to for each in kept).values()) >= MAX_CANDIDATES // 4
 
 
 @given(st.lists(parts, max_size=3), st.integers(0, 5), st.integers(0, 5))

@@ -162,6 +162,23 @@ def test_go_waits_until_the_first_orders_have_been_followed():
     assert flight.ask(population(3, 3)).go
 
 
+def test_members_that_turn_up_meanwhile_do_not_hide_that_orders_were_followed():
+    flight = Flight(THREE)
+    assert len(flight.until_orders(population(5, 1, 2))) == 2
+    assert flight.ask(population(5, 3, 3)).orders, "not yet: nobody has left the first queue"
+    found = flight.ask(population(3, 3, 3))
+    assert (found.orders, found.go) == ((), True)
+
+
+def test_orders_that_leave_the_queues_uneven_are_followed_by_others_before_go():
+    flight = Flight(TWO)
+    flight.until_orders(population(5, 1))
+    assert not flight.ask(population(3, 7)).go
+    assert flight.until_orders(population(3, 7))
+    assert not flight.ask(population(3, 7)).go
+    assert flight.ask(population(5, 5)).go
+
+
 def test_go_comes_without_candidates_too():
     flight = Flight(TWO)
     nobody = offers(TWO, (0, 0))
