@@ -58,6 +58,7 @@ def test_what_an_agent_costs_is_of_one_flight_and_counts_each_channel():
     assert agent_cost(9, 1.5) is cost
     assert cost.step_us <= cost.dearest_us <= cost.worst_us
     assert cost.flight_us > cost.step_us > 0.0
+    assert 0.0 < cost.heard_by <= 8.0
     assert cost.local_bps == pytest.approx(20.0 * cost.beacon_b)
     assert 50.0 < cost.beacon_b < 1200.0
     assert cost.sent_bps - cost.local_bps == pytest.approx(cost.multihop_bps)

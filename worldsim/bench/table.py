@@ -81,6 +81,7 @@ def _step_rows() -> Iterator[Measure]:
     """Yield the CPU time of an agent's step, by the team's size."""
     least = STEP_SIZES[0]
     for agents in STEP_SIZES:
+        yield _cost("others that hear a frame", "agents", agents, lambda cost: cost.heard_by, None)
         yield _cost("agent step, mean", "us", agents, lambda cost: cost.step_us, None)
         yield _cost("agent step, dearest 1 %", "us", agents, lambda cost: cost.dearest_us, None)
         yield _cost("agent step, worst", "us", agents, lambda cost: cost.worst_us, None)

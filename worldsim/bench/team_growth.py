@@ -36,6 +36,8 @@ class AgentCost(NamedTuple):
     """The mean over the dearest DEAREST of all steps [us]."""
     worst_us: float
     """The dearest step [us]."""
+    heard_by: float
+    """How many others hear a frame: fewer of a small team, most of which flies at its edge."""
     flight_us: float
     """CPU time of the whole flight for each step of an agent, radio and world included [us]."""
 
@@ -74,9 +76,10 @@ def agent_cost(agents: int, start_s: float = START_S) -> AgentCost:
     steps = sorted(times.all_s)
     dearest = steps[-ceil(DEAREST * len(steps)) :]
     agent_seconds = len(steps) / scenario.fleet.tick_hz
-    sent_b = fleet.medium_counters.sent_b
+    counters = fleet.medium_counters
     local_bps, multihop_bps = (
-        sum(sent_b[channel :: len(CHANNELS)]) / agent_seconds for channel in (LOCAL, MULTIHOP)
+        sum(counters.sent_b[channel :: len(CHANNELS)]) / agent_seconds
+        for channel in (LOCAL, MULTIHOP)
     )
     return AgentCost(
         beacon_b=local_bps / scenario.comms.local_hz,
@@ -85,5 +88,6 @@ def agent_cost(agents: int, start_s: float = START_S) -> AgentCost:
         step_us=1e6 * sum(steps) / len(steps),
         dearest_us=1e6 * sum(dearest) / len(dearest),
         worst_us=1e6 * steps[-1],
+        heard_by=counters.fates["delivered"] / counters.sent,
         flight_us=1e6 * spent_s / len(steps),
     )
