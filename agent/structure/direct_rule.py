@@ -34,7 +34,7 @@ class DirectRule:
         self._same_since_s = now_s
         self._full_since_s: float | None = None
         self._short_since_s = self._uneven_since_s = inf
-        """Since when members are missing, and since when some hear fewer than others [s]."""
+        """Since when members or leaders are missing, and since when some hear fewer members [s]."""
         self._next_choice_s = now_s
         self.applies = False
         self.heard = 1
@@ -54,11 +54,11 @@ class DirectRule:
             self._ids, self._same_since_s = ids, now_s
         self.heard = len(ids) + 1
         short = view.total == 0 or self.heard < view.total or not _all_led(view)
-        least = min([h.standing.heard for h in members if h.standing is not None], default=0)
+        least = min([h.standing.heard for h in members if h.standing], default=self.heard)
         if self.applies:
             self._leave(view, short=short, uneven=least < self.heard)
         else:
-            self._enter(not short and self.heard == view.total <= max(least, 1), view, claim)
+            self._enter(not short and self.heard == view.total <= least, view, claim)
 
     def _within_s(self, timing: Timing) -> float:
         """Return how recently a member must have been heard to count [s]."""
@@ -169,7 +169,8 @@ class DirectRule:
             return None  # a vertex without a leader
         team = self._team(view, claim)
         if view.gathering and _is_divided(view, team, places):
-            own = claim.queue if claim.queue in view.gathering else None
+            held_place = next(peer.place for peer in team if peer.id == self._own_id)
+            own = _group(view, held_place)
             places = [p for p in places if _group(view, p) == own]
             team = [peer for peer in team if _group(view, peer.place) == own]
         if len(places) > len(team):

@@ -142,3 +142,35 @@ def test_two_leaders_of_one_vertex_leave_the_places_as_they_are():
     double[1] = heard(2, (0.1, 0.0, 0.0), APEX, heard=4, leads=0)
     flight.run(0.8, double)
     assert (flight.claim.queue, flight.claim.number) == before
+
+
+def test_an_agent_that_chose_a_queue_which_gathers_without_it_takes_the_place_that_is_left():
+    """That queue has its members, so the place is one of another queue."""
+    pair = lines((0.0, 0.0, 0.0), (0.0, 3.0, 0.0))
+    others = [
+        heard(1, (0.0, 0.0, 0.0), APEX, heard=5, leads=0),
+        heard(2, (0.0, 3.0, 0.0), Place(1, 0), heard=5, leads=1, queue=1),
+        heard(3, (-1.0, 0.0, 0.0), pair.place(0, 1), heard=5),
+        heard(4, (-1.0, 3.0, 0.0), pair.place(1, 1), heard=5, queue=1),
+    ]
+    summaries = [leader_summary(total=5, counts=(1,)), leader_summary(total=5, counts=(2,))]
+    claim, rule = Claim(-9.0), DirectRule(9, 0.0)
+    claim.give_up(1, 0.0)
+    for tick in range(12):
+        seen = view(pair, TICK_S * tick, others, at=(-9.0, 0.0, 0.0), summaries=summaries)
+        seen.gathering = frozenset([1])
+        rule.update(seen, claim)
+        if rule.applies:
+            rule.choose(seen, claim)
+    assert (claim.queue, claim.number) == (0, 2)
+
+
+def test_it_holds_on_for_an_agent_that_is_alone():
+    rule, claim = DirectRule(9, 0.0), Claim(0.0)
+    claim.lead(0, 0.0, 0.0)
+    applied = []
+    for tick in range(60):
+        rule.update(view(LINE, TICK_S * tick, summaries=[told(1)]), claim)
+        applied.append(rule.applies)
+    assert applied[-1]
+    assert applied == sorted(applied), "once it holds it goes on"
