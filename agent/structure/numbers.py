@@ -1,7 +1,8 @@
 """Which number an agent takes in its queue (Algorithm 1, target-on-queue; E17).
 
-The first number follows from the distance to the vertex: exactly where the whole queue is heard,
-else by the leader's histogram. Of two agents with one number the one that claimed it from farther
+The first number is the own one in the order along the queue, once an agent knows of as many members
+as its leader counts. Else it follows from the distances to the vertex, or from the leader's
+histogram of them. Of two agents with one number the one that claimed it from farther
 away moves on; a leader that has one, since its vertex is taken (E18), keeps it. Who moves on takes
 a number known to be free, or pushes into the next one; so a push runs up to the tail. Gaps close
 inwards.
@@ -57,7 +58,7 @@ class Numbers:
         if joins:
             self._join(view, claim)
         else:
-            self._claim(view, claim, self._by_distance(view, claim, same))
+            self._claim(view, claim, self._first(view, claim, same))
 
     def _joins_late(self, view: View, claim: Claim) -> bool:
         """Whether the others have their numbers already. Who led for a moment has had none yet."""
@@ -87,43 +88,43 @@ class Numbers:
         self._claim(view, claim, _available(number, taken))
         claim.push_until_s = view.now_s + view.timing.push_s
 
-    def _by_distance(self, view: View, claim: Claim, same: list[Heard]) -> int:
-        """Return the number by the order of distances from the vertex."""
+    def _first(self, view: View, claim: Claim, same: list[Heard]) -> int:
+        """Return the first number, or the free one next to it if it is occupied."""
         queue = claim.queue
         occupied = self._occupied(view, same)
-        share = max(1, view.shares[queue])
-        complete = len(same) + 1 >= view.counts[queue]
-        number, last = self._order(view, queue, same, complete, share)
         taken = view.map.blocked_numbers(queue, view.blocked)
-        number = _nth_available(number, taken)
+        number, last = self._expected(view, queue, same, taken)
         last = _nth_available(last, taken)
         free = [k for k in range(1, last + 1) if k not in occupied and k not in taken]
         if number in occupied and free:
             number = min(free, key=lambda k: abs(k - number))
         return number
 
-    def _order(
-        self, view: View, queue: int, same: list[Heard], complete: bool, share: int
+    def _expected(
+        self, view: View, queue: int, same: list[Heard], taken: frozenset[int]
     ) -> tuple[int, int]:
-        """Return the own number among the members, and the last number of the queue."""
-        count = view.counts[queue]
+        """Return the number that is the agent's if each member has one, and how many have one.
+
+        taken: numbers that nobody can have, for a body is in the place.
+        """
+        count, share = view.counts[queue], max(1, view.shares[queue])
+        most = max(count, share)
         if view.map.closed[queue]:
-            return view.nearest_number(queue, max(count, share)), max(count, share)
+            return _available(view.nearest_number(queue, most), taken), most
         if len(view.order) == count and self._own_id in view.order:
-            return 1 + view.order.index(self._own_id), max(count, share)
+            return _nth_available(1 + view.order.index(self._own_id), taken), most
         vertex = view.map.home[queue]
         own = (view.to_vertex(vertex), self._own_id)
         nearer = sum((view.to_vertex(vertex, h.position), h.id) < own for h in same)
-        if complete:
-            return 1 + nearer, max(count, share)
+        if len(same) + 1 >= count:
+            return _nth_available(1 + nearer, taken), most
         if self._stands(view, queue):
-            return view.nearest_number(queue, share), share
+            return _available(view.nearest_number(queue, share), taken), share
         home = view.home_of(queue)
         bins = home.histogram if home is not None else b""
-        if not sum(bins):
-            return 1 + nearer, share
-        quantile = histogram.share_nearer(bins, own[0])
-        return 1 + min(share - 1, int(quantile * share)), share
+        if sum(bins):
+            nearer = min(share - 1, int(histogram.share_nearer(bins, own[0]) * share))
+        return _nth_available(1 + nearer, taken), share
 
     def keep_up(self, view: View, claim: Claim) -> bool:
         """Resolve a conflict, or close a gap; return whether the number changed."""

@@ -254,3 +254,14 @@ def test_invented_claims_and_counts_leave_a_number_that_there_is(claims, count, 
         each.decide(view(LINE, TICK_S * tick, others, at=each.at, summaries=[told]))
     assert each.claim.number >= 0
     assert each.claim.cost_m < 1e6
+
+
+@pytest.mark.parametrize("number", [2, 3])
+def test_who_stands_behind_a_blocked_place_takes_the_number_of_the_place_it_stands_in(number):
+    at = (-float(number), 0.0, 0.0)
+    member, other = Ranked(5, number), heard(6, (at[0] - 1.0, 0.0, 0.0))
+    member.numbers = Numbers(5, -1.0)
+    told = leader_summary(total=6, counts=(5,), histogram=b"\x01" * 16)
+    blocked = [LINE.place(0, 1)]
+    member.decide(view(LINE, 0.5, [other], at=at, summaries=[told], blocked=blocked))
+    assert member.claim.number == number
