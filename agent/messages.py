@@ -254,7 +254,7 @@ class Standing(Message, frozen=True):
     pushes: bool  # its claim comes before others', up the queue to the tail
     proposal: Swap | None
     reservation: Swap | None  # it took the partner's place and keeps its own for the partner
-    code: Annotated[int, Meta(ge=0, lt=256)]  # of its label, see agent.structure.label_code
+    code: Annotated[int, Meta(ge=1, lt=256)]  # of its label, see agent.structure.label_code
 
 
 class Order(NamedTuple):

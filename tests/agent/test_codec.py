@@ -258,7 +258,7 @@ standings = st.builds(
     pushes=st.booleans(),
     proposal=st.none() | swaps,
     reservation=st.none() | swaps,
-    code=st.integers(0, 255),
+    code=st.integers(1, 255),
 )
 leader_summaries = st.builds(
     LeaderSummary,
@@ -614,6 +614,14 @@ def test_no_mission_is_one_value_and_a_piece_always_has_a_key():
     piece = Piece(key=-1, index=0, count=1, data=b"")
     sent = encode(msgspec.structs.replace(GOOD[Gossip], piece=piece))
     assert rejection_cause(Gossip, sent) == "invalid"
+
+
+@pytest.mark.parametrize(("code", "taken"), [(0, False), (1, True), (255, True), (256, False)])
+def test_the_code_of_a_member_of_which_nothing_is_known_is_nobodys_own(code, taken):
+    """A leader that heard such a member would wait for ever until it is counted."""
+    standing = msgspec.structs.replace(STANDING, code=code)
+    sent = encode(msgspec.structs.replace(GOOD[Beacon], standing=standing))
+    assert (decoded_or_none(Beacon, sent) is not None) == taken
 
 
 def test_lists_longer_than_allowed_are_rejected():

@@ -85,7 +85,7 @@ class Lies:
             pushes=self._random.random() < 0.5,
             proposal=self._swap(senses),
             reservation=self._swap(senses),
-            code=self._random.randrange(256),
+            code=self._random.randrange(1, 256),
         )
 
     def summary(self, senses: Senses) -> Summary:
