@@ -31,8 +31,8 @@ class HeldPoint:
     def target(self, senses: Senses) -> tuple[Vector, Frame]:
         """Return where to stay [m; world frame], and the frame in which that point rests.
 
-        That is the own position, at rest in the world, for an agent that hears of no frame, and for
-        one that no slot of that frame could be as far away as (``can_hold``).
+        An agent that hears of no frame stays at its own position, at rest in the world. So does one
+        that is farther from the frame's origin than any slot may be (``can_hold``).
         """
         heard = senses.heard_frame
         if heard is None:

@@ -1,13 +1,13 @@
 """The census: which members there are, and in which queue, counted so that none counts twice.
 
-Each member has a label: the time at which it was last known to be there, and its queue then. Of two
-labels of a member the later one holds, so labels may travel any way, any number of times. A member
-whose label has not become later for longer than its way here explains is asked for: the own label
-of it goes out as news, and whoever knows a later one answers. Without an answer it is gone.
+Each member has a label: the time at which it was last known to be there, and a code of where it was
+then. Of two labels of a member the later one holds, so labels may travel any way, any number of
+times. A label that stands still for longer than its usual lag and T_lost is late. Then the agent
+sends the label that it has as news, and whoever knows a later one answers. A member that nobody
+answers for is gone.
 
-On the radio a label takes two bytes: its age in quanta of 0.25 s, and a code of its queue. In
-memory it is the time in quanta times CODES, plus the code; a label on the radio is then its
-distance from the greatest label of the frame's time.
+In memory a label is one number: its time in quanta of 0.25 s, times CODES, plus its code. On the
+radio it takes two bytes: the greatest label of the time at which it is sent, less the label.
 """
 
 from __future__ import annotations
@@ -34,17 +34,18 @@ WORTH_QUANTA = 2
 """A repeated label is taken if it is so much later: to take each would cost time for nothing."""
 LAG_SMOOTHING = 0.25
 SLOWER_THAN_NEWS = 6.0
-"""So much longer than news a repeated label takes over the same way: it waits for each round."""
+"""How many times as long as news a repeated label takes: each agent on its way keeps it for a
+round."""
 LAGS = 2.0
-"""A label may stand still for so many of its usual lags, besides T_lost."""
+"""A label is late after so many of its usual lags, and T_lost."""
 MAX_LAG_S = MAX_QUANTA * QUANTUM_S / LAGS
-"""Greatest lag that counts [s]: a label that is older than LAGS of these is not sent at all."""
+"""Greatest lag that is noted [s]: no label is sent that is older than LAGS times as much."""
 MAX_LABELLED = 2**14
 """Ids from here on are not counted."""
 LABEL_S = QUANTUM_S / CODES
 """Time of one step of a label [s]."""
 ASK_S, FORGOTTEN_S = 0.5, 10.0
-"""Who has been silent for too long is asked for so often, and no longer after so long a time."""
+"""A member whose label is late is asked for every ASK_S, until FORGOTTEN_S later."""
 SHARED_LABELS = MAX_LABELS_B // 2
 NEWS = 48
 """Most news in one frame."""
@@ -56,7 +57,7 @@ class Population(NamedTuple):
     total: int
     members: tuple[int, ...]  # of each queue, besides those in vertices
     holders: tuple[int, ...]  # of each vertex
-    changed_s: float = 0.0  # when a member was new or changed its queue last, by the labels [s]
+    changed_s: float = 0.0  # when a label with another code than before came last [s]
 
 
 class Census:
@@ -71,10 +72,11 @@ class Census:
         self._lag_s: list[float] = []
         """How old labels are when they arrive, by member [s]."""
         self._changed: set[int] = set()
-        """Members of which others are to be told: their queue changed, or they are asked for."""
+        """Members of which others are to be told: their code changed, or they are asked for."""
         self._asked_s: dict[int, float] = {}
-        """When a member that has been silent for too long was last asked for [s]."""
+        """When a member was last asked for [s]."""
         self._from = 0
+        """The first id of the next frame's labels."""
         self._changed_s = 0.0
         self._deadline_s: list[float] = []
         """T_lost before a member is late, by member [s]; infinite for one that is unknown."""
@@ -133,12 +135,12 @@ class Census:
             self._changed.add(member)
 
     def _expect_later(self, member: int, age_s: float) -> None:
-        """Note how old a label is that came as news; what is no news comes more slowly."""
+        """Estimate a new member's lag by the age of its first label, which came as news [s]."""
         if self._labels[member] == 0:
             self._lag_s[member] = min(MAX_LAG_S, SLOWER_THAN_NEWS * max(age_s - QUANTUM_S, 0.0))
 
     def ask(self, now_s: float, lost_s: float) -> None:
-        """Ask for members that have been silent for too long. lost_s: T_lost of a neighbour [s]."""
+        """Ask for members whose labels are late. lost_s: T_lost of a neighbour [s]."""
         oldest_s = now_s - lost_s
         if not self._deadline_s or min(self._deadline_s) >= oldest_s:
             return
@@ -161,7 +163,7 @@ class Census:
                 self._adopt(first + k, greatest - wire[k], now_s)
 
     def _adopt(self, member: int, label: int, now_s: float) -> None:
-        """Take a repeated label; it tells how old the member's labels usually are here."""
+        """Take a repeated label, and note its age in the member's usual lag."""
         if member == self._own:
             return
         lag_s = min(max(now_s - label // CODES * QUANTUM_S, 0.0), MAX_LAG_S)
@@ -213,7 +215,7 @@ class Census:
         return first, _packed([_on_the_radio(each, now_s) for each in self._labels[first:end]])
 
     def news(self, now_s: float, most: int = NEWS) -> tuple[tuple[int, int], ...]:
-        """Return the labels of members whose queue changed; from then on others are told."""
+        """Return the labels that others are to be told; from then on they count as told."""
         told = sorted(self._changed)[: min(most, NEWS)]
         self._changed.difference_update(told)
         return tuple([(member, _on_the_radio(self._labels[member], now_s)) for member in told])

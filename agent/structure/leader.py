@@ -56,7 +56,7 @@ class Unevenness(NamedTuple):
 
 
 class Leader:
-    """The leader of one vertex. heard_s: rounds of the multihop channel take so long [s]."""
+    """The leader of one vertex. round_s: time between two rounds of the multihop channel [s]."""
 
     def __init__(self, vertex: int, key: RootKey, now_s: float, round_s: float) -> None:
         self.vertex = vertex
