@@ -53,6 +53,8 @@ SPEED_SHARE, LEAST_SPEED_SHARE = 0.9, 0.2
 """The line is slower than its members, so that late ones catch up."""
 LONGEST_S, LONGEST_WAYS = 12.0, 6.0
 """No member gathers for longer than this time and so many straight flights to its slot."""
+MOST_S = 600.0
+"""No line arrives so long after its version, so one that was invented ends, too."""
 COLLECT_S, COLLECT_LATENCIES = 1.0, 4.0
 """How long a leader waits for its members' reports; then half of them are enough."""
 CLOSED = 4.0
@@ -96,7 +98,7 @@ class Gathering:
         latest, queues = latest_version(now_s), self._map.queues
         for line in heard.lines:
             plausible = line.version <= latest and line.leaves <= line.arrives
-            if line.queue < queues and plausible:
+            if line.queue < queues and plausible and _ends(line):
                 known = self.lines[line.queue]
                 if known is None or line.version > known.version:
                     self._publish(line)
@@ -223,7 +225,9 @@ class Gathering:
             self._asked_s[queue] = -inf
             return
         leaves_s = view.now_s + GATHER_S + hypot(*wanted) / self._speed_mps
-        self._publish(self._line(view, queue, wanted, leaves_s))
+        line = self._line(view, queue, wanted, leaves_s)
+        if _ends(line):
+            self._publish(line)
 
     def _look_after(self, view: View, line: Line, members: int, settled: bool) -> None:
         """Let a line leave once its members are ready; until then, keep it clear of others."""
@@ -244,7 +248,9 @@ class Gathering:
             moved, _ = self._clear(view, line.queue, present)
             if dist(moved, present) > 0.5 * GATHERED_M:
                 leaves_s = line.leaves / VERSIONS_PER_S
-                self._publish(self._line(view, line.queue, moved, leaves_s))
+                there = self._line(view, line.queue, moved, leaves_s)
+                if _ends(there):
+                    self._publish(there)
 
     def _line(self, view: View, queue: int, displacement: Vector, leaves_s: float) -> Line:
         vertex = view.frame.to_world(self._map.vertex_points[self._map.home[queue]])
@@ -277,6 +283,11 @@ class Gathering:
 
     def _publish(self, line: Line) -> None:
         self.lines[line.queue], self.news = line, True
+
+
+def _ends(line: Line) -> bool:
+    """Whether a line arrives in time."""
+    return line.arrives - line.version <= MOST_S * VERSIONS_PER_S
 
 
 def _sum(queue: int, parent: int, parts: Sequence[LinePart]) -> LinePart:

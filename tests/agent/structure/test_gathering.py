@@ -12,9 +12,9 @@ from agent.places.place_points import OwnTarget
 from agent.qstructure.orientation import Attitude
 from agent.qstructure.target_frame import Frame
 from agent.structure.claim import Claim
-from agent.structure.gathering import GATHER_S, GATHERED_M, HEAD_B, LONGEST_S, MOST_B
+from agent.structure.gathering import GATHER_S, GATHERED_M, HEAD_B, LONGEST_S, MOST_B, MOST_S
 from agent.structure.line import displacement_of
-from agent.structure.tree import Tree, version_at
+from agent.structure.tree import VERSIONS_PER_S, Tree, version_at
 from tests.agent.structure.builders import (
     LINE,
     gathering,
@@ -222,13 +222,15 @@ def test_the_latest_version_holds_in_whatever_order_versions_come(order):
         line(version=version_at(9.0)),
         line(queue=1),
         line(leaves_s=20.0, arrives_s=19.0),
+        line(ZERO, leaves_s=0.0, arrives_s=1.1 + MOST_S),
     ],
-    ids=["ahead of its time", "of no queue", "arrives before it leaves"],
+    ids=["ahead of its time", "of no queue", "arrives before it leaves", "displaced for good"],
 )
 def test_an_impossible_line_is_ignored(odd):
     found = gathering()
     found.hear(9, said(odd), 1.0, 2.0)
     assert target(found, NEAR) == SLOT
+    assert not found.queues(2.0)
 
 
 @pytest.mark.parametrize("leaves_s", [20.0, 1.0], ids=["it waits", "it flies"])
@@ -236,7 +238,7 @@ def test_nobody_flies_to_a_line_that_is_farther_than_its_slot(leaves_s):
     found = gathering()
     found.hear(9, said(line()), 1.0, 2.0)
     assert target(found, NEAR) == GATHERED
-    far = line((900.0, 0.0, 0.0), version=101, leaves_s=leaves_s, arrives_s=9999.0)
+    far = line((900.0, 0.0, 0.0), version=101, leaves_s=leaves_s, arrives_s=MOST_S)
     found.hear(9, said(far), 1.0, 2.0)
     assert target(found, NEAR, 2.1) == SLOT
 
@@ -321,15 +323,17 @@ def test_nothing_is_said_once_the_line_has_arrived():
 @pytest.mark.parametrize("room_b", [90, 200, 1000])
 def test_what_is_said_fits_and_each_queue_has_its_turn(room_b):
     fan = rays(*((-1.0, 0.05 * j, 0.0) for j in range(20)))
-    found, longest = gathering(fan), 2**31 - 1
+    found, longest, now_s = gathering(fan), 2**31 - 1, 2**32 / VERSIONS_PER_S - MOST_S
     for j in range(20):
-        greatest = Line(j, version_at(3.0), longest, longest, longest, 2**32 - 1, 2**32 - 1)
+        latest = 2**32 - 1
+        early = latest - round(MOST_S * VERSIONS_PER_S)
+        greatest = Line(j, early, longest, longest, longest, latest, latest)
         part = LinePart(j, 1, MAX_TEAM, MAX_TEAM, longest, longest, longest)
-        found.hear(3, said(greatest, parts=[part]), 2.0, 2.0)
-    found.update(view(fan, 2.0), Claim(0.0), [tree()], 0.0)
+        found.hear(3, said(greatest, parts=[part]), now_s, now_s)
+    found.update(view(fan, now_s), Claim(0.0), [tree()], 0.0)
     told = set()
     for _ in range(40):
-        frame, length_b = found.wire(2.0, room_b)
+        frame, length_b = found.wire(now_s, room_b)
         assert len(encode(frame)) == length_b <= min(room_b, MOST_B)
         told |= {("line", each.queue) for each in frame.lines}
         told |= {("part", each.queue) for each in frame.parts}
@@ -378,8 +382,8 @@ def test_a_leader_lets_the_line_leave_once_all_are_ready_and_not_before():
     assert found.lines[0].version > before.version
 
 
-@pytest.mark.parametrize(("behind_m", "gathers"), [(1.9, False), (2.5, True)])
-def test_a_queue_that_is_nearly_there_does_not_gather(behind_m, gathers):
+@pytest.mark.parametrize(("behind_m", "gathers"), [(1.9, False), (2.5, True), (300.0, False)])
+def test_a_queue_that_is_nearly_there_or_very_far_away_does_not_gather(behind_m, gathers):
     assert (led(gathering(), behind_m=behind_m) is not None) == gathers
 
 

@@ -13,7 +13,6 @@ from agent.controller import HeardSummary, Link
 from agent.messages import (
     AGENT_IDS,
     MAX_CANDIDATES,
-    MAX_CENTISECONDS,
     MAX_ORDERS,
     MAX_PLACES,
     MAX_TEAM,
@@ -32,6 +31,7 @@ from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
 from agent.structure.census import NEWS, Census
 from agent.structure.convergecast import ROUNDS
+from agent.structure.gathering import MOST_S
 from agent.structure.label_code import FIRST_QUEUE
 from agent.structure.link_timing import timing_of
 from agent.structure.queue_map import QueueMap
@@ -205,8 +205,9 @@ def test_summaries_of_any_agent_fit_their_frames(vertices, members, changed, rep
 def test_what_is_said_of_lines_fits_beside_the_rest_and_each_line_is_said(queues, vertices):
     report = greatest(queues)
     gathers, longest = gathering(fans(vertices, queues)), 2**31 - 1
+    arrives = version_at(START_S + MOST_S)
     every = [
-        Line(j, version_at(START_S), longest, longest, longest, 0, MAX_CENTISECONDS)
+        Line(j, version_at(START_S), longest, longest, longest, arrives, arrives)
         for j in range(queues * vertices)
     ]
     for line in every:
