@@ -41,7 +41,7 @@ class Numbers:
         """Who was last heard to claim it."""
         self._first_count, self._first_s = 0, 0.0
         self._unequal_s = inf
-        """Since when the agent has known of fewer or more members than the leader [s]."""
+        """Since when the agent waits, for it knows of fewer or more members than the leader [s]."""
 
     def take_first(self, view: View, claim: Claim) -> None:
         """Take a number, once the leader has counted the team."""
@@ -52,6 +52,7 @@ class Numbers:
         joins = self._joins_late(view, claim)
         if not joins and self._waits(view, claim.queue, same):
             return
+        self._unequal_s = inf
         known = (view.counts[claim.queue], view.shares[claim.queue], len(same) + 1)
         self._first_count = max(known)
         self._first_s = self._first_s or view.now_s

@@ -265,3 +265,19 @@ def test_who_stands_behind_a_blocked_place_takes_the_number_of_the_place_it_stan
     blocked = [LINE.place(0, 1)]
     member.decide(view(LINE, 0.5, [other], at=at, summaries=[told], blocked=blocked))
     assert member.claim.number == number
+
+
+def test_who_takes_its_number_anew_waits_again_until_it_knows_of_as_many_as_the_leader():
+    member = Ranked(5, 30.3)
+    member.numbers = Numbers(5, -1.0)
+
+    def decide(now_s, count):
+        told = leader_summary(total=count + 1, counts=(count,), histogram=b"\x01" * 16)
+        seen = view(LINE, now_s, [heard(6, ZERO)], at=member.at, summaries=[told])
+        seen.order = [5, 6]
+        member.decide(seen)
+        return member.claim.number
+
+    assert [decide(0.5, 3), decide(0.6, 2)] == [0, 1]
+    assert [decide(2.5, 9), decide(2.6, 9)] == [0, 0]
+    assert decide(4.0, 9) > 0, "but not for ever"
