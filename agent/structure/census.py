@@ -21,7 +21,7 @@ from operator import add
 from typing import NamedTuple
 
 from agent.messages import MAX_LABELS_B, MAX_TEAM, Summary
-from agent.structure.label_code import FIRST_VERTEX, queue_of
+from agent.structure.label_code import FIRST_VERTEX, queue_of_code
 
 QUANTUM_S = 0.25
 """Resolution of a label's time [s]."""
@@ -185,7 +185,7 @@ class Census:
         codes = Counter([code for code, _ in self.present(now_s, lost_s)])
         members, holders = [0] * queues, [0] * vertices
         for code, number in codes.items():
-            if (queue := queue_of(code, queues)) >= 0:
+            if (queue := queue_of_code(code, queues)) >= 0:
                 members[queue] += number
             elif FIRST_VERTEX <= code < FIRST_VERTEX + vertices:
                 holders[code - FIRST_VERTEX] += number

@@ -2,7 +2,7 @@
 
 from agent.structure.census import Census, Population
 from agent.structure.claim import NO_QUEUE, Claim
-from agent.structure.label_code import UNPLACED, LabelCodes, codes_of, of_vertex, queue_of
+from agent.structure.label_code import UNPLACED, LabelCodes, codes_of, of_vertex, queue_of_code
 from agent.structure.queue_map import QueueMap
 from agent.structure.view import View
 
@@ -40,7 +40,7 @@ class HeadCount:
             return of_vertex(claim.vertex)
         if claim.queue == NO_QUEUE:
             return UNPLACED
-        if queue_of(self._queue_code, self._map.queues) != claim.queue:
+        if queue_of_code(self._queue_code, self._map.queues) != claim.queue:
             self._queue_code = self._codes.of_queue(claim.queue, view.origin)
         return self._queue_code
 

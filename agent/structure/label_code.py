@@ -34,7 +34,7 @@ class LabelCodes:
         """Return the code of a member that joins a queue. here [m; target's frame]."""
         along = self._map.along(queue, 2 * self._places, here)
         stretch = min(max(0, int((along - self._begin) / self._length)), self._stretches - 1)
-        return min(FIRST_QUEUE + queue + self._map.queues * stretch, FIRST_VERTEX - 1)
+        return FIRST_QUEUE + queue + self._map.queues * stretch
 
 
 def of_vertex(vertex: int) -> int:
@@ -48,6 +48,6 @@ def codes_of(queue: int, queues: int) -> frozenset[int]:
     return frozenset(range(FIRST_QUEUE + queue, FIRST_VERTEX, queues))
 
 
-def queue_of(code: int, queues: int) -> int:
+def queue_of_code(code: int, queues: int) -> int:
     """Return the queue of a code in a formation of so many queues, -1 for none."""
     return (code - FIRST_QUEUE) % queues if FIRST_QUEUE <= code < FIRST_VERTEX else -1

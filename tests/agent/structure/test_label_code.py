@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agent.structure.label_code import FIRST_VERTEX, LabelCodes, of_vertex, queue_of
+from agent.structure.label_code import FIRST_VERTEX, LabelCodes, of_vertex, queue_of_code
 from tests.agent.structure.builders import LIBRARY, LINE, library, rays
 
 MAPS = {path.stem: library(path) for path in LIBRARY}
@@ -20,11 +20,11 @@ def test_a_code_tells_the_queue_of_any_member_anywhere(name, ids):
     for _ in range(200):
         queue = random.randrange(formation.queues)
         here = tuple(random.uniform(-99.0, 99.0) for _ in range(3))
-        assert queue_of(codes.of_queue(queue, here), formation.queues) == queue
+        assert queue_of_code(codes.of_queue(queue, here), formation.queues) == queue
 
 
 def test_a_vertex_has_a_code_of_no_queue():
-    assert all(queue_of(of_vertex(v), 3) == -1 for v in range(16))
+    assert all(queue_of_code(of_vertex(v), 3) == -1 for v in range(16))
     assert of_vertex(0) == FIRST_VERTEX
 
 
