@@ -64,7 +64,10 @@ class Election:
         now_s, timing = view.now_s, view.timing
         if claim.number < 1:
             listen_s = timing.listen_s if view.heard else ALONE_S
-            return now_s - self._started_s >= listen_s and self._is_nearest(view, vertex)
+            ordered = claim.since_s > self._started_s + listen_s
+            # Whoever was ordered here waits for others that were ordered at the same time.
+            began_s = claim.since_s if ordered else self._started_s
+            return now_s - began_s >= listen_s and self._is_nearest(view, vertex)
         wait_s = timing.lost_s + self._turn_s(view, claim, vertex)
         if direct is not None:
             if now_s - tree.advanced_s > timing.lost_s and direct.succeeds(view, claim, vertex):

@@ -91,14 +91,23 @@ class QueueChoice:
         own_m = view.distance(claim.queue, claim.number)
         if own_m == inf:  # no number, or one that a full queue has no place for
             own_m = view.way_to(claim.queue, view.counts[claim.queue])
-        ways_m = {
-            j: view.way_to(j, view.counts[j] + 1) for j, number in enumerate(takers) if number > 0
-        }
+        ways_m = {j: _way_to(view, j) for j, number in enumerate(takers) if number > 0}
         return tuple(
             Candidate(round(10.0 * (way_m - own_m)), self._own_id, j)
             for j, way_m in ways_m.items()
             if way_m < inf and own_m < inf
         )
+
+
+def _way_to(view: View, queue: int) -> float:
+    """Return the distance from where the agent would stand in a queue [m].
+
+    The first member of a queue with a vacant vertex will stand in it.
+    """
+    vacant = [v for v in view.vacant if v in view.map.vertices_of[queue]]
+    if vacant and not view.counts[queue]:
+        return min(view.to_vertex(v) for v in vacant)
+    return view.way_to(queue, view.counts[queue] + 1)
 
 
 def likely_length(view: View) -> int:

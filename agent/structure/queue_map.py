@@ -5,11 +5,12 @@ first vertex, its *home*. A number is a place's rank, counted from the first ran
 """
 
 from collections.abc import Iterable, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from itertools import permutations
 from math import dist, inf
 from typing import NamedTuple
 
-from agent.messages import MAX_TEAM, Place, Vector
+from agent.messages import MAX_TEAM, ZERO, Place, Vector
 from agent.qstructure.formation import NO_PLACES, Formation, Slot
 
 MAPS_KEPT = 16
@@ -85,6 +86,14 @@ class QueueMap:
         self.members = lru_cache(maxsize=64)(self._members)
         self.blocked_numbers = lru_cache(maxsize=64)(self._blocked_numbers)
         self._closed_row = lru_cache(maxsize=64)(self._measured_row)
+
+    @cached_property
+    def nearest_pairs(self) -> list[tuple[int, int]]:
+        """All pairs of two queues, by the distance between their first members' places."""
+        firsts = [self.slot(j, 1, 1) for j in range(self.queues)]
+        points = [slot.point if slot is not None else ZERO for slot in firsts]
+        pairs = permutations(range(self.queues), 2)
+        return sorted(pairs, key=lambda pair: (dist(points[pair[0]], points[pair[1]]), pair))
 
     def is_common(self, vertex: int) -> bool:
         """Whether several queues share a vertex."""

@@ -12,7 +12,8 @@ def transfers(
 
     Every agent with the same counts finds the same. counts, shares: members of each queue. The
     queues of one leader may all give to all that lack members, since it sees every candidate. Under
-    several leaders each transfer has one giver, so that no two leaders fill one gap.
+    several leaders each transfer has one giver, so that no two leaders fill one gap; the nearest
+    queues come first.
     """
     missing = [share - count for share, count in zip(shares, counts, strict=True)]
     if not any(missing):
@@ -21,11 +22,10 @@ def transfers(
         takers = [max(0, each) for each in missing]
         return {giver: takers for giver, each in enumerate(missing) if each < 0 and any(takers)}
     found: dict[int, list[int]] = {}
-    for giver in range(len(counts)):
-        for taker in range(len(counts)):
-            number = min(-missing[giver], missing[taker])
-            if number > 0:
-                found.setdefault(giver, [0] * len(counts))[taker] += number
-                missing[giver] += number
-                missing[taker] -= number
+    for giver, taker in formation.nearest_pairs:
+        number = min(-missing[giver], missing[taker])
+        if number > 0:
+            found.setdefault(giver, [0] * len(counts))[taker] += number
+            missing[giver] += number
+            missing[taker] -= number
     return found

@@ -87,14 +87,18 @@ class View:
         return self.map.members(latest.total if latest is not None else 0, self.blocked)
 
     @cached_property
-    def wanted(self) -> tuple[int, ...]:
-        """The shares, with those who are to lead a vertex that nobody is near."""
-        vacant = [
+    def vacant(self) -> list[int]:
+        """The vertices that are available, and of whose leader nothing was heard."""
+        return [
             v
             for v, summary in enumerate(self.summaries)
             if summary is None and self.map.vertex_places[v] not in self.blocked
         ]
-        return self.map.with_vacancies(self.shares, self.counts, vacant)
+
+    @cached_property
+    def wanted(self) -> tuple[int, ...]:
+        """The shares, with those who are to lead a vertex that nobody is near."""
+        return self.map.with_vacancies(self.shares, self.counts, self.vacant)
 
     @cached_property
     def transfers(self) -> Mapping[int, Sequence[int]]:

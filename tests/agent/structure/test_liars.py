@@ -154,8 +154,8 @@ def test_a_place_that_there_is_not_is_neither_taken_nor_swapped(formation, queue
 def test_who_says_that_it_belongs_to_a_queue_that_there_is_not_stands_for_no_vertex(
     formation, queue
 ):
-    claim = Claim(NOW_S)
-    claim.queue = 0
+    claim = Claim(0.0)
+    claim.give_up(0, 0.0)
     far = heard(LIAR, (900.0, 0.0, 0.0), queue=queue)
     trees = [Tree(1, 0.0) for _ in range(formation.vertices)]
     assert Election(1, 0.0).stand(view(formation, NOW_S, [far]), claim, trees)

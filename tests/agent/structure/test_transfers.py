@@ -36,6 +36,10 @@ def test_under_several_leaders_the_transfers_bring_the_shares_exactly(case):
     assert moved == shares
 
 
+def test_the_nearest_queues_give_and_take_first():
+    assert transfers(OWN_HOMES, (0, 2, 2, 0), (1, 1, 1, 1)) == {1: [1, 0, 0, 0], 2: [0, 0, 0, 1]}
+
+
 @settings(derandomize=True)
 @given(unbalanced(3))
 def test_the_queues_of_one_leader_may_give_to_all_that_lack(case):
