@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import assert_never
 
 from agent.codec import CHECKSUM_B, add_checksum, encode
-from agent.comms.neighbours import NEVER_HEARD, Version
+from agent.comms.neighbours import NEVER_HEARD, Version, version_of
 from agent.comms.unidentified_vehicles import DepartedMember, MemberPosition
 from agent.controller import Peer
 from agent.messages import AGENT_IDS, MAX_TEAM, NO_MISSION, Beacon, Gossip, Piece, Place, Record
@@ -49,7 +49,7 @@ class RecordTable:
     def adopt_beacon(self, beacon: Beacon) -> None:
         """Take a neighbour's beacon as the newest record of that neighbour."""
         subject = beacon.id
-        version = Version(beacon.stamp_s, beacon.incarnation, beacon.sequence)
+        version = version_of(beacon)
         if self._may_know(subject) and version.supersedes(self._last.get(subject, NEVER_HEARD)):
             self._last[subject] = version
             self._newest[subject] = beacon

@@ -6,7 +6,8 @@ never read.
 
 from collections.abc import Collection
 from math import dist, inf, log
-from typing import NamedTuple
+
+import msgspec
 
 from agent.codec import RejectedError
 from agent.controller import UNHEARD, Heard, Link
@@ -34,7 +35,7 @@ MARGIN = 1.2
 """The loss is estimated from the last 39 gaps or so: n (1e6^(1/n) - 1) / ln 1e6 at n = 39."""
 
 
-class Version(NamedTuple):
+class Version(msgspec.Struct, frozen=True, gc=False):
     """Which of a sender's statements one is: by its stamp, and by the sender's own count."""
 
     stamp_s: float
@@ -49,7 +50,10 @@ class Version(NamedTuple):
         """
         if self.incarnation < other.incarnation:
             return self.stamp_s > other.stamp_s + INCARNATION_LASTS_S
-        return self > other and self[1:] != other[1:]
+        if self.stamp_s == other.stamp_s:
+            return (self.incarnation, self.sequence) > (other.incarnation, other.sequence)
+        same = self.sequence == other.sequence and self.incarnation == other.incarnation
+        return self.stamp_s > other.stamp_s and not same
 
 
 NEVER_HEARD = Version(-inf, -1, -1)
@@ -99,7 +103,7 @@ class Neighbour:
 
     def __init__(self, beacon: Beacon, latency_s: float) -> None:
         self.beacon = beacon
-        self.version = _version_of(beacon)
+        self.version = version_of(beacon)
         self.latency_s = latency_s
         self.mean_gap = 1.0
         self.place = _claimed_place(beacon)
@@ -157,7 +161,7 @@ class Neighbours:
         own_sent_s: sending time of each recent own sequence [s]. A beacon that echoes a sequence
         was sent after it (E22), whatever its stamp says.
         """
-        sender, version = beacon.id, _version_of(beacon)
+        sender, version = beacon.id, version_of(beacon)
         if sender == self._own_id:
             raise RejectedError("spoofed", "a beacon with the receiver's own id")
         known = self._known.get(sender)
@@ -273,7 +277,8 @@ class Neighbours:
         self._in_order = [self._known[sender] for sender in self.sorted_ids]
 
 
-def _version_of(beacon: Beacon) -> Version:
+def version_of(beacon: Beacon) -> Version:
+    """Return which of its sender's statements a beacon is."""
     return Version(beacon.stamp_s, beacon.incarnation, beacon.sequence)
 
 

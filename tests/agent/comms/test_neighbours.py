@@ -1,12 +1,20 @@
 """Neighbours: which beacons are accepted, how they age, and when silence means departed."""
 
+from itertools import product
 from math import dist, log
 from random import Random
 
 import pytest
 
 from agent.codec import RejectedError
-from agent.comms.neighbours import LEAST_SILENCE_S, MAX_AGE_S, MAX_EXTRAPOLATION_S, Neighbours
+from agent.comms.neighbours import (
+    INCARNATION_LASTS_S,
+    LEAST_SILENCE_S,
+    MAX_AGE_S,
+    MAX_EXTRAPOLATION_S,
+    Neighbours,
+    Version,
+)
 from tests.agent.comms.builders import beacon
 
 HZ = 20.0
@@ -34,6 +42,16 @@ def test_a_replay_is_rejected():
     assert rejection_cause(known, beacon(OTHER, 5, 1.0), 1.0) == "replay"
     assert rejection_cause(known, beacon(OTHER, 5, 1.1), 1.1) == "replay"
     assert accepted(known) == [(OTHER, 0, 5)]
+
+
+def test_the_later_statement_supersedes_unless_its_incarnation_is_older():
+    grid = list(product((0.0, 0.1, 1.1 + INCARNATION_LASTS_S), (0, 1), (3, 4)))
+    for new, old in product(grid, grid):
+        supersedes = Version(*new).supersedes(Version(*old))
+        if new[1] >= old[1]:
+            assert supersedes == (new > old and new[1:] != old[1:])
+        else:
+            assert supersedes == (new[0] > old[0] + INCARNATION_LASTS_S)
 
 
 def test_an_overtaken_beacon_is_rejected():
