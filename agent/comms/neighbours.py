@@ -118,9 +118,11 @@ class Neighbour:
         before, self.version = self.beacon, version
         gap = 1.0
         if beacon.incarnation == before.incarnation:
-            # An invented sequence must not make a long silence seem likely.
-            most = 2.0 + 2.0 * (beacon.stamp_s - before.stamp_s) * beacon_hz
-            gap = min(max(beacon.sequence - before.sequence, 1), most)
+            gap = beacon.sequence - before.sequence
+            if gap != 1:
+                # An invented sequence must not make a long silence seem likely.
+                most = 2.0 + 2.0 * (beacon.stamp_s - before.stamp_s) * beacon_hz
+                gap = min(max(gap, 1), most)
             self.mean_gap += SMOOTHING * (gap - self.mean_gap)
         self.latency_s += SMOOTHING * (latency_s - self.latency_s)
         if beacon.rank != before.rank or beacon.queue != before.queue:
