@@ -145,10 +145,8 @@ def _gain(view: View, mine: Vector | None, other: Heard) -> float:
     theirs = view.point(*_numbered(view, other))
     if mine is None or theirs is None:
         return 0.0
-    return 2.0 * sum(
-        (q - p) * (b - a)
-        for q, p, a, b in zip(view.here, other.position, mine, theirs, strict=True)
-    )
+    (x, y, z), (u, v, w), (a, b, c), (d, e, f) = view.here, other.position, mine, theirs
+    return 2.0 * ((x - u) * (d - a) + (y - v) * (e - b) + (z - w) * (f - c))
 
 
 def _apart(view: View, claim: Claim, other: Heard) -> bool:
