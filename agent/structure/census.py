@@ -3,8 +3,8 @@
 Each member has a label: the time at which it was last known to be there, and a code of where it was
 then. Of two labels of a member the later one holds, so labels may travel any way, any number of
 times. A label that stands still for longer than its usual lag and T_lost is late. Then the agent
-sends the label that it has as news, and whoever knows a later one answers. A member that nobody
-answers for is gone.
+sends the label that it has as news, and a neighbour that knows a later one sends that. Without an
+answer the member is gone.
 
 In memory a label is one number: its time in quanta of 0.25 s, times CODES, plus its code. On the
 radio it takes two bytes: the greatest label of the time at which it is sent, less the label.

@@ -48,7 +48,7 @@ GATHERED_M = 0.3
 LEAST = 2.0
 """A queue that would be displaced by less than so many times the spacing does not gather."""
 GATHER_S = 5.0
-"""A line leaves after this time, and that of its straight flight, whoever is missing."""
+"""A line waits for its members for so long, and for the time of its straight flight, at most."""
 SPEED_SHARE, LEAST_SPEED_SHARE = 0.9, 0.2
 """The line is slower than its members, so that late ones catch up."""
 LONGEST_S, LONGEST_WAYS = 12.0, 6.0
