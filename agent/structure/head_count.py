@@ -45,7 +45,7 @@ class HeadCount:
         return self._queue_code
 
     def population(self, view: View, heard: int, *, all_hear_the_same: bool) -> Population:
-        """Return who is there. heard: members that the own agent hears, itself included.
+        """Return the members that are there. heard: how many the own agent hears, itself included.
 
         Where all those left hear each other, none could answer for more: then the agent does not
         wait for an answer.

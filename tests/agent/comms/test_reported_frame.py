@@ -1,4 +1,4 @@
-"""The frame that comes down the tiers to an agent without a mission: who is believed, how long."""
+"""An agent without a mission follows the frame of members with a tier, and only for a time."""
 
 import pytest
 

@@ -44,7 +44,7 @@ def told(known, now_s=NOW_S, regular=True):
 
 
 def counted(known, now_s=NOW_S):
-    """Return who is there, whenever that was learnt."""
+    """Return the members that are there; a label may be of any age."""
     return known.population(now_s, LOST_S, QUEUES, VERTICES)._replace(changed_s=0.0)
 
 
