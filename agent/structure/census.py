@@ -128,16 +128,20 @@ class Census:
         """Take a later label of a member; answer a much older one."""
         if member >= len(self._labels):
             self._make_room(member + 1)
-        if label > self._labels[member] and member != self._own:
-            self._expect_later(member, now_s - label // CODES * QUANTUM_S)
-            self._set(member, label, now_s)
-        elif label + WORTH_QUANTA * CODES <= self._labels[member]:
+        known = self._labels[member]
+        if label > known and member != self._own:
+            if self._codes[member] == label % CODES and label >= known + WORTH_QUANTA * CODES:
+                self._adopt(member, label, now_s)  # no event, but an answer: repeated as well
+            else:
+                self._expect_later(member, now_s - label // CODES * QUANTUM_S)
+                self._set(member, label, now_s)
+        elif label + WORTH_QUANTA * CODES <= known:
             self._changed.add(member)
 
     def _expect_later(self, member: int, age_s: float) -> None:
         """Estimate a new member's lag by the age of its first label, which came as news [s]."""
         if self._labels[member] == 0:
-            self._lag_s[member] = min(MAX_LAG_S, SLOWER_THAN_NEWS * max(age_s - QUANTUM_S, 0.0))
+            self._lag_s[member] = min(MAX_LAG_S, SLOWER_THAN_NEWS * age_s)
 
     def ask(self, now_s: float, lost_s: float) -> None:
         """Ask for members whose labels are late. lost_s: T_lost of a neighbour [s]."""

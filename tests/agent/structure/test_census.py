@@ -21,7 +21,7 @@ from agent.structure.census import (
 from agent.structure.label_code import FIRST_QUEUE, FIRST_VERTEX, UNPLACED
 
 OWN, IDS = 0, 40
-LOST_S = 1.5
+LOST_S, ANSWER_S = 1.5, 0.6
 QUEUES, VERTICES = 3, 2
 NOW_S = 30.0
 
@@ -248,3 +248,31 @@ def test_who_is_late_is_asked_for_whatever_was_asked_before(steps):
         fresh.news(now_s)
         fresh.ask(now_s, lost_s)
         assert known.news(now_s) == fresh.news(now_s)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nobody_asks_for_members_whose_labels_take_long_as_usual(seed):
+    """Answers come sooner than repeated labels. They must not hide how long those take."""
+    random, line, settled_s = Random(seed), 12, 20.0
+    known = [census(own=each, ids=line) for each in range(line)]
+    begin = [random.random() for _ in range(line)]
+    asked = 0
+    for tick in range(400):
+        now_s = 0.1 * tick
+        for each, mine in enumerate(known):
+            mine.hear(each, now_s, FIRST_QUEUE)
+            before = mine.news_number
+            mine.ask(now_s, LOST_S)
+            asked += mine.news_number - before if now_s > settled_s else 0
+            regular = (now_s - begin[each]) % 1.0 < 0.1
+            if not regular and not mine.has_news:
+                continue
+            summary = told(mine, now_s, regular)
+            for near in (each - 1, each + 1):
+                if 0 <= near < line:
+                    known[near].hear(each, now_s, FIRST_QUEUE)
+                    known[near].merge(summary, now_s, now_s)
+        if now_s > settled_s:
+            counts = [mine.population(now_s, LOST_S + ANSWER_S, QUEUES, 0) for mine in known]
+            assert {each.total for each in counts} == {line}
+    assert asked == 0
