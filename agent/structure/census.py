@@ -216,13 +216,14 @@ class Census:
             return 0, b""
         first, end = self._from, self._from + min(most, SHARED_LABELS)
         self._from = end if end < len(self._labels) else 0
-        return first, _packed([_on_the_radio(each, now_s) for each in self._labels[first:end]])
+        return first, _packed(_on_the_radio(self._labels[first:end], now_s))
 
     def news(self, now_s: float, most: int = NEWS) -> tuple[tuple[int, int], ...]:
         """Return the labels that others are to be told; from then on they count as told."""
         told = sorted(self._changed)[: min(most, NEWS)]
         self._changed.difference_update(told)
-        return tuple([(member, _on_the_radio(self._labels[member], now_s)) for member in told])
+        wire = _on_the_radio([self._labels[member] for member in told], now_s)
+        return tuple(zip(told, wire, strict=True))
 
     def _make_room(self, members: int) -> None:
         missing = members - len(self._labels)
@@ -233,12 +234,16 @@ class Census:
             self._deadline_s += [inf] * missing
 
 
-def _on_the_radio(label: int, now_s: float) -> int:
-    """Return a label as it is sent at a time [s]."""
-    age = max(0, int(now_s / QUANTUM_S) - label // CODES)
-    if label == 0 or age > MAX_QUANTA:
-        return UNKNOWN
-    return age * CODES + CODES - 1 - label % CODES
+def _on_the_radio(labels: list[int], now_s: float) -> list[int]:
+    """Return labels as they are sent at a time [s]."""
+    greatest = int(now_s / QUANTUM_S) * CODES + CODES - 1
+    oldest = max(1, greatest - MAX_QUANTA * CODES - (CODES - 1))
+    return [
+        (greatest - each if each <= greatest else CODES - 1 - each % CODES)
+        if each >= oldest
+        else UNKNOWN
+        for each in labels
+    ]
 
 
 def _packed(labels: list[int]) -> bytes:

@@ -13,8 +13,8 @@ def standing_slot(view: View, queue: int, members: int) -> Slot | None:
 
     members: so many are looked at.
     """
-    number = view.nearest_number(queue, members)
-    slots = [view.map.slot(queue, number, view.extent(queue, number))]
+    number = view.number_near(queue, members, STANDS_M)
+    slots = [view.map.slot(queue, number, view.extent(queue, number))] if number else []
     slots += [view.map.vertex_slot(v) for v in view.map.vertices_of[queue]]
     near = [each for each in slots if each and dist(each.point, view.origin) < STANDS_M]
     return near[0] if near else None

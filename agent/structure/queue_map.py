@@ -42,13 +42,15 @@ class Row:
             self._longest_m = max(self._longest_m, dist(self.slots[-1].point, slot.point))
         self.slots.append(slot)
 
-    def nearest(self, first: int, here: Vector) -> Nearest | None:
-        """Return the nearest of the first members. here [m; target's frame].
+    def nearest(self, first: int, here: Vector, within_m: float = inf) -> Nearest | None:
+        """Return the nearest of the first members; None if none is within a distance [m].
 
-        The slots next to a far one are far, too: they are left out.
+        The slots next to a far one are far, too: they are left out. here [m; target's frame].
         """
         slots, end = self.slots, min(first, len(self.slots))
-        near_m = min([dist(slots[k].point, here) for k in range(0, end, SPARSE)], default=inf)
+        near_m = within_m
+        if within_m == inf:
+            near_m = min([dist(slots[k].point, here) for k in range(0, end, SPARSE)], default=inf)
         found, k = None, 0
         while k < end:
             away_m = dist(slots[k].point, here)
@@ -136,10 +138,15 @@ class QueueMap:
         slots = self._row(queue, number, members).slots
         return slots[number - 1] if number <= len(slots) else None
 
-    def nearest(self, queue: int, members: int, here: Vector) -> Nearest | None:
-        """Return the nearest of a queue's first members. here [m; target's frame]."""
+    def nearest(
+        self, queue: int, members: int, here: Vector, within_m: float = inf
+    ) -> Nearest | None:
+        """Return the nearest of a queue's first members; None if none is within a distance [m].
+
+        here [m; target's frame].
+        """
         first = max(members, 1)
-        return self._row(queue, first, members).nearest(first, here)
+        return self._row(queue, first, members).nearest(first, here, within_m)
 
     def along(self, queue: int, members: int, here: Vector) -> float:
         """Return where a point lies along a queue: 0 beside its home, k beside its k-th member.

@@ -158,6 +158,11 @@ class View:
         found = self.map.nearest(queue, self._length(queue, members), self.origin)
         return found.away_m if found is not None else float("inf")
 
+    def number_near(self, queue: int, members: int, within_m: float) -> int | None:
+        """Return the nearest number of a queue's first places within a distance [m], if any."""
+        found = self.map.nearest(queue, self._length(queue, members), self.origin, within_m)
+        return found.number if found is not None else None
+
     def _length(self, queue: int, members: int) -> int:
         return self.extent(queue, members) if self.map.closed[queue] else members
 
