@@ -78,6 +78,8 @@ class Census:
         self._from = 0
         """The first id of the next frame's labels."""
         self._changed_s = 0.0
+        self.version = 0
+        """How often a member's code changed, or a new member became known."""
         self._deadline_s: list[float] = []
         """T_lost before a member is late, by member [s]; infinite for one that is unknown."""
 
@@ -179,6 +181,7 @@ class Census:
         if code != self._codes[member]:
             self._codes[member] = code
             self._changed.add(member)
+            self.version += 1
             if member != self._own:
                 self._changed_s = max(self._changed_s, now_s)
         self._labels[member] = label

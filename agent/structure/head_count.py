@@ -7,6 +7,10 @@ from agent.structure.queue_map import QueueMap
 from agent.structure.view import View
 
 
+ORDER_S = 0.5
+"""The order along a queue is found anew after this time, or when a member is new there."""
+
+
 class HeadCount:
     """The census of one agent. ids: number of agent ids of the run.
 
@@ -20,6 +24,10 @@ class HeadCount:
         self.code = UNPLACED
         self._queue_code = UNPLACED
         """The own code in the queue joined last."""
+        self._ordered: tuple[int, int] | None = None
+        """The queue, and the version of the census, for which the order was found."""
+        self._ordered_s = 0.0
+        self._order: list[int] = []
 
     def note(self, view: View, claim: Claim) -> None:
         """Bring the census up to date with the members heard directly."""
@@ -61,6 +69,11 @@ class HeadCount:
 
     def order(self, view: View, queue: int) -> list[int]:
         """Return the known members of a queue, in their order along it."""
-        lost_s = view.timing.lost_s + view.timing.answer_s
-        codes = codes_of(queue, self._map.queues)
-        return [member for _, member in sorted(self.census.present(view.now_s, lost_s, codes))]
+        wanted = queue, self.census.version
+        if wanted != self._ordered or view.now_s - self._ordered_s >= ORDER_S:
+            self._ordered, self._ordered_s = wanted, view.now_s
+            lost_s = view.timing.lost_s + view.timing.answer_s
+            codes = codes_of(queue, self._map.queues)
+            present = sorted(self.census.present(view.now_s, lost_s, codes))
+            self._order = [member for _, member in present]
+        return self._order
