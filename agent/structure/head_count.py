@@ -6,7 +6,6 @@ from agent.structure.label_code import UNPLACED, LabelCodes, codes_of, of_vertex
 from agent.structure.queue_map import QueueMap
 from agent.structure.view import View
 
-
 ORDER_S = 0.5
 """The order along a queue is found anew after this time, or when a member is new there."""
 

@@ -65,6 +65,12 @@ def test_what_an_agent_costs_is_of_one_flight_and_counts_each_channel():
     assert cost.multihop_bps > 0.0
 
 
+def test_teams_side_by_side_cost_as_much_radio_as_one():
+    alone, beside = agent_cost(3, 1.0), agent_cost(3, 1.0, together=7)
+    assert beside.sent_bps == pytest.approx(alone.sent_bps, rel=0.1)
+    assert 0.0 < beside.heard_by <= 2.0
+
+
 def test_traffic_is_measured_by_size_and_channel():
     names = {name for name, *_ in MEASURES}
     for agents in (9, 20, 50, 100, 200):

@@ -49,17 +49,24 @@ def _steps_per_cpu_s(agents: int, duration_s: float) -> Callable[[], float]:
     return lambda: agents * TICK_HZ * duration_s / flight_cpu_s(scenario)
 
 
+Figure = Callable[[AgentCost], float]
+
+
 def _cost(
-    name: str, unit: str, agents: int, figure: Callable[[AgentCost], float], goal: float | None
+    name: str, unit: str, agents: int, figure: Figure, goal: float | None, together: int = 0
 ) -> Measure:
-    return f"{name}, N = {agents}", unit, goal, False, lambda: figure(agent_cost(agents))
+    def cost() -> float:
+        return figure(agent_cost(agents, together=together))
+
+    return f"{name}, N = {agents}", unit, goal, False, cost
 
 
 def _growth(
-    name: str, agents: int, least: int, figure: Callable[[AgentCost], float], goal: float
+    name: str, agents: int, least: int, figure: Figure, goal: float, together: int = 0
 ) -> Measure:
     def ratio() -> float:
-        return figure(agent_cost(agents)) / figure(agent_cost(least))
+        measured = agent_cost(agents, together=together)
+        return figure(measured) / figure(agent_cost(least, together=together))
 
     return f"{name}, N = {agents} against {least}", "x", goal, False, ratio
 
@@ -79,16 +86,16 @@ def _radio_rows() -> Iterator[Measure]:
 
 def _step_rows() -> Iterator[Measure]:
     """Yield the CPU time of an agent's step, by the team's size."""
-    least = STEP_SIZES[0]
+    least, most = STEP_SIZES[0], STEP_SIZES[-1]
     for agents in STEP_SIZES:
         yield _cost("others that hear a frame", "agents", agents, lambda cost: cost.heard_by, None)
-        yield _cost("agent step, mean", "us", agents, lambda cost: cost.step_us, None)
-        yield _cost("agent step, dearest 1 %", "us", agents, lambda cost: cost.dearest_us, None)
-        yield _cost("agent step, worst", "us", agents, lambda cost: cost.worst_us, None)
-        yield _cost("flight, for each agent step", "us", agents, lambda cost: cost.flight_us, None)
+        yield _cost("agent step, mean", "us", agents, lambda cost: cost.step_us, None, most)
+        yield _cost("agent step, dearest 1 %", "us", agents, lambda c: c.dearest_us, None, most)
+        yield _cost("agent step, worst", "us", agents, lambda cost: cost.worst_us, None, most)
+        yield _cost("flight, for each agent step", "us", agents, lambda c: c.flight_us, None, most)
     for agents in STEP_SIZES[1:]:
-        yield _growth("agent step, mean", agents, least, lambda cost: cost.step_us, 1.3)
-        yield _growth("agent step, dearest 1 %", agents, least, lambda cost: cost.dearest_us, 1.3)
+        yield _growth("agent step, mean", agents, least, lambda c: c.step_us, 1.3, most)
+        yield _growth("agent step, dearest 1 %", agents, least, lambda c: c.dearest_us, 1.3, most)
 
 
 MEASURES: tuple[Measure, ...] = (

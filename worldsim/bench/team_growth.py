@@ -9,6 +9,8 @@ from math import ceil
 from time import process_time
 from typing import NamedTuple
 
+from msgspec.structs import replace
+
 from netem.wire.channels import CHANNELS, LOCAL, MULTIHOP
 from worldsim.bench.fleets import EIGHT_IN_RANGE_M, wedge
 from worldsim.engine.virtual import VirtualFleet
@@ -64,21 +66,29 @@ class StepTimes:
 
 
 @lru_cache(maxsize=16)
-def agent_cost(agents: int, start_s: float = START_S) -> AgentCost:
-    """Return what an agent of a team costs in its start phase; measured once for each size."""
+def agent_cost(agents: int, start_s: float = START_S, together: int = 0) -> AgentCost:
+    """Return what an agent of a team costs in its start phase; measured once for each size.
+
+    together: so many agents fly in all, in teams of this size side by side. Each step then finds
+    the processor's caches as cold, whatever the size of the team.
+    """
     scenario, times = wedge(agents, start_s, EIGHT_IN_RANGE_M), StepTimes()
-    fleet = VirtualFleet(scenario, watch=times)
+    fleets = [
+        VirtualFleet(replace(scenario, seed=1 + k), watch=times)
+        for k in range(max(1, together // agents))
+    ]
     times.all_s.clear()  # making an agent is no step
     began_s = process_time()
-    while fleet.loop.world.slot < scenario.slots and process_time() - began_s < MOST_CPU_S:
-        fleet.slot()
+    while fleets[0].loop.world.slot < scenario.slots and process_time() - began_s < MOST_CPU_S:
+        for fleet in fleets:
+            fleet.slot()
     spent_s = process_time() - began_s
     steps = sorted(times.all_s)
     dearest = steps[-ceil(DEAREST * len(steps)) :]
     agent_seconds = len(steps) / scenario.fleet.tick_hz
-    counters = fleet.medium_counters
+    counters = [fleet.medium_counters for fleet in fleets]
     local_bps, multihop_bps = (
-        sum(counters.sent_b[channel :: len(CHANNELS)]) / agent_seconds
+        sum(sum(each.sent_b[channel :: len(CHANNELS)]) for each in counters) / agent_seconds
         for channel in (LOCAL, MULTIHOP)
     )
     return AgentCost(
@@ -88,6 +98,6 @@ def agent_cost(agents: int, start_s: float = START_S) -> AgentCost:
         step_us=1e6 * sum(steps) / len(steps),
         dearest_us=1e6 * sum(dearest) / len(dearest),
         worst_us=1e6 * steps[-1],
-        heard_by=counters.fates["delivered"] / counters.sent,
+        heard_by=sum(e.fates["delivered"] for e in counters) / sum(e.sent for e in counters),
         flight_us=1e6 * spent_s / len(steps),
     )
