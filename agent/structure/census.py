@@ -172,7 +172,8 @@ class Census:
         """Take a repeated label, and note its age in the member's usual lag."""
         if member == self._own:
             return
-        lag_s = min(max(now_s - label // CODES * QUANTUM_S, 0.0), MAX_LAG_S)
+        age_s = now_s - label // CODES * QUANTUM_S
+        lag_s = 0.0 if age_s < 0.0 else age_s if age_s < MAX_LAG_S else MAX_LAG_S
         self._lag_s[member] += LAG_SMOOTHING * (lag_s - self._lag_s[member])
         self._set(member, label, now_s)
 
@@ -182,8 +183,8 @@ class Census:
             self._codes[member] = code
             self._changed.add(member)
             self.version += 1
-            if member != self._own:
-                self._changed_s = max(self._changed_s, now_s)
+            if member != self._own and now_s > self._changed_s:
+                self._changed_s = now_s
         self._labels[member] = label
         self._deadline_s[member] = label * LABEL_S + LAGS * self._lag_s[member]
 

@@ -1,6 +1,6 @@
 """What goes up a tree: each agent adds its own part to its followers' and tells its parent."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Generic, TypeVar
 
 from agent.messages import (
@@ -72,8 +72,10 @@ class Convergecast(Followers[Subtree]):
         return self._total
 
 
-def joined(parts: Iterable[Subtree], queues: int) -> Subtree:
+def joined(parts: Sequence[Subtree], queues: int) -> Subtree:
     """Return the sum of some agents' parts. queues: number of queues that begin at the vertex."""
+    if len(parts) == 1 and _is_plain(parts[0], queues):
+        return parts[0]
     highest = [0] * queues
     candidates: list[set[Candidate]] = [set() for _ in range(queues)]
     blocked: set[Place] = set()
@@ -92,6 +94,13 @@ def joined(parts: Iterable[Subtree], queues: int) -> Subtree:
         candidates=tuple(_cheapest(each) for each in candidates),
         blocked=tuple(sorted(blocked)[:MAX_PLACES]),
     )
+
+
+def _is_plain(part: Subtree, queues: int) -> bool:
+    """Whether a part is its own sum: a leaf's, nearly always."""
+    plain = not any(part.candidates) and not part.blocked
+    whole = len(part.histogram) == histogram.BINS
+    return plain and whole and len(part.highest) == len(part.candidates) == queues
 
 
 def _cheapest(candidates: set[Candidate]) -> tuple[Candidate, ...]:
