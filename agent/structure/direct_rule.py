@@ -143,7 +143,8 @@ class DirectRule:
         if claim.number > 0 and now_s - claim.since_s < view.timing.hold_s:
             return
         place = self._assigned(view, claim, self.heard)
-        if place is not None:
+        # Who is to stand in a vertex without a leader takes the lead instead.
+        if place is not None and place not in view.map.vertex_of:
             self._take(view, claim, place)
 
     def _is_all(self, view: View) -> bool:
@@ -156,17 +157,13 @@ class DirectRule:
     def succeeds(self, view: View, claim: Claim, vertex: int) -> bool:
         """Whether the assignment over all that are heard gives the own agent a vertex."""
         vertex_place = view.map.vertex_places[vertex]
-        return self._assigned(view, claim, self.heard, election=True) == vertex_place
+        return self._assigned(view, claim, self.heard) == vertex_place
 
-    def _assigned(
-        self, view: View, claim: Claim, members: int, *, election: bool = False
-    ) -> Place | None:
-        """Return the own place among all members; None where the election comes first."""
+    def _assigned(self, view: View, claim: Claim, members: int) -> Place | None:
+        """Return the own place among all members; None where there are too few of them."""
         layout = view.map.formation.layout(members, view.blocked)
         held = {h.place for h in view.heard if leads(h) and h.place is not None}
         places = [place for place in layout.places if place not in held]
-        if not election and any(place in view.map.vertex_of for place in places):
-            return None  # a vertex without a leader
         team = self._team(view, claim)
         if view.gathering and _is_divided(view, team, places):
             held_place = next(peer.place for peer in team if peer.id == self._own_id)

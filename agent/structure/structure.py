@@ -128,12 +128,14 @@ class Structure:
 
     def follow_trees(self, view: View, senses: Senses) -> None:
         """Find the root of each tree, and the own parent and tier."""
+        # Where all hear the root and each other, a statement of it comes to all on many ways.
+        root_s = view.timing.lost_s if self._direct.applies else view.timing.root_s
         for v, tree in enumerate(self.trees):
             followers = [
                 Follower(h, branch) for h in view.heard if (branch := _branch(h, v)) is not None
             ]
             leading = self._election.key if self.claim.vertex == v else None
-            deposed = tree.follow_root(view.now_s, followers, leading, view.timing)
+            deposed = tree.follow_root(view.now_s, followers, leading, root_s)
             reach_m, parent_s = senses.link.reach_m, view.timing.parent_s
             if not tree.stands_still(view.now_s, parent_s):
                 tree.choose_parent(view.here, senses.velocity, followers, reach_m, parent_s)

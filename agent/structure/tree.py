@@ -17,7 +17,6 @@ import msgspec
 
 from agent.controller import Heard
 from agent.messages import Branch, RootKey, Vector
-from agent.structure.link_timing import Timing
 
 VERSIONS_PER_S = 100.0
 REVIVAL_S = 1.0
@@ -79,15 +78,16 @@ class Tree:
         self.root, self.version, self.advanced_s = key, version_at(now_s), now_s
 
     def follow_root(
-        self, now_s: float, followers: Collection[Follower], leading: RootKey | None, timing: Timing
+        self, now_s: float, followers: Collection[Follower], leading: RootKey | None, root_s: float
     ) -> bool:
         """Take the best root and its latest version; return whether the root is not the own one.
 
-        leading: the own key, if the own agent leads this vertex.
+        leading: the own key, if the own agent leads this vertex; root_s: how long the version of
+        any other may stand still [s].
         """
         if leading is not None and self.root == leading:
             self.version, self.advanced_s = version_at(now_s), now_s
-        elif self.root is not None and now_s - self.advanced_s > timing.root_s:
+        elif self.root is not None and now_s - self.advanced_s > root_s:
             self._make_void(self.root)
             self.root = None
         latest = latest_version(now_s)

@@ -133,6 +133,15 @@ def test_those_left_choose_anew_once_the_others_are_lost_though_the_leader_count
     assert flight.claim.number == 2
 
 
+def test_those_left_close_up_while_nobody_leads_the_vertex_yet():
+    """Its successor is named by the same assignment, so nobody has to wait until it leads."""
+    flight = Flight()
+    assert flight.run(1.0, neighbours(4, 4, 4))
+    left = neighbours(3, 3, 3)[1:]
+    flight.run(2.0, left, [None])
+    assert (flight.claim.number, flight.claim.leads) == (2, False)
+
+
 def test_two_leaders_of_one_vertex_leave_the_places_as_they_are():
     """There are then more places than agents without one; one of the two will make way."""
     flight = Flight(TWO)

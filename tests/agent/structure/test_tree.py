@@ -65,7 +65,7 @@ class Team:
             if branch is not None and self.now_s - at_s <= lost_s
         ]
         key = self.leading.get(own)
-        if tree.follow_root(self.now_s, followers, key, self.timing):
+        if tree.follow_root(self.now_s, followers, key, self.timing.root_s):
             self.leading.pop(own, None)
         near = [each for each in followers if each.heard.age_s < self.timing.parent_s]
         tree.choose_parent(self.points[own], ZERO, near, REACH_M)
@@ -178,7 +178,7 @@ def branch(root=LOW, version=500, tier=0, parent=-1):
 
 
 def follow(tree, now_s, *followers, leading=None):
-    tree.follow_root(now_s, followers, leading, TIMING)
+    tree.follow_root(now_s, followers, leading, TIMING.root_s)
 
 
 def near(agent, at=(1.0, 0.0, 0.0), hears_me=True, velocity=ZERO, **fields):
@@ -232,9 +232,9 @@ def test_a_higher_key_does_not_win_by_a_later_version():
 def test_a_leader_makes_way_for_a_lower_key_only():
     tree = Tree(2, 5.0)
     tree.take_root(HIGH, 5.0)
-    assert not tree.follow_root(5.1, [near(3, root=RootKey(300, 3))], HIGH, TIMING)
+    assert not tree.follow_root(5.1, [near(3, root=RootKey(300, 3))], HIGH, TIMING.root_s)
     assert tree.version == version_at(5.1)
-    assert tree.follow_root(5.2, [near(1)], HIGH, TIMING)
+    assert tree.follow_root(5.2, [near(1)], HIGH, TIMING.root_s)
 
 
 def chosen(tree, *followers, reach_m=REACH_M):
