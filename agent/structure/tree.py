@@ -12,6 +12,7 @@ of a lower tier, and what goes to it is sent to the parent.
 
 from collections.abc import Collection
 from math import dist, inf
+from typing import NamedTuple
 
 import msgspec
 
@@ -135,34 +136,47 @@ class Tree:
         if root is None or root.id == own_id:
             self.parent, self.tier = -1, (-1 if root is None else 0)
             return
+        link = _OwnLink(here, velocity, reach_m, self.parent, KEPT * parent_s)
         position_of = {each.heard.id: each.heard.position for each in followers}
-
-        def order(each: Follower) -> tuple[int, bool, float, int]:
-            heard, branch = each.heard, each.branch
-            current = heard.id == self.parent
-            horizon_s = PARENT_STAYS_S if current else NEW_PARENT_STAYS_S
-            silent = heard.age_s >= KEPT * parent_s  # of the present parent alone
-            leaves = silent or _leaves(here, velocity, heard, horizon_s, reach_m)
-            far = LEAVING if leaves else 0
-            above = position_of.get(branch.parent)
-            to_its_parent = dist(heard.position, above) if above is not None else 0.0
-            return (_least_tier(each) + far, not current, to_its_parent, heard.id)
-
-        eligible = [
-            each
-            for each in followers
-            if each.branch.root == root
-            and (each.heard.age_s < parent_s or each.heard.id == self.parent)
-            and 0 <= each.branch.tier < MAX_TIER
-            and each.branch.parent != own_id
-        ]
-        best = None
-        for each in eligible:
-            if best is None or _least_tier(each) <= best[0][0]:
-                found = order(each), each.branch.tier
+        best: tuple[_Order, int] | None = None
+        for each in followers:
+            branch, current = each.branch, each.heard.id == self.parent
+            if (
+                branch.root == root
+                and (current or each.heard.age_s < parent_s)
+                and 0 <= branch.tier < MAX_TIER
+                and branch.parent != own_id
+                and (best is None or _least_tier(each) <= best[0][0])
+            ):
+                found = link.order(each, position_of.get(branch.parent)), branch.tier
                 best = found if best is None else min(best, found)
         self.parent = best[0][3] if best is not None else -1
         self.tier = best[1] + 1 if best is not None else -1
+
+
+_Order = tuple[int, bool, float, int]
+"""Of two agents the one with the lesser order is the better parent."""
+
+
+class _OwnLink(NamedTuple):
+    """What decides how good a parent an agent is, on the own side."""
+
+    here: Vector  # [m; world frame]
+    velocity: Vector  # [m/s; world frame]
+    reach_m: float
+    parent: int  # the present one
+    kept_s: float  # silence after which the present parent counts as leaving [s]
+
+    def order(self, other: Follower, above: Vector | None) -> _Order:
+        """Return where an agent stands among the parents there may be. above: its parent [m]."""
+        heard = other.heard
+        current = heard.id == self.parent
+        horizon_s = PARENT_STAYS_S if current else NEW_PARENT_STAYS_S
+        silent = heard.age_s >= self.kept_s  # of the present parent alone
+        leaves = silent or _leaves(self.here, self.velocity, heard, horizon_s, self.reach_m)
+        to_its_parent = dist(heard.position, above) if above is not None else 0.0
+        tier = _least_tier(other) + (LEAVING if leaves else 0)
+        return tier, not current, to_its_parent, heard.id
 
 
 def _least_tier(each: Follower) -> int:
