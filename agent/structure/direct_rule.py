@@ -14,7 +14,7 @@ from agent.messages import Place
 from agent.qstructure.formation import Slot
 from agent.structure.claim import Claim
 from agent.structure.link_timing import Timing
-from agent.structure.view import View, leads
+from agent.structure.view import View
 
 ENTER_S = 0.4
 """How long the members heard must have been all, and the same."""
@@ -162,9 +162,9 @@ class DirectRule:
     def _assigned(self, view: View, claim: Claim, members: int) -> Place | None:
         """Return the own place among all members; None where there are too few of them."""
         layout = view.map.formation.layout(members, view.blocked)
-        held = {h.place for h in view.heard if leads(h) and h.place is not None}
-        places = [place for place in layout.places if place not in held]
-        team = self._team(view, claim)
+        led = _led(view, claim)
+        places = [place for place in layout.places if place not in led]
+        team = self._team(view, claim, frozenset(layout.places))
         if view.gathering and _is_divided(view, team, places):
             held_place = next(peer.place for peer in team if peer.id == self._own_id)
             own = _group(view, held_place)
@@ -175,16 +175,33 @@ class DirectRule:
         points = [view.frame.to_world(layout.slots[place].point) for place in places]
         return own_place(self._own_id, team, places, points)
 
-    def _team(self, view: View, claim: Claim) -> list[Peer]:
-        own = view.map.place(claim.queue, claim.number) if claim.number > 0 else None
-        peers = [Peer(self._own_id, view.here, own, claim.cost_m)]
-        peers += [Peer(h.id, h.position, h.place, h.cost_m) for h in view.heard if not leads(h)]
+    def _team(self, view: View, claim: Claim, available: frozenset[Place]) -> list[Peer]:
+        """Return all members but the leaders of available vertices: the others stand in queues."""
+        peers = [
+            Peer(h.id, h.position, h.place, h.cost_m)
+            for h in view.heard
+            if h.standing is None or not _stands_in(view, h.standing.leads, available)
+        ]
+        if not _stands_in(view, claim.vertex, available):
+            own = view.map.place(claim.queue, claim.number) if claim.number > 0 else None
+            peers.append(Peer(self._own_id, view.here, own, claim.cost_m))
         return sorted(peers)
 
     def _take(self, view: View, claim: Claim, place: Place) -> None:
         queue, number = place.queue, view.map.number(place)
         if (queue, number) != (claim.queue, claim.number):
             claim.take(queue, number, view.distance(queue, number), view.now_s)
+
+
+def _led(view: View, claim: Claim) -> set[Place]:
+    """Return the vertices that have a leader, whether it stands there or not."""
+    vertices = {h.standing.leads for h in view.heard if h.standing is not None} | {claim.vertex}
+    return {view.map.vertex_places[v] for v in vertices if 0 <= v < view.map.vertices}
+
+
+def _stands_in(view: View, vertex: int, available: frozenset[Place]) -> bool:
+    """Whether the leader of a vertex, -1 for none, has its place there."""
+    return 0 <= vertex < view.map.vertices and view.map.vertex_places[vertex] in available
 
 
 def _since(since_s: float, now_s: float, *, holds: bool) -> float:

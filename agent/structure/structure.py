@@ -176,7 +176,9 @@ class Structure:
         taken, in_queue = self._map.vertex_places[claim.vertex] in view.blocked, claim.number > 0
         if taken == in_queue:
             self._misplaced_since_s = None
-            if in_queue:
+            if in_queue and self._direct.applies:
+                self._direct.choose(view, claim)
+            elif in_queue:
                 self._numbers.keep_up(view, claim)
             return
         # What is seen flickers while teams meet again; a leader that followed it would too.

@@ -1,5 +1,7 @@
 """The direct rule is the team's: it holds only where every member hears every member."""
 
+from copy import copy
+
 import pytest
 
 from agent.messages import Place
@@ -140,6 +142,42 @@ def test_those_left_close_up_while_nobody_leads_the_vertex_yet():
     left = neighbours(3, 3, 3)[1:]
     flight.run(2.0, left, [None])
     assert (flight.claim.number, flight.claim.leads) == (2, False)
+
+
+def test_a_leader_whose_vertex_is_taken_shares_the_queues_with_the_others():
+    """It may stand in a place that the layout has not; then the others have one too many."""
+    at = {1: (-2.0, -2.0, 0.0), 2: (-1.0, 1.0, 0.0), 3: (-1.2, 1.2, 0.0)}
+    claims = {k: Claim(-9.0) for k in at}
+    claims[1].lead(0, 0.0, -9.0)
+    claims[1].take(1, 2, 0.0, -9.0)
+    for k in (2, 3):
+        claims[k].take(0, 1, 0.0, -9.0)
+    layout = set(TWO.formation.layout(3, frozenset([APEX])).places)
+    for deciding in ((2, 3), (1,)):
+        chosen = [choice(own, at, claims) for own in deciding]
+        for own, number in zip(deciding, chosen, strict=True):
+            claims[own].take(*number, 0.0, -9.0)
+        places = [TWO.place(claims[k].queue, claims[k].number) for k in deciding]
+        assert len({*places}) == len(deciding)
+        assert layout.issuperset(places)
+    assert {TWO.place(c.queue, c.number) for c in claims.values()} == layout
+
+
+def choice(own, at, claims):
+    """Return the queue and number that an agent of TWO chooses while nobody else moves."""
+    around = [
+        heard(k, at[k], TWO.place(c.queue, c.number), heard=3, leads=c.vertex, queue=c.queue)
+        for k, c in claims.items()
+        if k != own
+    ]
+    mine, rule, told_all = copy(claims[own]), DirectRule(own, 0.0), [leader_summary(total=3)]
+    for tick in range(12):
+        seen = view(TWO, TICK_S * tick, around, at=at[own], summaries=told_all, blocked=[APEX])
+        rule.update(seen, mine)
+        if rule.applies:
+            rule.choose(seen, mine)
+    assert rule.applies
+    return mine.queue, mine.number
 
 
 def test_two_leaders_of_one_vertex_leave_the_places_as_they_are():
