@@ -2,8 +2,13 @@
 
 The vehicle of a dead agent may hover in a slot. An agent that senses a vehicle for long enough, and
 knows of no member there, takes it for unidentified. It remembers the vehicle out of the sensor's
-range until the vehicle is seen to have left, or may be a new member: a place that agents forget and
-find occupied again makes them move to and fro for ever.
+range until the vehicle is known to have left, or may be a new member: a place that agents forget
+and find occupied again makes them move to and fro.
+
+Where nobody sees the vehicle leave, the memory ends by itself. It ends early where the agent, or a
+neighbour that reports none there, would sense the vehicle if it had not moved. Each time that the
+vehicle is found there again, its memory lasts twice as long: agents look after a dead vehicle ever
+less often.
 
 A sensor may reach farther than the radio: a vehicle counts as unidentified only within the distance
 from which a member has ever been heard. Present neighbours do not decide this, for the last
@@ -13,12 +18,12 @@ survivor of a team has none.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import dist
+from math import dist, inf
 from typing import NamedTuple
 
 import msgspec
 
-from agent.messages import Beacon, Vector
+from agent.messages import PROXIMITY_RANGE_M, Beacon, Vector
 
 SAME_VEHICLE_M = 0.2
 """Two sightings nearer than this are the same vehicle, which then is stationary."""
@@ -29,10 +34,15 @@ RECENT_S = 10.0
 """How long the last report or sight of a vehicle tells what a vehicle sensed near by may be."""
 MAX_REMEMBERED = 64
 """Most vehicles remembered out of the sensor's range; those seen last are kept."""
-SURE_RANGE_M = 1.8
+SURE_RANGE_M = PROXIMITY_RANGE_M - SAME_VEHICLE_M
 """A vehicle nearer than this would be sensed if it were still there."""
-WITNESS_M = 1.3
-"""A neighbour nearer than this to a vehicle would sense it and report its place as blocked."""
+UNMOVED_RANGE_M = PROXIMITY_RANGE_M - 0.05
+"""A vehicle last sensed nearer than this would be sensed if it had not moved since."""
+REMEMBERED_S = 60.0
+"""How long a vehicle that nobody would sense is remembered at first."""
+MISSED_S = 1.5
+"""How long one is that the agent or a neighbour would sense; a neighbour needs as long to report a
+vehicle that it comes to sense."""
 
 ReportsVehicle = Callable[[Beacon, Vector], bool]
 """Whether a neighbour's beacon reports an unidentified vehicle at a position [m; world frame]."""
@@ -49,10 +59,29 @@ class _Track(NamedTuple):
     since_s: float  # at this position since [s]
     seen_s: float  # last sensed [s]
     others: frozenset[int]  # ids of members that were elsewhere while it was sensed
+    last: Vector  # where it was sensed last [m; world frame]
+    missed_s: float = inf  # since when it would be sensed if it had not moved [s]
+    given_up: bool = False  # whether the memory has ended
+    patience: float = 1.0  # by what factor the memory lasts longer than the first one
 
-    def seen_again(self, now_s: float, sensed: Sequence[Vector], members: frozenset[int]) -> _Track:
-        near = any(dist(self.position, each) < SAME_VEHICLE_M for each in sensed)
-        return self._replace(seen_s=now_s, others=self.others | members) if near else self
+    def seen(self, now_s: float, at: Vector, members: frozenset[int]) -> _Track:
+        """Return the track of a vehicle that is sensed now, at a position [m; world frame]."""
+        others = self.others | members
+        if self.given_up:
+            return _Track(self.position, now_s, now_s, others, at, patience=2.0 * self.patience)
+        return self._replace(seen_s=now_s, others=others, last=at, missed_s=inf)
+
+    def unseen(self, now_s: float, *, missed: bool) -> _Track:
+        """Return the track of a vehicle that the agent does not sense now.
+
+        missed: whether the agent or a neighbour would sense it if it had not moved.
+        """
+        missed_s = min(self.missed_s, now_s) if missed else inf
+        ended = (
+            now_s - self.seen_s >= self.patience * REMEMBERED_S
+            or now_s - missed_s >= self.patience * MISSED_S
+        )
+        return self._replace(missed_s=missed_s, given_up=self.given_up or ended)
 
 
 class MemberPosition(msgspec.Struct, frozen=True, gc=False):
@@ -103,7 +132,7 @@ class UnidentifiedVehicles:
         if not unknown and not self._tracks:
             return ()
         members = frozenset([member.id for member in around.team])
-        tracks = [each.seen_again(around.now_s, unknown, members) for each in self._tracks]
+        tracks = [_followed(each, around, unknown, members) for each in self._tracks]
         new = [
             seen
             for seen in unknown
@@ -117,7 +146,7 @@ class UnidentifiedVehicles:
         return tuple(
             track.position
             for track in self._tracks
-            if around.now_s - track.since_s >= UNIDENTIFIED_AFTER_S
+            if around.now_s - track.since_s >= UNIDENTIFIED_AFTER_S and not track.given_up
         )
 
     def _note_departed(self, around: Surroundings) -> None:
@@ -164,14 +193,13 @@ class UnidentifiedVehicles:
             for each in lost
             if now_s - each.seen_s <= RECENT_S
         )
-        return _Track(vehicle, now_s if moved else since_s, now_s, members)
+        return _Track(vehicle, now_s if moved else since_s, now_s, members, vehicle)
 
     def _may_remain(self, track: _Track, around: Surroundings) -> bool:
         """Whether a vehicle that is not sensed now is still taken to be where it hovered."""
         return (
             track.seen_s - track.since_s >= UNIDENTIFIED_AFTER_S
             and dist(track.position, around.position) > SURE_RANGE_M
-            and not _contradicted(track, around)
             and not self._is_member(track.position, around.team)
             and not self._may_have_joined(track, around)
         )
@@ -193,10 +221,20 @@ class UnidentifiedVehicles:
         return False
 
 
-def _contradicted(track: _Track, around: Surroundings) -> bool:
-    """Whether a neighbour that would sense the vehicle reports none there."""
-    return any(
-        dist(witness.position, track.position) <= WITNESS_M
+def _followed(
+    track: _Track, around: Surroundings, sensed: Sequence[Vector], members: frozenset[int]
+) -> _Track:
+    """Return a track as it is now. sensed: the unidentified vehicles [m; world frame]."""
+    for vehicle in sensed:
+        if dist(track.position, vehicle) < SAME_VEHICLE_M:
+            return track.seen(around.now_s, vehicle, members)
+    return track.unseen(around.now_s, missed=_is_missed(track, around))
+
+
+def _is_missed(track: _Track, around: Surroundings) -> bool:
+    """Whether the agent would sense a vehicle that has not moved, or a neighbour reports none."""
+    return dist(track.last, around.position) < UNMOVED_RANGE_M or any(
+        dist(track.last, witness.position) < UNMOVED_RANGE_M
         and not around.reports_vehicle(witness, track.position)
         for witness in around.beacons
     )
