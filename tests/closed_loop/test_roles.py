@@ -131,13 +131,13 @@ def test_the_team_skips_the_slot_of_a_dead_member(place):
     assert np.max(fleet.loop.figures.slot_error[living]) < 0.01
 
 
-def with_losses(seed, agents, killed, spacing_m=1.0):
-    """Fly a wedge of which some agents die at 15 s, for 40 s."""
+def with_losses(seed, agents, killed, spacing_m=1.0, lasts_s=40.0):
+    """Fly a wedge of which some agents die at 15 s."""
     event = f"[{{ at_s = 15.0, kill = ['{killed}'] }}]"
-    given = {"fleet.agents": str(agents), "event": event, "duration_s": "40"}
+    given = {"fleet.agents": str(agents), "event": event, "duration_s": str(lasts_s)}
     given |= {"control.spacing_m": str(spacing_m), "netem.range_m": "12"}
     fleet = VirtualFleet(load(WEDGE, {"seed": str(seed), **given}))
-    fly(fleet, 40.0)
+    fly(fleet, lasts_s)
     return fleet
 
 
@@ -165,3 +165,12 @@ def test_three_survivors_come_to_rest_among_nine_dead(seed):
 
 def test_a_dead_vertex_agent_that_no_slot_is_in_sight_of_is_not_forgotten():
     check_at_rest(with_losses(1, 5, "vertex:V1", spacing_m=2.5), since_s=30.0)
+
+
+def test_agents_look_after_a_dead_vehicle_that_no_slot_is_in_sight_of_ever_less_often():
+    """Two looks in 225 s: 60 s after the vehicle was seen last, and 120 s after that."""
+    lasts_s = 240.0
+    fleet = with_losses(1, 2, "vertex:V1", spacing_m=2.5, lasts_s=lasts_s)
+    changes_s = [event.t_s for event in fleet.loop.events if event.kind == "slot"]
+    assert len([time_s for time_s in changes_s if time_s > 30.0]) == 4, "there and back, twice"
+    check_at_rest(fleet, since_s=lasts_s - 5.0)

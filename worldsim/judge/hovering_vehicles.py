@@ -12,9 +12,9 @@ from math import dist
 import numpy as np
 from numpy.typing import NDArray
 
-from agent.comms.unidentified_vehicles import SAME_VEHICLE_M, SURE_RANGE_M, UNIDENTIFIED_AFTER_S
+from agent.comms.unidentified_vehicles import SAME_VEHICLE_M, UNIDENTIFIED_AFTER_S
 from agent.controller import Flown
-from agent.messages import Place
+from agent.messages import Place, Vector
 from agent.places.place_points import PlacePoints
 from agent.qstructure.formation import NO_PLACES, Layout
 from worldsim.judge.phase import Phase
@@ -71,7 +71,21 @@ class HoveringVehicles:
         if not others.any():
             return NO_PLACES
         positions = [(x, y, z) for x, y, z in tick.position[others].tolist()]
-        return self._targets.taken_by(_flown(tick, phase), len(team), positions)
+        return self.places_near(tick, phase, team, positions)
+
+    def places_near(
+        self,
+        tick: Tick,
+        phase: Phase,
+        team: list[int],
+        positions: Sequence[Vector],
+        occupied: frozenset[Place] = NO_PLACES,
+    ) -> frozenset[Place]:
+        """Return the places that vehicles at positions [m; world frame] would take from a team.
+
+        occupied: places that others take.
+        """
+        return self._targets.taken_by(_flown(tick, phase), len(team), positions, occupied)
 
     def held_places(self, tick: Tick, phase: Phase, team: list[int]) -> frozenset[Place]:
         """Return the places in which agents of a team (rows) stand that claim them."""
@@ -87,51 +101,3 @@ class HoveringVehicles:
 
 def _flown(tick: Tick, phase: Phase) -> Flown:
     return Flown(phase.mission, phase.formation, phase.frame(tick.time_s))
-
-
-class Watchers:
-    """Knows which hovering vehicles agents surely take for occupants of a place.
-
-    As in the agents' own rule, an agent is near enough to sense the vehicle, and has ever heard a
-    member that was no nearer. senses: for each agent, whether it senses every vehicle near by.
-    """
-
-    def __init__(self, senses: Sequence[bool]) -> None:
-        self._senses = senses
-        self._farthest_m = np.zeros(len(senses))
-        """(N,): the farthest distance from which each agent ever heard a member [m]."""
-        self._hearer = self._heard = np.empty(0, dtype=np.int64)
-        """(P,): the pairs that may still raise the distance of a hearer."""
-
-    def restart(self, agent: int) -> None:
-        """Forget what an agent heard: its process starts anew."""
-        self._farthest_m[agent] = 0.0
-
-    def hear(self, hears: NDArray[np.bool_]) -> None:
-        """Take which agent hears which from now on. hears: (N, N), row hears column."""
-        self._keep(*np.nonzero(hears))
-
-    def see(self, position: Floats) -> None:
-        """Take where the vehicles are (N, 3) [m; world frame]; ticks come in order."""
-        if not len(self._hearer):
-            return
-        away = position[self._hearer] - position[self._heard]
-        np.fmax.at(self._farthest_m, self._hearer, np.sqrt(np.sum(away * away, axis=1)))
-        self._keep(self._hearer, self._heard)
-
-    def seen_by(self, position: Floats, team: list[int]) -> NDArray[np.bool_]:
-        """Return which vehicles (N,) some agents of a team (rows) surely take for occupants.
-
-        position: (N, 3) [m; world frame].
-        """
-        watchers = [row for row in team if self._senses[row]]
-        away = position[watchers, None] - position[None]
-        distance = np.sqrt(np.sum(away * away, axis=2))
-        reach_m = np.minimum(SURE_RANGE_M, self._farthest_m[watchers])
-        seen: NDArray[np.bool_] = np.any(distance <= reach_m[:, None], axis=0)
-        return seen
-
-    def _keep(self, hearer: NDArray[np.int64], heard: NDArray[np.int64]) -> None:
-        """Keep the pairs whose hearer senses farther than it has heard."""
-        open_ = self._farthest_m[hearer] < SURE_RANGE_M
-        self._hearer, self._heard = hearer[open_], heard[open_]

@@ -10,8 +10,9 @@ I6: no agent that news reaches within a bound changes its role more than 3 times
 I7: no agent changes its place in a settled team in which every agent is in its place; where frames
 are lost, each agent may once.
 A fault is an event of the timeline, an exit, a change of the connected components, a vehicle that
-comes to hover in a component's place or leaves it, or a radio whose queues cannot carry the
-traffic; while that lasts, none of the invariants is evaluated.
+comes to hover in a component's place or leaves it, agents that look again whether a vehicle hovers
+in a place of which they cannot know it, or a radio whose queues cannot carry the traffic; while
+that lasts, none of the invariants is evaluated.
 """
 
 from collections import Counter
@@ -25,8 +26,9 @@ from numpy.typing import NDArray
 
 from agent.messages import Place
 from agent.qstructure.formation import NO_PLACES
+from worldsim.judge.blocked_places import BlockedPlaces
 from worldsim.judge.connectivity import Components, Connectivity
-from worldsim.judge.hovering_vehicles import HoveringVehicles, Watchers
+from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.phase import Phase
 from worldsim.judge.radio_events import RadioRunEvent
 from worldsim.judge.radio_load import RadioLoad
@@ -85,8 +87,10 @@ class Invariants:
     def __init__(self, scenario: Scenario, hovering: HoveringVehicles) -> None:
         self.tallies = {name: InvariantTally() for name in ("I2", "I3", "I4", "I6", "I7")}
         self._connectivity, self._load = Connectivity(scenario), RadioLoad()
-        self._hovering, self._local = hovering, scenario.control.allocation == "structure"
-        self._watchers = Watchers(["proximity" in each.sensors for each in scenario.vehicles])
+        self._local = scenario.control.allocation == "structure"
+        self._places = BlockedPlaces(
+            hovering, ["proximity" in each.sensors for each in scenario.vehicles]
+        )
         self._boot_s = scenario.fleet.boot_s
         self._fault_s = 0.0
         """When the last fault is over [s; simulated time]."""
@@ -130,7 +134,7 @@ class Invariants:
                 self._count_role_change(event)
             case Restarted() | Joined():
                 if event.agent is not None:
-                    self._watchers.restart(event.agent)
+                    self._places.restart(event.agent)
                 self._fault(event.t_s, event.t_s + self._boot_s)
             case Killed() | Left() | Paused() | Resumed() | FormationGiven() | FrameGiven():
                 self._fault(event.t_s, event.t_s)
@@ -143,7 +147,8 @@ class Invariants:
         """Evaluate a tick; in_place: whether every running agent is in its place."""
         if tick.time_s >= self._components_due_s:
             self._find_components(tick)
-        self._watchers.see(tick.position)
+        parted = len(self._members) > 1 or not tick.alive.all()
+        self._places.see(tick, parted=parted, news_s=self._twice_s)
         last_claims = self._claims
         self._find_breaches(tick, phase)
         if self._is_suspect(tick.time_s, last_claims):
@@ -159,6 +164,8 @@ class Invariants:
         if tick.time_s >= self._settled_s and self._breaches is not None:
             self.tallies["I2"].count(self._breaches.vertices)
             self.tallies["I3"].count(self._breaches.shares)
+        if self._quiet_since_s is not None and self._looks_again(tick, phase, last_claims):
+            self._restart_premises(tick.time_s)
         self._evaluate_quiet(tick, last_claims, in_place)
 
     @property
@@ -206,7 +213,7 @@ class Invariants:
         """Find the connected components: once a second, and after each fault."""
         self._components_due_s = tick.time_s + COMPONENTS_EVERY_S
         found = self._connectivity.components(tick)
-        self._watchers.hear(found.hears)
+        self._places.hear(found.hears)
         last, self._components, self._members = self._components, found, found.members()
         if last is not None and not last.same_as(found):
             self._restart_premises(tick.time_s)
@@ -249,21 +256,13 @@ class Invariants:
     def _blocked(self, tick: Tick, phase: Phase, rows: list[int]) -> frozenset[Place] | None:
         """Return the places in which others hover, for a component.
 
-        None where it cannot know them, where its own agent stands in such a place, or where the
-        mission has reached none of its agents.
+        None where that is not clear, or where the mission has reached none of its agents.
         """
         if not (tick.mission[rows] >= phase.mission).any():
             return None
         if len(rows) == len(tick.alive) or self._components is None:
             return NO_PLACES
-        occupied = self._hovering.occupied_places(tick, phase, rows)
-        if occupied:
-            seen = self._watchers.seen_by(tick.position, rows)
-            if occupied != self._hovering.occupied_places(tick, phase, rows, seen):
-                return None
-            if occupied & self._hovering.held_places(tick, phase, rows):
-                return None
-        return occupied
+        return self._places.of(tick, phase, rows)
 
     def _judged(self, phase: Phase, blocked: Sequence[frozenset[Place] | None]) -> Breaches | None:
         """Return the breaches in all components of which it is clear whom their agents know.
@@ -345,6 +344,12 @@ class Invariants:
             self._quiet_since_s = None
         elif since_s is None:
             self._quiet_since_s = tick.time_s
+
+    def _looks_again(self, tick: Tick, phase: Phase, last_claims: Claims) -> bool:
+        """Whether agents may look whether a vehicle still hovers in a place: they cannot know."""
+        return last_claims is not self._claims and any(
+            self._places.is_unclear(tick, phase, rows) for rows in self._members
+        )
 
     def _count_moves(self, alive: NDArray[np.bool_], last_claims: Claims) -> int:
         """Return the number of agents that changed their place more often than allowed."""
