@@ -126,9 +126,12 @@ class Election:
 
     def _lead(self, view: View, claim: Claim, tree: Tree, vertex: int) -> None:
         cost_m = view.to_vertex(vertex)
-        self.key = RootKey(min(round(100.0 * cost_m), MAX_COST_CM), self._own_id)
+        in_queue = view.map.vertex_places[vertex] in view.blocked and claim.number > 0
+        # Where teams meet again, the one that stands in the vertex stays the leader.
+        cost_cm = MAX_COST_CM if in_queue else min(round(100.0 * cost_m), MAX_COST_CM - 1)
+        self.key = RootKey(cost_cm, self._own_id)
         tree.take_root(self.key, view.now_s)
-        if view.map.vertex_places[vertex] in view.blocked and claim.number > 0:
+        if in_queue:
             claim.vertex = vertex
         else:
             claim.lead(vertex, cost_m, view.now_s)
