@@ -156,7 +156,6 @@ class Structure:
         self._direct.update(view, self.claim)
         if self.claim.queue == NO_QUEUE and not self.claim.leads:
             self._queue_choice.choose(view, self.claim)
-            self._head_count.note_own(view, self.claim)
         waits = self.claim.number < 1 and not self.claim.leads
         view.order = self._order = self._head_count.order(view, self.claim.queue) if waits else ()
         if not self.claim.leads:
