@@ -82,6 +82,7 @@ class Flown(NamedTuple):
     key: int
     formation: Formation
     frame: Frame  # the target's frame at present
+    frame_key: int = 0  # of the mission whose frame it is: a newer one's may come first
 
 
 class HeardFrame(NamedTuple):

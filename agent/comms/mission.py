@@ -251,7 +251,7 @@ class Missions:
             self._check_drift(formation, self._frame.drift)
         self._encoded, self._path = encoded, path
         frame = flown.frame if flown is not None else Track(path).at(path.start_s)
-        self.flown = Flown(key=key, formation=formation, frame=frame)
+        self.flown = Flown(key, formation, frame, self.frame_key)
         if key >= self.frame_key:
             self.frame_key = key
             self._set_frame(self.flown, Track(path), path.start_s)
@@ -261,7 +261,8 @@ class Missions:
         self._frame = frame
         here, now = flown.frame, frame.at(time_s)
         if here.moves or now.moves or (here.origin, here.yaw) != (now.origin, now.yaw):
-            self.flown = flown._replace(frame=now)
+            here = now
+        self.flown = flown._replace(frame=here, frame_key=self.frame_key)
 
     def _check_drift(self, formation: Formation, drift: Drift | None) -> None:
         try:

@@ -51,7 +51,7 @@ class Election:
                 and not self._is_led(view, v)
                 and self._is_next(view, claim, trees[v], v, direct)
             ):
-                self._lead(view, claim, trees[v], v)
+                self.lead(view, claim, trees[v], v)
                 return True
         return False
 
@@ -124,7 +124,8 @@ class Election:
         behind = TURN_STEP_S * homed.index(claim.queue)
         return TURN_S + TURN_LATENCIES * view.timing.latency_s + behind
 
-    def _lead(self, view: View, claim: Claim, tree: Tree, vertex: int) -> None:
+    def lead(self, view: View, claim: Claim, tree: Tree, vertex: int) -> None:
+        """Take the lead of a vertex."""
         cost_m = view.to_vertex(vertex)
         in_queue = view.map.vertex_places[vertex] in view.blocked and claim.number > 0
         # Where teams meet again, the one that stands in the vertex stays the leader.

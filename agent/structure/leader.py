@@ -36,6 +36,8 @@ those heard, four times and so on."""
 COLLECTED_S, COLLECTED_LATENCIES = 1.0, 4.0
 """How long it waits for candidates to come up the tiers, if there are too few; and for even queues
 before it says go."""
+EXPECTED_S = 4.0
+"""How long a leader waits until all that had places in the mission before are counted."""
 MOST_WAITS = 2.0
 """Each order begins the wait before go anew, within so many times its length."""
 
@@ -56,9 +58,16 @@ class Unevenness(NamedTuple):
 
 
 class Leader:
-    """The leader of one vertex. round_s: time between two rounds of the multihop channel [s]."""
+    """The leader of one vertex.
 
-    def __init__(self, vertex: int, key: RootKey, now_s: float, round_s: float) -> None:
+    round_s: time between two rounds of the multihop channel [s]; expected: members of a team that
+    took its places over from another mission.
+    """
+
+    def __init__(
+        self, vertex: int, key: RootKey, now_s: float, round_s: float, expected: int = 0
+    ) -> None:
+        self._expects, self._expects_until_s = expected, now_s + EXPECTED_S
         self.vertex = vertex
         self._key = key
         self._round_s = round_s
@@ -106,9 +115,14 @@ class Leader:
             self._since_s = view.now_s if self._counted is not None else population.changed_s
             self._counted = counted
         wait_s = view.timing.resettle_s if self._go else self._first_wait_s(view, counted.total)
-        if not self._go and counted.total < len(view.heard) + 1:
+        if not self._go and counted.total < self._least(view):
             return False
         return view.now_s - self._since_s >= wait_s - 1e-9 and counted.total > 0
+
+    def _least(self, view: View) -> int:
+        """Return how many members the first steady count has at least."""
+        expected = self._expects if view.now_s < self._expects_until_s else 0
+        return max(len(view.heard) + 1, expected)
 
     def _first_wait_s(self, view: View, total: int) -> float:
         """Return how long the first counts must be steady [s]: longer for news from farther away.

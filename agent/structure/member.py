@@ -1,10 +1,14 @@
-"""A member of the Q-structure: the structure of the mission that it flies, begun anew with each."""
+"""A member of the Q-structure: the structure of the mission that it flies.
+
+With each mission the structure begins anew, but for the places: they follow from those before.
+"""
 
 from agent.config import AgentSetup
-from agent.controller import Senses, Words
+from agent.controller import Flown, Senses, Words
 from agent.messages import DISTRESS, Place
 from agent.places.place_points import OwnTarget
 from agent.structure.queue_map import map_of
+from agent.structure.relocation import relocated
 from agent.structure.structure import Structure
 
 
@@ -36,9 +40,15 @@ class StructureMember:
             return None
         if self._structure is None or mission.key != self._mission:
             self._mission = mission.key
-            formation = map_of(mission.formation)
-            self._structure = self._kind(self._setup, formation, mission.key, senses.now_s)
+            self._structure = self._begun(mission, senses.now_s)
         return self._structure.update(senses, mission)
+
+    def _begun(self, mission: Flown, now_s: float) -> Structure:
+        """Return the structure of a mission; its team stands in places of the one before."""
+        held = self._structure.held if self._structure is not None else None
+        spacing_m = self._setup.control.spacing_m
+        before = relocated(held, mission, now_s, spacing_m) if held is not None else None
+        return self._kind(self._setup, map_of(mission.formation), mission.key, now_s, before)
 
     def words(self, now_s: float) -> Words:
         """Return what the agent says of its part; call it once a tick, after ``select``."""

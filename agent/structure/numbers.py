@@ -197,9 +197,11 @@ class Numbers:
         return theirs < claim.cost_m
 
     def _close_gap(self, view: View, claim: Claim, same: list[Heard], occupied: set[int]) -> bool:
-        """Move inwards where nobody is heard to stand below."""
+        """Move inwards where nobody is heard to stand below, unless they lack the mission yet."""
         queue, number, count = claim.queue, claim.number, view.counts[claim.queue]
         taken = view.map.blocked_numbers(queue, view.blocked)
+        if view.is_under_way:
+            return False
         if len(same) + 1 >= count > 0:
             return self._close_all_gaps(view, claim, occupied, taken)
         below = _below(number, taken)

@@ -37,6 +37,7 @@ from agent.structure.link_timing import timing_of
 from agent.structure.numbers import Numbers
 from agent.structure.queue_choice import QueueChoice
 from agent.structure.queue_map import QueueMap
+from agent.structure.relocation import Held, Relocated
 from agent.structure.slow_layer import SlowLayer
 from agent.structure.swaps import Swaps
 from agent.structure.tree import Follower, Tree
@@ -54,9 +55,19 @@ FAR_M = 2.5
 
 
 class Structure:
-    """One agent's part in the structure of one mission."""
+    """One agent's part in the structure of one mission.
 
-    def __init__(self, setup: AgentSetup, formation: QueueMap, mission: int, now_s: float) -> None:
+    before: what follows from the mission before; ``held`` is the same for the next mission.
+    """
+
+    def __init__(
+        self,
+        setup: AgentSetup,
+        formation: QueueMap,
+        mission: int,
+        now_s: float,
+        before: Relocated | None = None,
+    ) -> None:
         own_id = setup.id
         self._own_id, self._map = own_id, formation
         self._beacon_s = 1.0 / setup.comms.local_hz
@@ -89,6 +100,11 @@ class Structure:
         self._blocked: frozenset[Place] = frozenset()
         self._view: View | None = None
         self._own: OwnTarget | None = None
+        self._place_given = before.place if before is not None else None
+        self._expected = before.members if before is not None else 0
+        """Size of the team that takes its places over, until a leader's count of it is steady."""
+        self.held: Held | None = None
+        """The own place, with the frame in which the team stands in its places."""
 
     @property
     def blocked(self) -> tuple[Place, ...]:
@@ -104,12 +120,26 @@ class Structure:
             return self._flown(senses.now_s)
         view = self._view = self._look(senses, mission)
         view.summaries, view.order = self._slow.summaries, self._order
+        view.expected = self._expected
         self.follow_trees(view, senses)
+        if self._expected and view.latest is not None:
+            self._expected = 0
         if decides:
             self._next_decision_s = senses.now_s + 1.0 / DECISION_HZ - 1e-9
             self._decide(view, senses, mission)
         self._own = self._target(view)
+        self._note_held(view, mission)
         return self._flown(senses.now_s)
+
+    def _note_held(self, view: View, mission: Flown) -> None:
+        """Remember the own place for the next mission, whose frame may come before it."""
+        own = view.target(self.claim)
+        if own is None or own.place is None or not view.total:
+            self.held = None
+        elif mission.frame_key == mission.key:
+            self.held = Held(own.place, view.total, view.blocked, mission, view.now_s)
+        elif self.held is not None:
+            self.held = self.held._replace(place=own.place, members=view.total)
 
     def _flown(self, now_s: float) -> OwnTarget | None:
         """Return the own target, displaced while the members of the own queue gather."""
@@ -154,6 +184,8 @@ class Structure:
         self._election.note(view)
         self._update_blocked(view, senses, mission)
         self._direct.update(view, self.claim)
+        if self._place_given is not None:
+            self._relocate(view, self._place_given)
         if self.claim.queue == NO_QUEUE and not self.claim.leads:
             self._queue_choice.choose(view, self.claim)
         waits = self.claim.number < 1 and not self.claim.leads
@@ -168,6 +200,25 @@ class Structure:
             for branch in (h.standing.branches if h.standing is not None else ())
         )
         self._report(view)
+
+    def _relocate(self, view: View, place: Place) -> None:
+        """Take the place that follows from the mission before."""
+        self._place_given = None
+        vertex, queue = self._map.vertex_of.get(place), place.queue
+        if vertex is not None:
+            self._election.lead(view, self.claim, self.trees[vertex], vertex)
+            self._begin_to_lead(view)
+        else:
+            number = self._map.number(place)
+            self.claim.take(queue, number, view.distance(queue, number), view.now_s)
+        self._head_count.note_own(view, self.claim)
+
+    def _begin_to_lead(self, view: View) -> None:
+        key, claim = self._election.key, self.claim
+        if key is not None:
+            self._leader = Leader(claim.vertex, key, view.now_s, self._round_s, view.expected)
+            self._head_count.note_own(view, claim)
+        self._slow.news = True
 
     def _decide_as_leader(self, view: View) -> None:
         """Stand in the vertex, or while a vehicle has taken it, in the queue (E18)."""
@@ -194,11 +245,7 @@ class Structure:
         claim = self.claim
         direct = self._direct if self._direct.applies else None
         if self._election.stand(view, claim, self.trees, direct):
-            key = self._election.key
-            if key is not None:
-                self._leader = Leader(claim.vertex, key, view.now_s, self._round_s)
-                self._head_count.note_own(view, claim)
-            self._slow.news = True
+            self._begin_to_lead(view)
         elif self._direct.applies:
             self._direct.choose(view, claim)
         elif self._queue_choice.obey(view, claim):

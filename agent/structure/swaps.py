@@ -105,12 +105,13 @@ class Swaps:
     def propose(self, view: View, claim: Claim) -> None:
         """Propose the swap that gains most, if any gains enough.
 
-        In a queue that has members to give away, orders come first.
+        In a queue that has members to give away, orders come first. While a mission is under way,
+        those who have it are on their new ways and the others are not: a swap would gain nothing.
         """
         now_s, timing = view.now_s, view.timing
         waits = now_s < claim.no_swap_before_s or now_s - claim.since_s <= timing.hold_s
         leaving = claim.queue in view.transfers
-        if waits or leaving or claim.swapping or claim.pushes(now_s):
+        if waits or leaving or view.is_under_way or claim.swapping or claim.pushes(now_s):
             return
         mine = view.point(claim.queue, claim.number)
         best: tuple[float, Heard] | None = None

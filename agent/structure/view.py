@@ -41,6 +41,9 @@ class View:
         self.order: Sequence[int] = ()
         """The known members of the own queue along it, for an agent without a number."""
         self.gathering: frozenset[int] = frozenset()
+        self.expected = 0
+        """Members of the team that took its places over from another mission; holds until a
+        leader's count is steady."""
         self.origin = frame.to_frame(here)
 
     @cached_property
@@ -51,6 +54,8 @@ class View:
     @cached_property
     def counts(self) -> list[int]:
         """Members of each queue, as leaders count them."""
+        if self.is_under_way:
+            return [*self.shares]
         counts = [0] * self.map.queues
         for v, summary in enumerate(self.summaries):
             if summary is not None:
@@ -75,13 +80,20 @@ class View:
         return max(steady, key=lambda each: each.version, default=None)
 
     @property
+    def is_under_way(self) -> bool:
+        """Whether others of a team that took its places over may not have the mission yet."""
+        return self.expected > 0 and self.latest is None
+
+    @property
     def total(self) -> int:
-        """Members of the team, 0 if no leader's count of them was steady."""
-        return self.latest.total if self.latest is not None else 0
+        """Members of the team; without a leader's steady count those expected, 0 for none."""
+        return self.latest.total if self.latest is not None else self.expected
 
     @cached_property
     def shares(self) -> tuple[int, ...]:
         """Members that each queue should have besides those in vertices, as counted so far."""
+        if self.is_under_way:
+            return self.map.members(self.expected, self.blocked)
         known = [each for each in self.summaries if each is not None]
         latest = max(known, key=lambda each: each.version, default=None)
         return self.map.members(latest.total if latest is not None else 0, self.blocked)

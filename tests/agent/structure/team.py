@@ -34,6 +34,7 @@ class Said(NamedTuple):
     place: Place | None
     cost_m: float
     standing: Standing | None
+    mission: int
 
 
 class Member:
@@ -82,6 +83,11 @@ class Team:
         self.now_s = 0.0
         self._air = []
 
+    def fly(self, frame):
+        """Give the whole team a mission: the same formation in another frame."""
+        key = self.mission.key + 1
+        self.mission = Flown(key, self.map.formation, frame, key)
+
     def join(self, at):
         """Let another agent take off."""
         own_id = max(self.members) + 1
@@ -128,7 +134,7 @@ class Team:
             return
         member.changes += member.place is not None and own.place != member.place
         member.place = own.place
-        self._fly(member, own.slot.point)
+        self._fly(member, self.mission.frame.to_world(own.slot.point))
 
     def _senses(self, member):
         neighbours = [self._heard(member, said) for _, said in sorted(member.beacons.items())]
@@ -156,6 +162,7 @@ class Team:
             velocity=said.velocity,
             target=said.at,
             place=said.place,
+            mission=said.mission,
             cost_m=said.cost_m,
             standing=said.standing,
             hears_me=echoed is not None and self.now_s - echoed.stamp_s < ECHO_LASTS_S,
@@ -177,6 +184,7 @@ class Team:
             place=member.place,
             cost_m=member.structure.cost_m,
             standing=member.words.standing,
+            mission=self.mission.key,
         )
         arrives_s = self.now_s + self.link.latency_s
         for other in self.members.values():
@@ -199,8 +207,9 @@ class Team:
         layout = self.map.formation.layout(len(self.members))
         if self.places() != Counter(layout.places):
             return False
+        to_world = self.mission.frame.to_world
         return all(
-            dist(member.at, layout.slots[member.place].point) < 0.01
+            dist(member.at, to_world(layout.slots[member.place].point)) < 0.01
             for member in self.members.values()
         )
 

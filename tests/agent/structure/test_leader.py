@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from agent.controller import Link
 from agent.messages import ZERO, Candidate, RootKey
 from agent.structure.census import Population
-from agent.structure.leader import FOLLOWED_S, MAX_ORDERS, Leader
+from agent.structure.leader import EXPECTED_S, FOLLOWED_S, MAX_ORDERS, Leader
 from tests.agent.structure.builders import TWO, heard, lines, rays, subtree, view
 
 KEY = RootKey(10, 1)
@@ -40,9 +40,9 @@ def offers(formation, counts, each=8, vertex=0):
 class Flight:
     """A leader, asked ten times a second."""
 
-    def __init__(self, formation, vertex=0, link=None, neighbours=()):
+    def __init__(self, formation, vertex=0, link=None, neighbours=(), expected=0):
         self._formation, self._link, self._neighbours = formation, link, neighbours
-        self._leader = Leader(vertex, KEY, 0.0, ROUND_S)
+        self._leader = Leader(vertex, KEY, 0.0, ROUND_S, expected)
         self._vertex, self.now_s = vertex, 0.0
         self._first = True
 
@@ -234,3 +234,15 @@ def test_a_blocked_place_changes_the_shares_and_is_told():
     flight = Flight(TWO)
     assert flight.until_orders(population(3, 2, holders=(0,)), blocked=blocked) == ()
     assert flight.ask(population(3, 2, holders=(0,)), blocked=blocked).blocked == ((0, 0),)
+
+
+def test_a_leader_waits_for_those_of_the_mission_before_but_not_for_ever():
+    """Orders before they have the mission would move others to places that they will take."""
+    flight, few, all_are_there = Flight(TWO, expected=7), population(4, 1), population(3, 3)
+    seen = [flight.ask(few) for _ in range(round((EXPECTED_S - 0.5) / TICK_S))]
+    assert not any(each.go or each.orders for each in seen)
+    late = [flight.ask(few) for _ in range(round(2.0 / TICK_S))]
+    assert late[-1].orders, "whoever has not come by then is not waited for"
+    soon = Flight(TWO, expected=7)
+    assert not soon.ask(few).go
+    assert any(soon.ask(all_are_there).go for _ in range(round(2.0 / TICK_S)))

@@ -281,3 +281,16 @@ def test_who_takes_its_number_anew_waits_again_until_it_knows_of_as_many_as_the_
     assert [decide(0.5, 3), decide(0.6, 2)] == [0, 1]
     assert [decide(2.5, 9), decide(2.6, 9)] == [0, 0]
     assert decide(4.0, 9) > 0, "but not for ever"
+
+
+@pytest.mark.parametrize(("total", "number"), [(None, 3), (3, 2)], ids=["under way", "counted"])
+def test_a_gap_stays_while_its_member_may_lack_the_mission(total, number):
+    """No steady count has been heard, and the team is the one of the mission before."""
+    each = Ranked(4, 3.0, 3)
+    told = leader_summary(total=total, counts=(total - 1,), highest=(3,)) if total else None
+    for tick in range(40):
+        others = [heard(1, (-1.0, 0.0, 0.0), LINE.place(0, 1))]
+        seen = view(LINE, TICK_S * tick, others, at=each.at, summaries=[told])
+        seen.expected = 4
+        each.decide(seen)
+    assert each.claim.number == number

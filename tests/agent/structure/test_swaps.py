@@ -199,3 +199,16 @@ def test_invented_swaps_leave_an_agent_with_a_place(others, proposal, reservatio
     assert claim.queue == 0
     assert claim.number >= 1
     assert claim.cost_m < 1e4
+
+
+def test_nobody_proposes_while_a_mission_is_under_way():
+    """Those who have it are on new ways, the others are not: what a swap gains is not known."""
+    claim, swaps = Claim(-10.0), Swaps(1)
+    claim.take(0, 1, 1.0, -10.0)
+    seen = view(LINE, 0.0, [heard(2, (-1.0, 0.0, 0.0), SECOND)], at=(-4.0, 0.0, 0.0))
+    seen.expected = 3
+    swaps.propose(seen, claim)
+    assert claim.proposal is None
+    seen.expected = 0
+    swaps.propose(seen, claim)
+    assert claim.proposal == Swap(2, FIRST, SECOND)
