@@ -40,7 +40,7 @@ class DirectRule:
         self.heard = 1
         self._guessed: tuple[int, ...] | None = None
         """Among which members the last guess was made."""
-        self._guess: Slot | None = None
+        self._guess: Place | None = None
         self._around: tuple[int, ...] = ()
         self._around_since_s = now_s
 
@@ -96,11 +96,15 @@ class DirectRule:
         return self._full_since_s is not None and not self.applies
 
     def guess(self, view: View) -> Slot | None:
-        """Return the slot that the assignment over all neighbours gives, without claiming it.
+        """Return the slot of the likely place, so that the agent flies there at once."""
+        place = self.likely(view)
+        return view.map.formation.slot(place, len(view.around) + 1) if place is not None else None
 
-        Where they are the whole team this is the place that the agent will take, so that it flies
-        there at once. None where a neighbour hears more, or where so many are heard that it takes
-        too long.
+    def likely(self, view: View) -> Place | None:
+        """Return the place that the assignment over all neighbours gives, without claiming it.
+
+        Where they are the whole team this is the place that the agent will take. None where a
+        neighbour hears more, or where so many are heard that it takes too long.
         """
         if not 0 < len(view.around) <= MOST_GUESSED:
             return None
@@ -111,20 +115,23 @@ class DirectRule:
             return None
         settled = view.now_s - self._around_since_s >= GUESS_AFTER_S + view.timing.latency_s
         if settled and self._guessed != ids:
-            self._guessed = ids
-            place = self._likely_place(view)
-            made = view.map.formation
-            self._guess = made.slot(place, len(ids) + 1) if place is not None else None
+            self._guessed, self._guess = ids, self._likely_place(view)
         return self._guess
 
     def _likely_place(self, view: View) -> Place | None:
-        """Return the place that the own agent is likely to get, once the nearest lead."""
+        """Return the place that the own agent is likely to get.
+
+        A single vertex is led by the nearest; where there are several, the nearest of each would
+        leave long ways to the others, so the assignment gives them, too.
+        """
         team = [Peer(self._own_id, view.here, None)]
         team += [Peer(h.id, h.position, None) for h in view.around]
         team.sort()
         layout = view.map.formation.layout(len(team), view.blocked)
         places = list(layout.places)
-        for place in [p for p in layout.places if p in view.map.vertex_of]:
+        for place in view.map.vertex_places if view.map.vertices == 1 else ():
+            if place not in layout.slots:
+                continue
             point = view.frame.to_world(layout.slots[place].point)
             nearest = min(team, key=lambda peer: (dist(peer.position, point), peer.id))
             if nearest.id == self._own_id:

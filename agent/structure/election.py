@@ -1,5 +1,8 @@
 """Who leads a vertex: the nearest agent at first, the next of its queue when it falls silent.
 
+Of several vertices the nearest agents would leave long ways to the others. There the assignment
+over all agents finds the first leaders, where they hear each other.
+
 A leader stands in the vertex, and is the root of its tree (Sec. 3.1). Where an unidentified vehicle
 stands in the vertex, the leader leads from its own place in the queue (E18).
 """
@@ -7,7 +10,7 @@ stands in the vertex, the leader leads from its own place in the queue (E18).
 from math import inf
 
 from agent.controller import Heard
-from agent.messages import LeaderSummary, RootKey
+from agent.messages import LeaderSummary, Place, RootKey
 from agent.structure.claim import Claim
 from agent.structure.direct_rule import DirectRule
 from agent.structure.tree import Tree
@@ -15,6 +18,9 @@ from agent.structure.view import View, leads, queue_of
 
 ALONE_S = 1.5
 """Who hears no other agent listens so long before it leads: beacons may be on their way."""
+NEAREST, ASSIGNED = 2.0, 3.0
+"""Where there are several vertices the nearest leads only after so many times as long, and the
+assignment is asked for so many times as long."""
 MAX_COST_CM = 2**31 - 1
 TURN_S, TURN_LATENCIES, TURN_STEP_S = 1.3, 4.0, 0.5
 """How much longer agents of other queues wait for a shared vertex than those of the queue that has
@@ -39,12 +45,21 @@ class Election:
                 self._last[v] = summary
 
     def stand(
-        self, view: View, claim: Claim, trees: list[Tree], direct: DirectRule | None = None
+        self,
+        view: View,
+        claim: Claim,
+        trees: list[Tree],
+        direct: DirectRule | None = None,
+        likely: Place | None = None,
     ) -> bool:
-        """Take the lead of a vertex of the own queue that has no leader; return whether it did.
+        """Take the lead of a vertex that has no leader; return whether it did.
 
-        direct: given where it applies; then the assignment finds the successor.
+        direct: given where it applies; then the assignment finds the successor. likely: the place
+        that the assignment over all neighbours gives at first, where there are several vertices.
         """
+        since_s = view.now_s - self._started_s
+        if likely is not None and since_s < ASSIGNED * view.timing.listen_s:
+            return self._stand_as_assigned(view, claim, trees, likely)
         for v in view.map.vertices_of[claim.queue]:
             if (
                 trees[v].root is None
@@ -55,6 +70,21 @@ class Election:
                 return True
         return False
 
+    def _stand_as_assigned(
+        self, view: View, claim: Claim, trees: list[Tree], likely: Place
+    ) -> bool:
+        """Take the lead of a vertex without a leader that is the own likely place.
+
+        It may be of another queue: so a vertex that nobody starts near is not left to the last.
+        """
+        v = view.map.vertex_of.get(likely)
+        listened = view.now_s - self._started_s >= view.timing.listen_s
+        if v is None or not listened or trees[v].root is not None or self._is_led(view, v):
+            return False
+        claim.give_up(likely.queue, view.now_s)
+        self.lead(view, claim, trees[v], v)
+        return True
+
     def _is_led(self, view: View, vertex: int) -> bool:
         return any(h.standing is not None and h.standing.leads == vertex for h in view.heard)
 
@@ -64,6 +94,8 @@ class Election:
         now_s, timing = view.now_s, view.timing
         if claim.number < 1:
             listen_s = timing.listen_s if view.heard else ALONE_S
+            if view.map.vertices > 1:
+                listen_s *= NEAREST  # first those to whom the assignment gives a vertex
             ordered = claim.since_s > self._started_s + listen_s
             # Whoever was ordered here waits for others that were ordered at the same time.
             began_s = claim.since_s if ordered else self._started_s

@@ -244,7 +244,9 @@ class Structure:
     def _decide_as_member(self, view: View) -> None:
         claim = self.claim
         direct = self._direct if self._direct.applies else None
-        if self._election.stand(view, claim, self.trees, direct):
+        first = claim.number < 1 and self._map.vertices > 1
+        likely = self._direct.likely(view) if first else None
+        if self._election.stand(view, claim, self.trees, direct, likely):
             self._begin_to_lead(view)
         elif self._direct.applies:
             self._direct.choose(view, claim)

@@ -91,7 +91,7 @@ def test_a_leader_flies_to_its_vertex_at_once():
     flown = team(THREE, gather=True)
     flown.run(3.0)
     leaders = [member for member in flown.members.values() if member.leads]
-    flown.run(16.0)
+    flown.run(12.0)
     assert len(leaders) == 3
     for leader in leaders:
         assert dist(leader.at, THREE.vertex_points[THREE.vertex_of[leader.place]]) < 0.01

@@ -7,6 +7,8 @@ from random import Random
 import msgspec
 import pytest
 
+from agent.assignment.allocation import allocate
+from agent.controller import Peer
 from agent.messages import Place
 from tests.agent.structure.builders import LIBRARY, LINE, TWO, library, lines, rays
 from tests.agent.structure.team import Team
@@ -204,3 +206,27 @@ def test_a_leader_returns_to_its_vertex_once_the_body_has_left():
     assert flown.until_formed(40.0)
     check_stays(flown)
     assert [member.place for member in flown.members.values() if member.leads] == [Place(0, 0)]
+
+
+@pytest.mark.parametrize("name", ["figure-1a", "figure-1b", "three lines"])
+def test_where_all_hear_all_the_first_leaders_are_those_of_the_assignment(name):
+    """The nearest to each vertex would leave long ways to the others."""
+    flown = team(MAPS[name], 12, seed=3)
+    layout = flown.map.formation.layout(12)
+    slots = [layout.slots[place].point for place in layout.places]
+    peers = [Peer(k, member.at, None) for k, member in flown.members.items()]
+    best = allocate(peers, layout.places, slots)
+    flown.run(1.0)
+    leaders = {k: member.place for k, member in flown.members.items() if member.leads}
+    assert leaders == {k: place for k, place in best.items() if place in flown.map.vertex_of}
+    assert flown.until_formed(30.0)
+
+
+def test_a_vertex_whose_likely_leader_is_silent_gets_another_one():
+    """All heard it at first, so the assignment gave it the vertex; then it falls silent."""
+    flown = team(MAPS["figure-1b"], 9, seed=1)
+    flown.run(0.25)
+    far = min(flown.members.values(), key=lambda each: dist(each.at, (-5.0, 0.0, 0.0)))
+    del flown.members[far.id]
+    assert flown.until_formed(40.0)
+    check_stays(flown)
