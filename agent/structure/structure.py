@@ -46,8 +46,9 @@ from agent.structure.view import View
 DECISION_HZ = 10.0
 PATIENCE_S = 0.3
 """So long an agent without a number stays where it is: most have one by then, and need not turn."""
-CERTAIN_S = 1.0
-"""A leader leaves its vertex, or returns to it, once it has been taken, or free, for so long."""
+CERTAIN_S, CERTAIN_HOPS = 0.5, 2.0
+"""A leader leaves its vertex, or returns to it, once it has been taken, or free, for so long, and
+for as long as news of it takes over so many hops."""
 SETTLED_S = 1.0
 """So long an agent without a number looks each tick, for much is new to it."""
 FAR_M = 2.5
@@ -234,7 +235,7 @@ class Structure:
         # What is seen flickers while teams meet again; a leader that followed it would too.
         if self._misplaced_since_s is None:
             self._misplaced_since_s = view.now_s
-        elif view.now_s - self._misplaced_since_s >= CERTAIN_S:
+        elif view.now_s - self._misplaced_since_s >= CERTAIN_S + CERTAIN_HOPS * view.timing.hop_s:
             self._misplaced_since_s = None
             if taken:
                 self._numbers.take_first(view, claim)
