@@ -55,6 +55,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="X",
         help="simulated seconds per second (default: 1)",
     )
+    add(
+        "--on-overload",
+        choices=("go", "slow", "abort"),
+        default="go",
+        help="when ticks are late: go on and report it, slow simulated time down, or abort the run"
+        " (default: go)",
+    )
     add("--no-recording", action="store_true", help="write no run.rrd")
     return parser
 
@@ -74,7 +81,12 @@ def main(arguments: list[str] | None = None) -> int:
         options.connect,
         scenario,
         lambda: _directory(options, scenario),
-        RunOptions(options.run or scenario.name, options.speed, not options.no_recording),
+        RunOptions(
+            options.run or scenario.name,
+            options.speed,
+            not options.no_recording,
+            on_overload=options.on_overload,
+        ),
         lambda startup: ManualLink(startup.vanished),
     )
 

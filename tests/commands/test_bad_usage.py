@@ -51,6 +51,11 @@ BAD = [
     (("run", "small.toml", "--speed", "inf"), "--speed"),
     (("run", "small.toml", "--speed", "2", "--lockstep"), "cannot be combined with --lockstep"),
     (("run", "small.toml", "--shards", "2"), "needs --lockstep"),
+    (("run", "small.toml", "--on-overload", "stop"), "--on-overload: "),
+    (
+        ("run", "small.toml", "--on-overload", "slow", "--lockstep"),
+        "--on-overload: cannot be combined with --lockstep, in which no tick is late",
+    ),
     (("sim", "small.toml", "--out", "small.toml"), "small.toml: exists"),
     (("sim", "small.toml", "--out", "small.toml/x"), "cannot be created: not a directory"),
     (("run", "small.toml", "--out", "."), "exists; a run is never overwritten"),

@@ -72,6 +72,7 @@ def test_a_step_that_does_not_return_is_named_once(
     )
     found.look([1], 6.0)
     assert told == [found.failure]
+    assert (found.named(0), found.named(1)) == (False, True)
 
 
 def test_a_step_that_a_slow_host_may_delay_is_not_called_a_hang(

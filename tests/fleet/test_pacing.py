@@ -34,6 +34,23 @@ def test_the_pacer_catches_up_less_than_a_slot_and_skips_longer_stalls() -> None
     assert pacer.elapsed_s == pytest.approx(1.06)
 
 
+def test_a_change_of_pace_moves_no_slot_that_is_due_already() -> None:
+    clock = Clock()
+    pacer = Pacer(0.0125, clock)
+    pacer.start()
+    pacer.change(4, 0.05)
+    assert pacer.left_s(4) == pytest.approx(0.05)
+    assert pacer.left_s(5) == pytest.approx(0.1)
+    clock.now_s += 0.12
+    pacer.begin(5)  # 0.02 s late: caught up
+    pacer.change(6, 0.025)
+    assert pacer.left_s(6) == pytest.approx(0.03)
+    assert pacer.left_s(8) == pytest.approx(0.08)
+    clock.now_s += 1.08
+    pacer.begin(8)  # a stall of a second at the new pace
+    assert pacer.left_s(9) == pytest.approx(0.025)
+
+
 def test_a_tick_is_late_when_its_command_is_missing_at_the_next_observation() -> None:
     lateness = LatenessCounter(2)
     assert lateness.late_fraction is None

@@ -117,6 +117,7 @@ def test_a_run_passes_and_leaves_all_of_its_files(start: Start, scenario: Write,
     assert delivery["excess_ms"].keys() == {"p1", "p5", "p50", "p95", "p99", "max"}
     assert delivery["bound_ms"] == 62.5
     assert "extra delivery delay: " in fleet.text
+    assert summary["overload"] == {"policy": "go", "least_speed": 2.0}
     assert [row.alive for row in processes(run)] == [False] * 7
     none_left(pids(run))
 

@@ -56,6 +56,39 @@ def test_a_failing_controller_is_named_and_its_vehicle_hovers(start: Start, tmp_
     assert [(kill["kind"], kill["agent"], kill["status"]) for kill in kills] == [("kill", 2, 1)]
 
 
+SLOW = """
+import time
+from agent.guidance.flocking import Flocking
+
+
+class Slow(Flocking):
+    def decide(self, senses):
+        time.sleep(0.1)
+        return super().decide(senses)
+"""
+
+
+def test_an_overload_ends_the_run_in_order(start: Start, tmp_path: Path) -> None:
+    (tmp_path / "slow.py").write_text(SLOW)
+    run = tmp_path / "run"
+    slow = ("--set", "control.controller=slow:Slow", "--on-overload", "abort")
+    fleet = start(*QSWARM, "run", FLOCKING, "--out", str(run), *slow)
+    assert fleet.status(40.0) == 3, fleet.text
+    assert " % of the ticks in the last 2 s; the run ends (--on-overload abort); use " in fleet.text
+    summary = json.loads((run / "summary.json").read_text())
+    assert summary["outcome"] == "inconclusive"
+    assert summary["reason"].startswith("the controllers of agent-0, ")
+    assert " ms a step: overload (late: " in summary["reason"]
+    assert summary["overload"]["policy"] == "abort"
+    assert 0.0 < summary["duration_s"] < 10.0
+    from worldsim.recording.verify import verify  # noqa: PLC0415 - a second that other tests save
+
+    recorded = verify(run)
+    assert abs(recorded.ticks - 20.0 * summary["duration_s"]) <= 1.0
+    assert recorded.inconclusive == f"summary.json: {summary['reason']}"
+    assert not list(processes_of(fleet.process.pid))
+
+
 MIXED = """
 import os, signal, time
 from agent.guidance.flocking import Flocking

@@ -4,7 +4,7 @@ import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -96,6 +96,12 @@ Lockstep = Annotated[
         help="Synchronous: simulated time waits for every process; repeatable on any host.",
     ),
 ]
+OnOverload = Annotated[
+    Literal["go", "slow", "abort"],
+    typer.Option(
+        help="When ticks are late: go on and report it, slow simulated time down, or abort the run."
+    ),
+]
 Shards = Annotated[
     int,
     typer.Option(metavar="N", min=1, max=64, help="Number of radio processes (needs --lockstep)."),
@@ -161,11 +167,16 @@ def overrides_of(
     return overrides | {key: str(value) for key, value in options.items() if value is not None}
 
 
-def check_lockstep(lockstep: bool, speed: float, shards: int) -> None:
+def check_lockstep(lockstep: bool, speed: float, shards: int, on_overload: str) -> None:
     """Raise typer.BadParameter for options that --lockstep excludes, or that need it."""
     if lockstep and speed != 1.0:
         raise typer.BadParameter(
             "cannot be combined with --lockstep, which has no fixed speed", param_hint="--speed"
+        )
+    if lockstep and on_overload != "go":
+        raise typer.BadParameter(
+            "cannot be combined with --lockstep, in which no tick is late",
+            param_hint="--on-overload",
         )
     if shards > 1 and not lockstep:
         raise typer.BadParameter("needs --lockstep", param_hint="--shards")

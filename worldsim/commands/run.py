@@ -12,6 +12,7 @@ from worldsim.commands.options import (
     List,
     Lockstep,
     NoRecording,
+    OnOverload,
     Out,
     ScenarioFile,
     ScenarioFiles,
@@ -34,6 +35,7 @@ commands = typer.Typer()
         "qswarm run wedge-9",
         "qswarm run wedge-9 --seed 7 --set netem.loss_percent=50",
         "qswarm run my.toml --agents 20 --duration 40 --speed 2",
+        "qswarm run wedge-9 --agents 80 --on-overload slow",
         "qswarm run wedge-9 --lockstep",
         "qswarm run --list",
     )
@@ -46,6 +48,7 @@ def run(
         float,
         typer.Option(metavar="X", help="Simulated seconds in a second of wall time.", min=0.01),
     ] = 1.0,
+    on_overload: OnOverload = "go",
     lockstep: Lockstep = False,
     shards: Shards = 1,
     duration: Duration = None,
@@ -65,13 +68,15 @@ def run(
 
     if not isfinite(speed):
         raise typer.BadParameter(f"{speed}; a number from 0.01", param_hint="--speed")
-    check_lockstep(lockstep, speed, shards)
+    check_lockstep(lockstep, speed, shards, on_overload)
     overrides = overrides_of(settings, agents, seed, duration)
     command_ticks = VIRTUAL_COMMAND_TICKS if lockstep else PROCESS_COMMAND_TICKS
     loaded = load_scenario(scenario, overrides, command_ticks)
     warn(scenario, loaded)
     directory = RunDirectory.create(out, loaded)
-    terms = RunOptions(loaded.name, speed, not no_recording, lockstep, shards)
+    terms = RunOptions(
+        loaded.name, speed, not no_recording, lockstep, shards, on_overload=on_overload
+    )
     return run_processes(loaded, directory, terms)
 
 

@@ -38,7 +38,7 @@ def _in_words(error: typer.BadParameter) -> str:
     cause: Any = error.__cause__
     problem = cause.errors()[0] if hasattr(cause, "errors") else None
     if problem is None or problem["type"] not in NEEDED:
-        return error.message
+        return error.message.removeprefix("Value error, ")
     given = repr(problem["input"]) if "parsing" in problem["type"] else str(problem["input"])
     needed = NEEDED[problem["type"]].format(**problem.get("ctx", {}))
     return f"got {given[:MAX_SHOWN]}; {needed}"

@@ -106,6 +106,10 @@ class Culprits:
         if process_exit.status is not None or process_exit.signal in CRASH_SIGNALS:
             self._ends.append(f"{agent_name(agent)} {process_exit} at {time_s:.1f} s")
 
+    def named(self, agent: int) -> bool:
+        """Return whether an agent itself is at fault: it hangs, or was stopped."""
+        return agent in self._hangs or agent_name(agent) in self._stops
+
     @property
     def failure(self) -> str | None:
         """Which agents have ended by themselves, or have not returned; None: none."""

@@ -34,12 +34,14 @@ from worldsim.fleet.culprits import Culprits
 from worldsim.fleet.delivery_latency import DeliveryLatency, LatencyCollector
 from worldsim.fleet.ipc import AgentProcess
 from worldsim.fleet.launcher_link import LauncherLink
+from worldsim.fleet.overload import Overload
 from worldsim.fleet.pacing import LatenessCounter, Pacer
 from worldsim.fleet.progress import ProgressReporter
 from worldsim.fleet.startup import Startup
 from worldsim.judge.event import By
 from worldsim.judge.run_events import LateStart
 from worldsim.judge.tick import Packets
+from worldsim.results.summary import OverloadRow
 from worldsim.scenario.tables import Scenario
 
 START_WITHIN_S = 5.0
@@ -60,17 +62,20 @@ class FreeRunningFleet:
         recorder: Recorder,
         launcher: LauncherLink,
         startup: Startup,
-        speed: float,
+        overload: Overload,
     ) -> None:
+        speed = overload.requested
         rows = range(scenario.rows)
         self.loop = SlotLoop(
             scenario, world_of(scenario, PROCESS_COMMAND_TICKS), recorder, self._packets
         )
         self.medium_counters: MediumCounters | None = None
         self.lateness = LatenessCounter(len(rows))
+        self.overload = overload
         self.real_time_factor: float | None = None
         self._culprits = Culprits(launcher.steps, launcher.report_notice, speed)
         self._late_agents: list[int] = []
+        self._ticks_seen = 0
         self._scenario = scenario
         self._launcher = launcher
         self._startup = startup
@@ -108,6 +113,19 @@ class FreeRunningFleet:
         return self._culprits.stop or self._culprits.slow(ticks)
 
     @property
+    def ended_by(self) -> str | None:
+        """Why the fleet itself ended the run before its time: an overload. None: it did not."""
+        reason = self.overload.abort_reason
+        if reason is None or self.late_because is None:
+            return reason
+        return f"{self.late_because}: {reason}"
+
+    @property
+    def overload_row(self) -> OverloadRow:
+        """What the summary says of overload."""
+        return {"policy": self.overload.policy, "least_speed": self.overload.least_speed}
+
+    @property
     def delivery(self) -> DeliveryLatency | None:
         """How late frames arrived, from the agents' counts; None without a frame."""
         delivered = (
@@ -128,7 +146,7 @@ class FreeRunningFleet:
         self._pacer.start()
         self.begun = True
         slots, world = self._scenario.slots, self.loop.world
-        while world.slot < slots and not should_stop():
+        while world.slot < slots and not should_stop() and self.overload.abort_reason is None:
             self._slot(should_stop)
         self.real_time_factor = world.time_s / max(self._pacer.elapsed_s, 1e-9)
         self.land()
@@ -166,7 +184,7 @@ class FreeRunningFleet:
         self._send(self.loop.open())
         self._handle_exits()
         self._culprits.look(self._late_agents, self.loop.world.time_s)
-        self._late_agents.clear()
+        self._note_late_ticks(slot)
         while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not should_stop():
             self._launcher.wait(min(left_s, POLL_S))
             self._handle_exits()
@@ -181,7 +199,20 @@ class FreeRunningFleet:
         ):
             self._read_arrivals(agent)
         self.loop.close(b"")
-        self._progress_reporter.report(self._pacer.elapsed_s, self.late_fraction)
+        slowed_to = self.overload.speed if self.overload.slowed else None
+        self._progress_reporter.report(self._pacer.elapsed_s, self.late_fraction, slowed_to)
+
+    def _note_late_ticks(self, slot: int) -> None:
+        """Follow the overload; an agent that hangs or was stopped tells nothing of the host."""
+        late = sum(not self._culprits.named(agent) for agent in self._late_agents)
+        self._late_agents.clear()
+        ticks, self._ticks_seen = self.lateness.ticks - self._ticks_seen, self.lateness.ticks
+        before = self.overload.speed
+        report = self.overload.note(self._pacer.elapsed_s, ticks, late)
+        if report is not None:
+            self._launcher.report_notice(report)
+        if self.overload.speed != before:
+            self._pacer.change(slot, 1.0 / (self._scenario.slot_hz * self.overload.speed))
 
     def _carry_out(self, operation: Operation, by: By = None) -> None:
         """Carry out an operation between slots, and apply it to the world at once."""

@@ -99,13 +99,15 @@ class Progress(Message, frozen=True):
     in_place: int  # number of agents within 0.12 m of their slots
     min_separation_m: float | None  # least separation so far [m]; None before the first tick
     late_fraction: float | None  # share of late ticks; None where there are none
+    slowed_to: float | None = None  # speed of simulated time, while below the requested one
 
     def __str__(self) -> str:
         separation = "-" if self.min_separation_m is None else f"{self.min_separation_m:.2f} m"
         late = "-" if self.late_fraction is None else f"{self.late_fraction:.1%}"
+        slowed = "" if self.slowed_to is None else f"   slowed to {self.slowed_to:.2f} x"
         return (
             f"{self.time_s:6.1f} of {self.duration_s:g} s   in place {self.in_place}/{self.agents}"
-            f"   least separation {separation}   late ticks {late}"
+            f"   least separation {separation}   late ticks {late}{slowed}"
         )
 
 

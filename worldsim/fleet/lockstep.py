@@ -62,6 +62,8 @@ class LockstepFleet:
 
     late_fraction: float | None = None
     late_because: None = None
+    overload_row: None = None
+    ended_by: None = None
     delivery: None = None
     rejected: Mapping[str, int] = {}
     """Always empty: a message that the world rejects ends the run."""

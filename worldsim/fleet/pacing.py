@@ -7,7 +7,7 @@ from agent.messages import Command
 
 
 class Pacer:
-    """Paces slots on the wall clock: slot k is due at epoch + k * slot_s.
+    """Paces slots on the wall clock: they are due slot_s apart, from an epoch on.
 
     When the host stalls for more than a slot, the epoch moves: missed slots are not caught up in a
     burst, and simulated time stands still meanwhile.
@@ -16,6 +16,7 @@ class Pacer:
     def __init__(self, slot_s: float, clock: Callable[[], float] = time.monotonic) -> None:
         self._slot_s = slot_s
         self._clock = clock
+        self._epoch_slot = 0
         self._started_s = self._epoch_s = clock()
 
     def start(self) -> None:
@@ -29,7 +30,7 @@ class Pacer:
 
     def left_s(self, slot: int) -> float:
         """Return the wall time until a slot is due [s]; negative when it is overdue."""
-        return self._epoch_s + slot * self._slot_s - self._clock()
+        return self._epoch_s + (slot - self._epoch_slot) * self._slot_s - self._clock()
 
     def begin(self, slot: int) -> None:
         """Note that a slot begins now."""
@@ -37,13 +38,19 @@ class Pacer:
         if late_s > self._slot_s:
             self._epoch_s += late_s
 
+    def change(self, slot: int, slot_s: float) -> None:
+        """Make the slots after ``slot`` due ``slot_s`` apart; ``slot`` is due as before."""
+        self._epoch_s += (slot - self._epoch_slot) * self._slot_s
+        self._epoch_slot, self._slot_s = slot, slot_s
+
 
 class LatenessCounter:
     """Counts late ticks: the command had not arrived by the agent's next slot."""
 
     def __init__(self, agents: int) -> None:
         self._observed_slot: list[int | None] = [None] * agents
-        self._ticks = 0
+        self.ticks = 0
+        """Number of ticks whose command was expected, in time or late."""
         self._late = 0
 
     def observe(self, agent: int, slot: int, latest: Command | None) -> bool:
@@ -56,7 +63,7 @@ class LatenessCounter:
         if observed_slot is None:
             return False
         late = latest is None or latest.slot < observed_slot
-        self._ticks += 1
+        self.ticks += 1
         self._late += late
         return late
 
@@ -68,4 +75,4 @@ class LatenessCounter:
     @property
     def late_fraction(self) -> float | None:
         """Share of late ticks; None before the first tick."""
-        return self._late / self._ticks if self._ticks else None
+        return self._late / self.ticks if self.ticks else None

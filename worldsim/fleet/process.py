@@ -17,6 +17,7 @@ from netem.wire.shutdown import StopRequest
 from worldsim.fleet.free_running import FreeRunningFleet
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.lockstep import LockstepFleet
+from worldsim.fleet.overload import OnOverload, Overload
 from worldsim.fleet.startup import Startup, StartupError, assemble
 from worldsim.results.exit_status import BAD_INPUT, EXIT_STATUS, INCONCLUSIVE
 from worldsim.results.run_folder import RunDirectory, RunDirectoryError, RunWriteError
@@ -34,6 +35,7 @@ class RunOptions(NamedTuple):
     lockstep: bool = False  # simulated time waits for every process
     shards: int = 1  # number of mediums that share the agents
     users: Path | None = None  # file of passwords, where the router requires one
+    on_overload: OnOverload = "go"  # what is done when ticks are late; not in lockstep
 
     @property
     def mode(self) -> Mode:
@@ -93,7 +95,7 @@ def conduct(
         fleet.land()
         sinks.close()
         launcher.wait(0.0)  # reads the reason that the launcher sends before its SIGTERM
-        ended_by = None if complete else launcher.stop_reason or "interrupted"
+        ended_by = None if complete else launcher.stop_reason or fleet.ended_by or "interrupted"
         summary = summarise(scenario, _finished(fleet, options.mode, ended_by))
         if fleet.begun:
             summary = directory.write_summary(summary)
@@ -116,7 +118,8 @@ def _fleet(
 ) -> FreeRunningFleet | LockstepFleet:
     if options.lockstep:
         return LockstepFleet(scenario, bus, sinks, launcher, startup, options.shards)
-    return FreeRunningFleet(scenario, bus, sinks, launcher, startup, options.speed)
+    overload = Overload(options.speed, options.on_overload)
+    return FreeRunningFleet(scenario, bus, sinks, launcher, startup, overload)
 
 
 def _lateness(medium_counters: MediumCounters | None) -> str:
@@ -138,6 +141,7 @@ def _finished(
         medium_counters=fleet.medium_counters,
         late_tick_fraction=fleet.late_fraction,
         late_because=fleet.late_because,
+        overload=fleet.overload_row,
         real_time_factor=fleet.real_time_factor,
         cut_off_by=cut_off_by,
         failure=fleet.failure,

@@ -20,16 +20,19 @@ class ProgressReporter:
         self._launcher = launcher
         self._report_at_s = 0.0
 
-    def report(self, elapsed_s: float, late_fraction: float | None) -> None:
+    def report(
+        self, elapsed_s: float, late_fraction: float | None, slowed_to: float | None = None
+    ) -> None:
         """Report progress if it is due at ``elapsed_s``, the wall time since the start [s].
 
-        late_fraction: share of late ticks; None under a clock that has none.
+        late_fraction: share of late ticks; None under a clock that has none. slowed_to: speed of
+        simulated time while it is below the requested one.
         """
         if elapsed_s >= self._report_at_s:
             self._report_at_s = elapsed_s + REPORT_EVERY_S
-            self._launcher.report_progress(self._progress(late_fraction))
+            self._launcher.report_progress(self._progress(late_fraction, slowed_to))
 
-    def _progress(self, late_fraction: float | None) -> Progress:
+    def _progress(self, late_fraction: float | None, slowed_to: float | None) -> Progress:
         figures = self._loop.figures
         in_place = int(np.sum(figures.slot_error <= CONVERGED_M)) if figures is not None else 0
         return Progress(
@@ -39,6 +42,7 @@ class ProgressReporter:
             in_place,
             self._loop.judge.min_separation_m,
             late_fraction,
+            slowed_to,
         )
 
 

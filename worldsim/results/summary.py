@@ -69,6 +69,7 @@ class FinishedRun:
     cut_off_by: str | None = None  # what ended the run before its time; None: it is complete
     failure: str | None = None  # an error during the run
     late_because: str | None = None  # the process that made ticks late, if not the host
+    overload: "OverloadRow | None" = None  # None under a clock where no tick can be late
     rejected_by_world: Mapping[str, int] = field(default_factory=dict)  # messages by cause
     delivery: "DeliveryRow | None" = None  # of frames that agents used
 
@@ -124,6 +125,13 @@ class DeliveryRow(ChannelDeliveryRow):
     channels: dict[str, ChannelDeliveryRow | None]
 
 
+class OverloadRow(TypedDict):
+    """What was to be done when ticks are late, and what was done."""
+
+    policy: Literal["go", "slow", "abort"]  # as in --on-overload
+    least_speed: float  # simulated seconds in a second of wall time; as requested: never slowed
+
+
 class Summary(Provenance):
     """The content of summary.json; None for what was not measured."""
 
@@ -154,6 +162,7 @@ class Summary(Provenance):
     delivery_late_ms: dict[str, float] | None  # how late the radio's batches left
     late_tick_fraction: float | None
     real_time_factor: float | None
+    overload: OverloadRow | None
     trace_sha256: str | None
 
 
@@ -196,6 +205,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "delivery_late_ms": _delivery_late_ms(counters),
         "late_tick_fraction": run.late_tick_fraction,
         "real_time_factor": run.real_time_factor,
+        "overload": run.overload,
         "trace_sha256": None if run.mode == "processes" else run.loop.trace.sha256,
         **provenance(),
     }
