@@ -118,6 +118,11 @@ def test_a_run_passes_and_leaves_all_of_its_files(start: Start, scenario: Write,
     assert delivery["bound_ms"] == 62.5
     assert "extra delivery delay: " in fleet.text
     assert summary["overload"] == {"policy": "go", "least_speed": 2.0}
+    resources = summary["resources"]
+    assert resources["agent_steps"] == 4 * 6 * 20
+    assert min(resources["cpu_us_per_agent_step"].values()) > 0.0
+    assert 0.0 < resources["start_up_s"] < 30.0
+    assert 0.5 < resources["agent_private_mb"] < 100.0
     assert [row.alive for row in processes(run)] == [False] * 7
     none_left(pids(run))
 

@@ -31,7 +31,7 @@ KEYS = {
         "turns_over_limit_fraction",
     ),
     *("packets", "invariants", "late_tick_fraction", "real_time_factor", "trace_sha256"),
-    "overload",
+    *("overload", "resources"),
     *("direct_links", "needed_links", "bytes_per_s"),
     *("version", "commit", "commit_dirty", "python", "packages", "host"),
 }

@@ -4,17 +4,15 @@ Agents note their steps in a shared page; /proc says what a process does. Where 
 started by hand there is no page, and nobody is named.
 """
 
-import os
-import re
 import signal
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 from agent.step_page import StepPage, StepTimes
 from netem.wire.keys import agent_name, medium_name
 from worldsim.fleet.fork import ProcessExit
+from worldsim.fleet.process_state import ProcessState, process_state
 
 HANG_S = 1.0
 """A step hangs that has used this CPU time, or that sleeps and has lasted this wall time."""
@@ -30,10 +28,6 @@ CRASH_SIGNALS = frozenset(
 """Signals that a process gets for its own errors."""
 MAX_NAMED = 5
 LARGE_B = 1024**3
-
-_SWITCHES = re.compile(r"ctxt_switches:\s+(\d+)")
-_PAGE_B = os.sysconf("SC_PAGE_SIZE")
-_CLOCK_HZ = os.sysconf("SC_CLK_TCK")
 
 
 class SharedSteps(NamedTuple):
@@ -55,16 +49,6 @@ class SharedSteps(NamedTuple):
     def medium_pid(self, shard: int) -> int:
         """Return the process of a medium; 0 before it is noted."""
         return self.page.read(self.agents + shard).pid
-
-
-class _Process(NamedTuple):
-    """What /proc says of a process."""
-
-    stopped: bool
-    waits: bool  # for anything but a core or the disk
-    cpu_s: float
-    resident_b: int
-    switches: int  # how often it was given a core
 
 
 class Culprits:
@@ -90,10 +74,12 @@ class Culprits:
         if self._steps is None or not late:
             return
         for shard in range(self._steps.mediums):
-            self._note_stop(medium_name(shard), _process(self._steps.medium_pid(shard)), time_s)
+            self._note_stop(
+                medium_name(shard), process_state(self._steps.medium_pid(shard)), time_s
+            )
         for agent in late:
             times = self._steps.page.read(agent)
-            process = _process(times.pid)
+            process = process_state(times.pid)
             self._note_stop(agent_name(agent), process, time_s)
             if process is not None and not process.stopped:
                 self._note_hang(agent, times, process, time_s)
@@ -134,12 +120,14 @@ class Culprits:
         more = f" and {len(slow) - MAX_NAMED} more" if len(slow) > MAX_NAMED else ""
         return f"the controllers of {names}{more} took {mean_ms:.0f} ms a step"
 
-    def _note_stop(self, name: str, process: _Process | None, time_s: float) -> None:
+    def _note_stop(self, name: str, process: ProcessState | None, time_s: float) -> None:
         if process is not None and process.stopped and name not in self._stops:
             self._stops[name] = f"{name} was stopped by a signal at {time_s:.1f} s"
             self._report(self._stops[name])
 
-    def _note_hang(self, agent: int, times: StepTimes, process: _Process, time_s: float) -> None:
+    def _note_hang(
+        self, agent: int, times: StepTimes, process: ProcessState, time_s: float
+    ) -> None:
         if times.entered_s is None or agent in self._hangs:
             return
         lasts_s = time.monotonic() - times.entered_s
@@ -155,7 +143,7 @@ class Culprits:
         self._report(self._hangs[agent])
 
     def _hang_in_words(
-        self, agent: int, lasts_s: float, cpu_s: float, process: _Process
+        self, agent: int, lasts_s: float, cpu_s: float, process: ProcessState
     ) -> str | None:
         """Return what a step does that hangs; None for one that a slow host may delay."""
         if cpu_s > HANG_S:
@@ -166,7 +154,7 @@ class Culprits:
             return "it is blocked"
         return "it computes and waits in turn" if lasts_s > LONG_HANG_S else None
 
-    def _asleep(self, agent: int, process: _Process) -> bool:
+    def _asleep(self, agent: int, process: ProcessState) -> bool:
         """Return whether a process has waited without a break for ASLEEP_S."""
         now_s = time.monotonic()
         switches, since_s = self._asleep_since.get(agent, (-1, now_s))
@@ -174,19 +162,3 @@ class Culprits:
             self._asleep_since[agent] = (process.switches, now_s)
             return False
         return now_s - since_s >= ASLEEP_S
-
-
-def _process(pid: int) -> _Process | None:
-    """Return what a process does; None for none."""
-    if not pid:
-        return None
-    try:
-        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
-        status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
-    except OSError:
-        return None
-    switches = sum(map(int, _SWITCHES.findall(status)))
-    state, *fields = stat.rpartition(")")[2].split()
-    cpu_s = (int(fields[10]) + int(fields[11])) / _CLOCK_HZ
-    resident_b = int(fields[20]) * _PAGE_B
-    return _Process(state in "Tt", state == "S", cpu_s, resident_b, switches)

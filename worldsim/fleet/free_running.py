@@ -37,6 +37,7 @@ from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.overload import Overload
 from worldsim.fleet.pacing import LatenessCounter, Pacer
 from worldsim.fleet.progress import ProgressReporter
+from worldsim.fleet.resources import ResourceMeter
 from worldsim.fleet.startup import Startup
 from worldsim.judge.event import By
 from worldsim.judge.run_events import LateStart
@@ -73,6 +74,8 @@ class FreeRunningFleet:
         self.lateness = LatenessCounter(len(rows))
         self.overload = overload
         self.real_time_factor: float | None = None
+        self.resources = ResourceMeter(launcher.steps)
+        self._agent_steps = 0
         self._culprits = Culprits(launcher.steps, launcher.report_notice, speed)
         self._late_agents: list[int] = []
         self._ticks_seen = 0
@@ -143,12 +146,14 @@ class FreeRunningFleet:
 
     def fly(self, should_stop: Callable[[], bool]) -> bool:
         """Run the scenario's slots, at most until ``should_stop``; return whether all were run."""
+        self.resources.begin()
         self._pacer.start()
         self.begun = True
         slots, world = self._scenario.slots, self.loop.world
         while world.slot < slots and not should_stop() and self.overload.abort_reason is None:
             self._slot(should_stop)
         self.real_time_factor = world.time_s / max(self._pacer.elapsed_s, 1e-9)
+        self.resources.end(self._agent_steps)
         self.land()
         self.loop.finish()
         return world.slot == slots
@@ -235,6 +240,7 @@ class FreeRunningFleet:
             incarnations=incarnations,
         )
         self._truth(pack(truth))
+        self._agent_steps += len(opened.observations)
         for agent, observation in opened.observations:
             self._observers[agent](encode(observation))
             if self.lateness.observe(agent, opened.slot, self.loop.world.latest[agent]):

@@ -7,6 +7,7 @@ zygote forks the agents. An exit is what waitpid reports, to the launcher or to 
 import json
 import signal
 import socket
+import time
 from functools import partial
 
 from netem import process as netem_process
@@ -53,13 +54,16 @@ def run(scenario: Scenario, directory: RunDirectory, options: RunOptions) -> int
     No process is left behind, also after Ctrl-C, SIGTERM and SIGHUP. Raises RunDirectoryError where
     the host allows too few files.
     """
+    launched_s = time.monotonic()
     problem = descriptors_problem(scenario.rows + OTHER_DESCRIPTORS)
     if problem is not None:
         directory.remove_results()
         raise RunDirectoryError(directory.path, problem)
     interrupt_on_signals()
     adopt_orphans()
-    launcher = Launcher(scenario, directory, options._replace(users=directory.users))
+    launcher = Launcher(
+        scenario, directory, options._replace(users=directory.users, launched_s=launched_s)
+    )
     try:
         launcher.fly()
         status = launcher.conclude()

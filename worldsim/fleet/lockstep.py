@@ -49,6 +49,7 @@ from worldsim.fleet.culprits import Culprits
 from worldsim.fleet.ipc import AgentProcess, ProcessAction, names_of
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.progress import ProgressReporter, StallReporter
+from worldsim.fleet.resources import ResourceMeter
 from worldsim.fleet.startup import Startup
 from worldsim.judge.event import By
 from worldsim.judge.tick import Packets
@@ -83,6 +84,8 @@ class LockstepFleet:
         )
         self.medium_counters: MediumCounters | None = None
         self.real_time_factor: float | None = None
+        self.resources = ResourceMeter(launcher.steps)
+        self._agent_steps = 0
         self.failure: str | None = None
         self._culprits = Culprits(launcher.steps, launcher.report_notice, speed=0.0)
         self.begun = self._landed = False
@@ -108,6 +111,7 @@ class LockstepFleet:
         An error in between ends the run, and becomes its ``failure``.
         """
         self._should_stop = should_stop
+        self.resources.begin()
         self.begun = True
         begun_s = time.perf_counter()
         try:
@@ -124,6 +128,7 @@ class LockstepFleet:
         self.failure = self._launcher_failure()
         time_s = self.loop.world.time_s
         self.real_time_factor = time_s / max(time.perf_counter() - begun_s, 1e-9)
+        self.resources.end(self._agent_steps)
         self.land()
         self.loop.finish()
         return self.loop.world.slot == self._slots
@@ -143,6 +148,7 @@ class LockstepFleet:
         self._check_exits()
         opened = self.loop.open()
         self._stepping = [agent for agent, _ in opened.observations]
+        self._agent_steps += len(self._stepping)
         self._send(opened)
         for agent, _ in opened.observations:
             self._await_command(agent, opened.slot)

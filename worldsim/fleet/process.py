@@ -1,6 +1,7 @@
 """The world as a process: it waits for a fleet of real processes, runs it, and judges it."""
 
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -36,6 +37,7 @@ class RunOptions(NamedTuple):
     shards: int = 1  # number of mediums that share the agents
     users: Path | None = None  # file of passwords, where the router requires one
     on_overload: OnOverload = "go"  # what is done when ticks are late; not in lockstep
+    launched_s: float | None = None  # when the launcher started [s; monotonic clock], if one did
 
     @property
     def mode(self) -> Mode:
@@ -83,20 +85,21 @@ def conduct(
     launcher = link_of(startup)
     sinks = open_sinks(directory, scenario, directory.path.name, options.mode, options.recording)
     fleet = _fleet(scenario, bus, sinks, launcher, startup, options)
-    complete = False
+    complete, up_s = False, None
 
     def should_stop() -> bool:
         return stop.requested or launcher.stop_reason is not None
 
     try:
         present = assemble(startup, options.speed, should_stop, launcher)
+        up_s = time.monotonic()
         complete = present and fleet.fly(should_stop)
     finally:
         fleet.land()
         sinks.close()
         launcher.wait(0.0)  # reads the reason that the launcher sends before its SIGTERM
         ended_by = None if complete else launcher.stop_reason or fleet.ended_by or "interrupted"
-        summary = summarise(scenario, _finished(fleet, options.mode, ended_by))
+        summary = summarise(scenario, _finished(fleet, options, ended_by, up_s))
         if fleet.begun:
             summary = directory.write_summary(summary)
         else:
@@ -133,15 +136,23 @@ def _lateness(medium_counters: MediumCounters | None) -> str:
 
 
 def _finished(
-    fleet: FreeRunningFleet | LockstepFleet, mode: Mode, cut_off_by: str | None
+    fleet: FreeRunningFleet | LockstepFleet,
+    options: RunOptions,
+    cut_off_by: str | None,
+    up_s: float | None,
 ) -> FinishedRun:
+    """Return the run for its summary. up_s: when all were present [s; monotonic clock]."""
+    resources = fleet.resources.row
+    if resources is not None and up_s is not None and options.launched_s is not None:
+        resources = {**resources, "start_up_s": up_s - options.launched_s}
     return FinishedRun(
-        mode=mode,
+        mode=options.mode,
         loop=fleet.loop,
         medium_counters=fleet.medium_counters,
         late_tick_fraction=fleet.late_fraction,
         late_because=fleet.late_because,
         overload=fleet.overload_row,
+        resources=resources,
         real_time_factor=fleet.real_time_factor,
         cut_off_by=cut_off_by,
         failure=fleet.failure,

@@ -70,6 +70,7 @@ class FinishedRun:
     failure: str | None = None  # an error during the run
     late_because: str | None = None  # the process that made ticks late, if not the host
     overload: "OverloadRow | None" = None  # None under a clock where no tick can be late
+    resources: "ResourcesRow | None" = None  # of the processes of a launched fleet
     rejected_by_world: Mapping[str, int] = field(default_factory=dict)  # messages by cause
     delivery: "DeliveryRow | None" = None  # of frames that agents used
 
@@ -132,6 +133,15 @@ class OverloadRow(TypedDict):
     least_speed: float  # simulated seconds in a second of wall time; as requested: never slowed
 
 
+class ResourcesRow(TypedDict):
+    """What the processes of a launched fleet used."""
+
+    start_up_s: float | None  # wall time from the launcher's start until all were present
+    agent_steps: int  # how often an agent was to step
+    cpu_us_per_agent_step: dict[str, float]  # by part, without the start: agents, netem, world
+    agent_private_mb: float | None  # memory shared with no other process, the median agent
+
+
 class Summary(Provenance):
     """The content of summary.json; None for what was not measured."""
 
@@ -163,6 +173,7 @@ class Summary(Provenance):
     late_tick_fraction: float | None
     real_time_factor: float | None
     overload: OverloadRow | None
+    resources: ResourcesRow | None
     trace_sha256: str | None
 
 
@@ -206,6 +217,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "late_tick_fraction": run.late_tick_fraction,
         "real_time_factor": run.real_time_factor,
         "overload": run.overload,
+        "resources": run.resources,
         "trace_sha256": None if run.mode == "processes" else run.loop.trace.sha256,
         **provenance(),
     }
