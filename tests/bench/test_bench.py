@@ -1,31 +1,72 @@
 """The benchmark: every row is measured, the best repeat counts, and goals are bounds."""
 
 import json
+import signal
+import sys
 
 import pytest
 
 from worldsim.bench import table
 from worldsim.bench.fleets import wedge
+from worldsim.bench.measures import InvalidFigureError, Measure, Row, chosen, measured_row
 from worldsim.bench.part_costs import control_step_us, frame_us
 from worldsim.bench.recording_cost import recording_mb, recording_us
-from worldsim.bench.table import MEASURES, Row, measured
+from worldsim.bench.table import MEASURES
 from worldsim.bench.team_growth import agent_cost
+from worldsim.bench.ticking import ticking
 from worldsim.commands.app import command
 
 
 @pytest.fixture
 def quick(monkeypatch):
-    """Two measures that take no time: each repeat returns the next number."""
-    slower, faster = iter([3.0, 1.0, 2.0]), iter([30.0, 60.0, 40.0])
-    rows = (
-        ("less", "us", 2.0, False, lambda: next(slower)),
-        ("more", "x", 70.0, True, lambda: next(faster)),
-    )
-    monkeypatch.setattr(table, "MEASURES", rows)
+    """Set the figures of two measures that take no time: each call returns the next one."""
+
+    def become(less, more):
+        least, most = iter(less), iter(more)
+        rows = (
+            Measure("less", "us", 2.0, False, lambda: next(least)),
+            Measure("more", "x", 70.0, True, lambda: next(most)),
+        )
+        monkeypatch.setattr(table, "MEASURES", rows)
+
+    become([3.0, 1.0, 2.0], [30.0, 60.0, 40.0])
+    return become
 
 
 def test_the_best_of_the_repeats_counts(quick):
-    assert [(row.measured, row.reached) for row in measured(3)] == [(1.0, True), (60.0, False)]
+    rows = [measured_row(measure, 3) for measure in table.MEASURES]
+    assert [(row.measured, row.reached) for row in rows] == [(1.0, True), (60.0, False)]
+
+
+def test_a_measurement_that_proves_nothing_has_no_figure():
+    def never():
+        raise InvalidFigureError("not converged")
+
+    row = measured_row(Measure("x", "us", None, False, never), 3)
+    assert (row.measured, row.invalid, row.reached) == (None, "not converged", False)
+
+
+def test_rows_are_chosen_by_name_in_their_order():
+    measures = [Measure(name, "us", None, False, float) for name in ("step, N = 9", "frame", "end")]
+
+    def names(*patterns):
+        return [measure.name for measure in chosen(measures, patterns)]
+
+    assert names() == ["step, N = 9", "frame", "end"]
+    assert names("end", "STEP*") == ["step, N = 9", "end"]
+    assert names("e*", "*e*") == ["step, N = 9", "frame", "end"]
+    with pytest.raises(LookupError, match="ste"):
+        names("end", "ste")
+
+
+def test_progress_is_called_while_code_runs_and_not_after_it():
+    calls = []
+    with ticking(lambda: calls.append(len(calls)), every_s=0.001):
+        while len(calls) < 3:
+            sum(range(1000))
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+    assert signal.getsignal(signal.SIGALRM) == signal.SIG_DFL
+    assert calls[:3] == [0, 1, 2]
 
 
 @pytest.mark.parametrize(
@@ -83,8 +124,58 @@ def test_the_command_prints_each_row_and_overwrites_nothing(quick, capsys, tmp_p
     file = tmp_path / "speed.json"
     assert command(["bench", "--repeats", "3", "--json", str(file)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == ["less", "more"]
-    assert lines[1].endswith("not reached")
+    assert [line.split()[0] for line in lines] == ["code:", "less", "more"]
+    assert lines[2].endswith("not reached")
     assert [row["measured"] for row in json.loads(file.read_text())["rows"]] == [1.0, 60.0]
-    assert command(["bench", "--json", str(file)]) == 2
-    assert "speed.json" in capsys.readouterr().err
+    assert command(["bench", "--save", str(file)]) == 2
+    assert "speed.json: exists" in capsys.readouterr().err
+
+
+def test_the_command_compares_with_saved_figures(quick, capsys, tmp_path):
+    file = str(tmp_path / "before.json")
+    assert command(["bench", "--repeats", "1", "--save", file]) == 0
+    quick([3.6], [30.0])
+    capsys.readouterr()
+    assert command(["bench", "--repeats", "1", "--against", file]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "1.20 x 3  WORSE" in lines[1]
+    assert "1.00 x 30 " in lines[2]
+    assert lines[3] == f"against {file}: 2 compared, 1 worse by more than 10 %: less"
+
+
+@pytest.mark.parametrize(("most", "status"), [("19", 1), ("20", 0), ("30", 0)])
+def test_a_slowdown_fails_the_command_only_where_asked(quick, tmp_path, most, status):
+    file = str(tmp_path / "before.json")
+    quick([3.0], [36.0])
+    assert command(["bench", "--repeats", "1", "--save", file]) == 0
+    quick([3.0], [30.0])  # 20 % worse, counted on the inverse
+    arguments = ["bench", "--repeats", "1", "--against", file, "--fail-over", most]
+    assert command(arguments) == status
+
+
+def test_a_bad_file_is_named_before_anything_is_measured(capsys, tmp_path):
+    file = tmp_path / "old.json"
+    file.write_text('{"rows": []}')
+    assert command(["bench", "--against", str(file)]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err == (
+        f"{file}: format: is missing; 'qswarm-bench' of qswarm bench --save is needed\n"
+    )
+
+
+def test_long_measurements_are_shown_on_stderr(quick, capsys, monkeypatch):
+    from worldsim.results import progress_line  # noqa: PLC0415 - as the command does
+
+    monkeypatch.setattr(progress_line, "QUIET_S", 0.0)
+    shown = []
+
+    def until_shown():
+        while not shown:
+            shown.extend(line for line in sys.stderr.getvalue().splitlines() if line)
+        return 1.0
+
+    rows = (Measure("slow", "us", None, False, until_shown),)
+    monkeypatch.setattr(table, "MEASURES", rows)
+    assert command(["bench", "--repeats", "1"]) == 0
+    assert shown == ["1 of 1: slow, 1 s"]

@@ -68,6 +68,13 @@ BAD = [
     (("netem", "check"), "SCENARIO: got 0 scenarios; check takes one"),
     (("netem", "check", "small.toml", "--for", "3"), "--for: check undoes nothing; omit it"),
     (("bench", "--json", "nowhere/x.json"), "nowhere/x.json: cannot be written: no such folder"),
+    (("bench", "--save", "nowhere/x.json"), "nowhere/x.json: cannot be written: no such folder"),
+    (("bench", "--against", "none.json"), "none.json: no such file"),
+    (("bench", "--against", "small.toml"), "small.toml: not JSON: "),
+    (("bench", "--fail-over", "10"), "--fail-over: needs --against"),
+    (("bench", "--seconds", "10"), "--seconds: needs --processes"),
+    (("bench", "--only", "agent stop*"), "--only: no row matches 'agent stop*'; a name as"),
+    (("bench", "--only", "processes*"), "--only: 'processes*' needs --processes"),
     (
         ("bench", "--repeats", "1000"),
         "--repeats: got 1000; at most 100 is allowed (see qswarm bench",

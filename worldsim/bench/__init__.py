@@ -1,1 +1,1 @@
-"""Measures CPU time: the figures behind `qswarm bench`."""
+"""Measures CPU time, traffic and fleets of processes: the figures behind `qswarm bench`."""

@@ -1,10 +1,10 @@
-"""The benchmark's rows: what is measured, its unit and its goal."""
+"""The benchmark's rows in one process: what is measured, its unit and its goal."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 from netem.link_parameters import Conditions
 from worldsim.bench.fleets import EIGHT_IN_RANGE_M, flight_cpu_s, wedge
+from worldsim.bench.measures import Measure
 from worldsim.bench.part_costs import control_step_us, frame_us
 from worldsim.bench.recording_cost import recording_mb, recording_us
 from worldsim.bench.team_growth import AgentCost, agent_cost
@@ -15,29 +15,6 @@ RADIO_SIZES = (9, 20, 50, 100, 200)
 """Teams whose traffic is measured."""
 STEP_SIZES = (10, 100, 200)
 """Teams whose steps are measured."""
-Measure = tuple[str, str, float | None, bool, Callable[[], float]]
-"""A row's name, unit, goal, whether more is better, and what measures it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One figure, the best of some repeats: a busy host can only make it worse."""
-
-    name: str
-    unit: str
-    """Of goal and measured."""
-    goal: float | None
-    """None: the figure is there to be known."""
-    measured: float
-    more: bool
-    """Whether a greater value is better; then the goal is the least value."""
-
-    @property
-    def reached(self) -> bool:
-        """Whether the goal is reached, if there is one."""
-        if self.goal is None:
-            return True
-        return self.measured >= self.goal if self.more else self.measured <= self.goal
 
 
 def _real_time_factor() -> float:
@@ -58,7 +35,7 @@ def _cost(
     def cost() -> float:
         return figure(agent_cost(agents, together=together))
 
-    return f"{name}, N = {agents}", unit, goal, False, cost
+    return Measure(f"{name}, N = {agents}", unit, goal, False, cost)
 
 
 def _growth(
@@ -68,7 +45,7 @@ def _growth(
         measured = agent_cost(agents, together=together)
         return figure(measured) / figure(agent_cost(least, together=together))
 
-    return f"{name}, N = {agents} against {least}", "x", goal, False, ratio
+    return Measure(f"{name}, N = {agents} against {least}", "x", goal, False, ratio)
 
 
 def _radio_rows() -> Iterator[Measure]:
@@ -99,28 +76,25 @@ def _step_rows() -> Iterator[Measure]:
 
 
 MEASURES: tuple[Measure, ...] = (
-    ("control step, 8 neighbours, 4 obstacles", "us", 30.0, False, control_step_us),
-    ("medium, a frame, N = 9, clean", "us", 15.0, False, lambda: frame_us(9)),
-    ("medium, a frame, N = 100, clean", "us", 15.0, False, lambda: frame_us(100)),
-    (
+    Measure("control step, 8 neighbours, 4 obstacles", "us", 30.0, False, control_step_us),
+    Measure("medium, a frame, N = 9, clean", "us", 15.0, False, lambda: frame_us(9)),
+    Measure("medium, a frame, N = 100, clean", "us", 15.0, False, lambda: frame_us(100)),
+    Measure(
         "medium, a frame, N = 100, loss and jitter",
         "us",
         15.0,
         False,
         lambda: frame_us(100, Conditions(loss_percent=20.0, delay_ms=20.0, jitter_ms=5.0)),
     ),
-    ("virtual time, N = 9, one core", "x real time", 50.0, True, _real_time_factor),
-    ("virtual time, N = 10", "agent-steps/CPU s", 10_000.0, True, _steps_per_cpu_s(10, 10.0)),
-    ("virtual time, N = 100", "agent-steps/CPU s", 20_000.0, True, _steps_per_cpu_s(100, 2.0)),
-    ("recording, a tick, N = 200", "us", 500.0, False, lambda: recording_us(200)),
-    ("recording, N = 200", "MB a minute", 25.0, False, lambda: recording_mb(200)),
+    Measure("virtual time, N = 9, one core", "x real time", 50.0, True, _real_time_factor),
+    Measure(
+        "virtual time, N = 10", "agent-steps/CPU s", 10_000.0, True, _steps_per_cpu_s(10, 10.0)
+    ),
+    Measure(
+        "virtual time, N = 100", "agent-steps/CPU s", 20_000.0, True, _steps_per_cpu_s(100, 2.0)
+    ),
+    Measure("recording, a tick, N = 200", "us", 500.0, False, lambda: recording_us(200)),
+    Measure("recording, N = 200", "MB a minute", 25.0, False, lambda: recording_mb(200)),
     *_radio_rows(),
     *_step_rows(),
 )
-
-
-def measured(repeats: int) -> Iterator[Row]:
-    """Measure each row ``repeats`` times; yield it with its best figure."""
-    for name, unit, goal, more, measure in MEASURES:
-        found = [measure() for _ in range(repeats)]
-        yield Row(name, unit, goal, max(found) if more else min(found), more)
