@@ -1,0 +1,114 @@
+"""Compiled modules: they run instead of the plain ones for as long as they match them.
+
+``deploy/compile.sh`` compiles what is hot, into ``build/compiled`` beside the packages, and writes
+a manifest last. The compiled modules run only if the manifest fits this Python and every source
+file: after an edit, or half a build, plain Python runs, and a line says why. It is never a mixture.
+QSWARM_PURE=1 asks for plain Python.
+
+This module comes before all others, so it imports none of them.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from hashlib import sha256
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ExtensionFileLoader, ModuleSpec
+from importlib.util import spec_from_file_location
+from pathlib import Path
+from sysconfig import get_config_var
+from types import ModuleType
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDER = ROOT / "build" / "compiled"
+MANIFEST = "manifest.json"
+PURE = "QSWARM_PURE"
+"""The environment variable that asks for plain Python, here and in processes begun from here."""
+REMEDY = "deploy/compile.sh compiles anew"
+
+
+class UnfitError(ValueError):
+    """Compiled modules that must not run; the text says why."""
+
+
+class Finder(MetaPathFinder):
+    """Finds compiled modules. files: the extension of each module, by its name."""
+
+    def __init__(self, files: Mapping[str, Path]) -> None:
+        self._files = files
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return the spec of a compiled module, None for any other."""
+        file = self._files.get(fullname)
+        if file is None:
+            return None
+        return spec_from_file_location(
+            fullname, file, loader=ExtensionFileLoader(fullname, str(file))
+        )
+
+
+def fitting(root: Path, folder: Path) -> dict[str, Path]:
+    """Return the extension of each compiled module by its name; nothing where none was compiled.
+
+    Raises :class:`UnfitError` if one of them does not fit.
+    """
+    if not folder.is_dir():
+        return {}
+    manifest = _read(folder / MANIFEST)
+    if manifest.get("abi") != get_config_var("SOABI"):
+        raise UnfitError(f"it was compiled for {manifest.get('abi')}")
+    for source, digest in manifest["sources"].items():
+        if digest_of(root / source) != digest:
+            raise UnfitError(f"{source} has changed since")
+    files = {name: folder / file for name, file in manifest["extensions"].items()}
+    for file in files.values():
+        if not file.is_file():
+            raise UnfitError(f"{file.name} is missing")
+    return files
+
+
+def digest_of(source: Path) -> str | None:
+    """Return the digest of a source file, None where there is none."""
+    try:
+        return sha256(source.read_bytes()).hexdigest()
+    except OSError:
+        return None
+
+
+def _read(file: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(file.read_text("utf-8"))
+        if not {"abi", "sources", "extensions"} <= found.keys():
+            raise UnfitError(f"{file.name} names no sources")
+    except (OSError, ValueError, AttributeError) as error:
+        raise UnfitError(f"the build is unfinished ({error})") from error
+    return found  # type: ignore[no-any-return]
+
+
+def prefer() -> None:
+    """Import compiled modules from now on, if they fit; the packages call it before all else."""
+    if os.environ.get(PURE, "0") not in {"", "0"} or _installed():
+        return
+    try:
+        files = fitting(ROOT, FOLDER)
+    except UnfitError as error:
+        os.environ[PURE] = "1"  # the processes begun from here need not say it again
+        print(
+            f"qswarm: plain Python runs, not the compiled code: {error}. {REMEDY}.", file=sys.stderr
+        )
+        return
+    if files:
+        sys.meta_path.insert(0, Finder(files))
+
+
+def _installed() -> bool:
+    return any(isinstance(each, Finder) for each in sys.meta_path)
+
+
+def running() -> str:
+    """Return which code runs, for a person: compiled or plain."""
+    return "compiled" if _installed() else "plain Python"

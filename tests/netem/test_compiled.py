@@ -1,0 +1,104 @@
+"""Compiled modules run only while they fit: this Python, whole, and made of the present sources."""
+
+import json
+import subprocess
+import sys
+from importlib.machinery import ModuleSpec
+from sysconfig import get_config_var
+
+import pytest
+
+from netem.compiled import MANIFEST, PURE, REMEDY, Finder, UnfitError, digest_of, fitting
+
+SOURCE, EXTENSION = "hot/core.py", "hot/core.so"
+
+
+@pytest.fixture
+def root(tmp_path):
+    """A checkout with one module that was compiled."""
+    folder = tmp_path / "build" / "compiled"
+    for made in (tmp_path / SOURCE, folder / EXTENSION):
+        made.parent.mkdir(parents=True)
+        made.write_text("x = 1\n")
+    manifest = {
+        "abi": get_config_var("SOABI"),
+        "sources": {SOURCE: digest_of(tmp_path / SOURCE)},
+        "extensions": {"hot.core": EXTENSION},
+    }
+    (folder / MANIFEST).write_text(json.dumps(manifest))
+    return tmp_path
+
+
+def found(root):
+    return fitting(root, root / "build" / "compiled")
+
+
+def changed(root, **fields):
+    file = root / "build" / "compiled" / MANIFEST
+    file.write_text(json.dumps({**json.loads(file.read_text()), **fields}))
+
+
+def test_a_whole_build_of_the_present_sources_fits(root):
+    assert found(root) == {"hot.core": root / "build" / "compiled" / EXTENSION}
+
+
+def test_where_nothing_was_compiled_plain_python_runs_and_nobody_is_told(tmp_path):
+    assert found(tmp_path) == {}
+
+
+@pytest.mark.parametrize("edit", ["x = 2\n", "", None])
+def test_an_edit_ends_the_use_of_all_compiled_modules(root, edit):
+    file = root / SOURCE
+    file.unlink() if edit is None else file.write_text(edit)
+    with pytest.raises(UnfitError, match=f"{SOURCE} has changed"):
+        found(root)
+
+
+def test_what_another_python_compiled_does_not_run(root):
+    changed(root, abi="cpython-39-x86_64-linux-gnu")
+    with pytest.raises(UnfitError, match="compiled for cpython-39"):
+        found(root)
+
+
+@pytest.mark.parametrize("text", [None, "", "{", "[]", "{}", '{"abi": 1}'])
+def test_half_a_build_does_not_run(root, text):
+    file = root / "build" / "compiled" / MANIFEST
+    file.unlink() if text is None else file.write_text(text)
+    with pytest.raises(UnfitError):
+        found(root)
+
+
+def test_a_build_without_one_of_its_extensions_does_not_run(root):
+    (root / "build" / "compiled" / EXTENSION).unlink()
+    with pytest.raises(UnfitError, match=r"core\.so is missing"):
+        found(root)
+
+
+def test_only_compiled_modules_are_found(tmp_path):
+    finder = Finder({"hot.core": tmp_path / "core.so"})
+    spec = finder.find_spec("hot.core", None)
+    assert isinstance(spec, ModuleSpec)
+    assert spec.origin == str(tmp_path / "core.so")
+    assert finder.find_spec("hot.other", None) is None
+
+
+def test_a_person_is_told_once_why_plain_python_runs(root):
+    """Processes that are begun from there run plain Python, too, and do not say it again."""
+    (root / SOURCE).write_text("x = 2\n")
+    code = f"""
+import os, sys
+from pathlib import Path
+from netem import compiled
+compiled.ROOT = Path({str(root)!r})
+compiled.FOLDER = compiled.ROOT / "build" / "compiled"
+compiled.prefer()
+compiled.prefer()
+print(compiled.running(), os.environ[{PURE!r}])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=30
+    )
+    assert done.stdout.split() == ["plain", "Python", "1"]
+    (line,) = done.stderr.splitlines()
+    assert SOURCE in line
+    assert REMEDY in line
