@@ -6,18 +6,43 @@ tracks the neighbours, applies the safety filter to the intent, and talks to the
 vehicle.
 """
 
-from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import entry_points
-from math import inf
 from typing import NamedTuple, Protocol
 
 import msgspec
 
 from agent.config import AgentSetup
 from agent.messages import MEMBER, Place, Standing, Summary, Vector
-from agent.qstructure.formation import Formation
-from agent.qstructure.target_frame import Frame
+from agent.senses import (
+    UNHEARD,
+    Flown,
+    Heard,
+    HeardFrame,
+    HeardSummary,
+    Link,
+    Peer,
+    Senses,
+)
+
+__all__ = [
+    "BUILT_IN",
+    "ENTRY_POINTS",
+    "NO_WORDS",
+    "UNHEARD",
+    "Controller",
+    "ControllerError",
+    "Flown",
+    "Heard",
+    "HeardFrame",
+    "HeardSummary",
+    "Intent",
+    "Link",
+    "Peer",
+    "Senses",
+    "Words",
+    "load",
+]
 
 BUILT_IN = {
     "q_structure": "agent.guidance.q_structure:QStructure",
@@ -29,90 +54,6 @@ ENTRY_POINTS = "qswarm.controllers"
 
 class ControllerError(ValueError):
     """A controller that cannot be loaded; the text says why."""
-
-
-class Heard(msgspec.Struct, frozen=True, gc=False, order=True):
-    """A neighbour heard directly, extrapolated to now."""
-
-    id: int
-    age_s: float  # age of its last beacon [s]
-    position: Vector  # last reported position plus velocity times age [m; world frame]
-    velocity: Vector  # as reported [m/s; world frame]
-    target: Vector  # its immediate target q_tg, as reported [m; world frame]
-    place: Place | None  # the place that it claims
-    mission: int = 0  # key of the mission that it flies
-    cost_m: float | None = None  # see Peer
-    standing: Standing | None = None  # in the Q-structure, None where it uses none
-    hears_me: bool = False  # whether it echoed an own beacon of late
-
-
-class Link(NamedTuple):
-    """The radio as the agent measures it, over all neighbours."""
-
-    loss: float  # share of beacons lost, from gaps in their sequence
-    latency_s: float  # mean delay of beacons [s]
-    reach_m: float  # from how far two neighbours were heard, or the only one [m]
-
-
-UNHEARD = Link(loss=0.0, latency_s=0.0, reach_m=inf)
-"""Before any neighbour was heard."""
-
-
-class HeardSummary(NamedTuple):
-    """A summary of the Q-structure, heard on the multihop channel."""
-
-    sender: int
-    stamp_s: float  # the sender's time [s]
-    summary: Summary
-
-
-class Peer(msgspec.Struct, frozen=True, gc=False, order=True):
-    """A known member of the team, the own agent included; heard directly or through others."""
-
-    id: int
-    position: Vector  # last reported [m; world frame]
-    place: Place | None  # the place that it claims
-    cost_m: float | None = None
-    """Reported distance to its place when it first claimed it [m]."""
-
-
-class Flown(NamedTuple):
-    """The mission that an agent flies at present."""
-
-    key: int
-    formation: Formation
-    frame: Frame  # the target's frame at present
-    frame_key: int = 0  # of the mission whose frame it is: a newer one's may come first
-
-
-class HeardFrame(NamedTuple):
-    """The frame of a team whose mission the agent does not know."""
-
-    key: int  # of the mission
-    frame: Frame  # at present
-
-
-class Senses(msgspec.Struct, frozen=True, gc=False):
-    """Everything that a controller decides on."""
-
-    now_s: float  # simulated time, the same for all agents [s]
-    position: Vector  # own [m; world frame]
-    velocity: Vector  # own [m/s; world frame]
-    yaw: float  # own [rad; world frame]
-    vehicles: tuple[Vector, ...]
-    """Vehicles within the proximity sensor's range, relative to the own centre [m; world axes]."""
-    neighbours: tuple[Heard, ...]  # sorted by id
-    team: Callable[[], tuple[Peer, ...]]  # all known members, sorted by id; gathered when called
-    mission: Flown | None  # None: not briefed, and none heard yet
-    silent: tuple[Vector, ...] = ()  # unidentified vehicles [m; world frame] (E18)
-    blocked: frozenset[Place] = frozenset()
-    """Places that others see taken by an unidentified vehicle (E18)."""
-    link: Link = UNHEARD
-    summaries: tuple[HeardSummary, ...] = ()  # heard since the last step
-    obstacles: tuple[Vector, ...] = ()
-    """Near points of obstacles, relative to the own centre [m; world axes]."""
-    heard_frame: HeardFrame | None = None
-    """Without a mission: the frame that a neighbour with a tier reported last, for up to 5 s."""
 
 
 class Words(NamedTuple):

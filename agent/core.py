@@ -6,8 +6,9 @@ Zenoh, or virtual time) only carry bytes.
 
 from collections import Counter, deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import dist, hypot, inf
-from typing import NamedTuple, assert_never
+from typing import NamedTuple, assert_never, final
 
 import msgspec
 
@@ -54,7 +55,9 @@ IMPLAUSIBLE_SPEEDS = 4.0
 exceed the limit: a controller may ask for more than its vehicle then flies."""
 
 
-class Outbox(msgspec.Struct, frozen=True, gc=False):
+@final
+@dataclass
+class Outbox:
     """An agent's output of one step: for its vehicle, and for its radio."""
 
     command: Command

@@ -5,9 +5,9 @@ passed on.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import inf
-
-import msgspec
+from typing import final
 
 from agent.codec import add_checksum, encode
 from agent.comms.gossip import RecordTable
@@ -35,7 +35,9 @@ MAX_ECHOES = 8
 """Most echoes of one beacon; of more neighbours others have their turn in the next."""
 
 
-class OwnState(msgspec.Struct, frozen=True, gc=False):
+@final
+@dataclass
+class OwnState:
     """What an agent reports about itself; see Beacon."""
 
     position: Vector  # [m; world frame]

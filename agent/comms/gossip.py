@@ -10,6 +10,7 @@ have are ignored, which bounds the table.
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from math import inf
+from operator import attrgetter
 from types import MappingProxyType
 from typing import assert_never
 
@@ -114,7 +115,7 @@ class RecordTable:
             place = Place(newest.queue, newest.rank) if placed else None
             cost_m = newest.cost_mm / 1000.0
             peers.append(Peer(id=subject, position=newest.position, place=place, cost_m=cost_m))
-        peers.sort()
+        peers.sort(key=attrgetter("id"))
         return tuple(peers)
 
     def members(self, now_s: float) -> list[MemberPosition]:

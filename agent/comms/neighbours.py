@@ -6,8 +6,7 @@ never read.
 
 from collections.abc import Collection
 from math import dist, inf, log
-
-import msgspec
+from typing import final
 
 from agent.codec import RejectedError
 from agent.controller import UNHEARD, Heard, Link
@@ -35,12 +34,19 @@ MARGIN = 1.2
 """The loss is estimated from the last 39 gaps or so: n (1e6^(1/n) - 1) / ln 1e6 at n = 39."""
 
 
-class Version(msgspec.Struct, frozen=True, gc=False):
+@final
+class Version:
     """Which of a sender's statements one is: by its stamp, and by the sender's own count."""
 
-    stamp_s: float
-    incarnation: int
-    sequence: int
+    def __init__(
+        self,
+        stamp_s: float,
+        incarnation: int,
+        sequence: int,
+    ) -> None:
+        self.stamp_s = stamp_s
+        self.incarnation = incarnation
+        self.sequence = sequence
 
     def supersedes(self, other: "Version") -> bool:
         """Whether this statement is newer: later, and not the same one once more.
@@ -118,7 +124,7 @@ class Neighbour:
         before, self.version = self.beacon, version
         gap = 1.0
         if beacon.incarnation == before.incarnation:
-            gap = beacon.sequence - before.sequence
+            gap = float(beacon.sequence - before.sequence)
             if gap != 1:
                 # An invented sequence must not make a long silence seem likely.
                 most = 2.0 + 2.0 * (beacon.stamp_s - before.stamp_s) * beacon_hz

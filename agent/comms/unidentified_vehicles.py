@@ -18,10 +18,9 @@ survivor of a team has none.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import dist, inf
-from typing import NamedTuple
-
-import msgspec
+from typing import NamedTuple, final
 
 from agent.messages import PROXIMITY_RANGE_M, Beacon, Vector
 
@@ -84,7 +83,9 @@ class _Track(NamedTuple):
         return self._replace(missed_s=missed_s, given_up=self.given_up or ended)
 
 
-class MemberPosition(msgspec.Struct, frozen=True, gc=False):
+@final
+@dataclass
+class MemberPosition:
     """A team member's last reported position."""
 
     id: int

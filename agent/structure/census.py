@@ -67,7 +67,7 @@ class Census:
         self._own = own_id
         self._ids = min(ids, MAX_LABELLED)
         self._labels: list[int] = []
-        self._codes = bytearray()
+        self._codes: list[int] = []
         """The codes of the labels; 0 of a member of which nothing is known."""
         self._lag_s: list[float] = []
         """How old labels are when they arrive, by member [s]."""
@@ -233,7 +233,7 @@ class Census:
         missing = members - len(self._labels)
         if missing > 0:
             self._labels += [0] * missing
-            self._codes += bytes(missing)
+            self._codes += [0] * missing
             self._lag_s += [0.0] * missing
             self._deadline_s += [inf] * missing
 

@@ -7,6 +7,7 @@ vertex has no leader the rule does not apply, for the others may have to order s
 
 from collections import Counter
 from math import dist, inf
+from operator import attrgetter
 
 from agent.assignment.allocation import own_place
 from agent.controller import Peer
@@ -126,7 +127,7 @@ class DirectRule:
         """
         team = [Peer(self._own_id, view.here, None)]
         team += [Peer(h.id, h.position, None) for h in view.around]
-        team.sort()
+        team.sort(key=attrgetter("id"))
         layout = view.map.formation.layout(len(team), view.blocked)
         places = list(layout.places)
         for place in view.map.vertex_places if view.map.vertices == 1 else ():
@@ -192,7 +193,7 @@ class DirectRule:
         if not _stands_in(view, claim.vertex, available):
             own = view.map.place(claim.queue, claim.number) if claim.number > 0 else None
             peers.append(Peer(self._own_id, view.here, own, claim.cost_m))
-        return sorted(peers)
+        return sorted(peers, key=attrgetter("id"))
 
     def _take(self, view: View, claim: Claim, place: Place) -> None:
         queue, number = place.queue, view.map.number(place)

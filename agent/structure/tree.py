@@ -12,9 +12,7 @@ of a lower tier, and what goes to it is sent to the parent.
 
 from collections.abc import Collection
 from math import dist, inf
-from typing import NamedTuple
-
-import msgspec
+from typing import NamedTuple, final
 
 from agent.controller import Heard
 from agent.messages import Branch, RootKey, Vector
@@ -36,11 +34,17 @@ MAX_TIER = 1000
 VOID_KEPT = 32
 
 
-class Follower(msgspec.Struct, frozen=True, gc=False):
+@final
+class Follower:
     """An agent heard, with its branch in this tree."""
 
-    heard: Heard
-    branch: Branch
+    def __init__(
+        self,
+        heard: Heard,
+        branch: Branch,
+    ) -> None:
+        self.heard = heard
+        self.branch = branch
 
 
 def version_at(time_s: float) -> int:

@@ -1,5 +1,6 @@
 """Controllers: how they are found by name, how intents are checked, and how they fail."""
 
+import dataclasses
 from math import hypot, inf, nan
 from pathlib import Path
 from typing import Any
@@ -191,7 +192,7 @@ def heard(x: float, velocity: tuple[float, float, float] = REST) -> Heard:
 
 
 def flock(*neighbours: Heard) -> Intent:
-    senses = replace(SENSES, position=REST, yaw=0.0, neighbours=neighbours)
+    senses = dataclasses.replace(SENSES, position=REST, yaw=0.0, neighbours=neighbours)
     return Flocking(setup_of("flocking")).decide(senses)
 
 

@@ -1,6 +1,7 @@
 """Slot selection: a place is chosen anew once knowledge has settled, and not much later."""
 
-import msgspec
+from dataclasses import replace
+
 import pytest
 
 from agent.assignment.slot_selection import ALONE_S, PATIENCE_S, SETTLED_S, SlotSelection
@@ -93,7 +94,7 @@ def settled(team):
 def test_a_place_is_kept_while_members_go_one_after_another():
     """Two members of a queue leave 0.3 s apart: the place is chosen anew after the second only."""
     team = [peer(5), *map(peer, range(1, 5)), peer(0)]
-    team = [msgspec.structs.replace(each, id=number) for number, each in enumerate(team)]
+    team = [replace(each, id=number) for number, each in enumerate(team)]
     made, now_s = settled(team)
     kept = made.select(senses(now_s, team, at=team[0].position)).place
     places = []

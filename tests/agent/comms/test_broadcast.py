@@ -1,9 +1,9 @@
 """Broadcasts: on time, numbered, and never longer than a frame may be."""
 
+from dataclasses import replace
 from itertools import pairwise
 from math import inf
 
-import msgspec
 import pytest
 
 from agent.codec import decode_beacon, decode_gossip
@@ -150,7 +150,7 @@ def test_each_round_sends_the_whole_table():
 
 def test_the_own_record_agrees_with_the_beacon():
     sender, table = broadcast(incarnation=2), table_with(3, [record(4, 9)])
-    own = msgspec.structs.replace(STILL, position=(1.0, 2.0, 3.0), place=Place(1, 4))
+    own = replace(STILL, position=(1.0, 2.0, 3.0), place=Place(1, 4))
     (_, first), (_, second) = sender.frames(7.0, own, (), table)
     sent, (own_record, other) = decode_beacon(first), decode_gossip(second).records
     assert other == record(4, 9)
@@ -169,13 +169,13 @@ def test_who_relays_nothing_sends_no_record():
 def test_a_summary_goes_out_at_once_in_a_frame_of_its_own(relays):
     sender, table = broadcast(relays=relays), RecordTable(3, 2.0)
     sender.frames(7.0, STILL, (), table)
-    own = msgspec.structs.replace(STILL, summary=SUMMARY)
+    own = replace(STILL, summary=SUMMARY)
     ((_, payload),) = [each for each in sender.frames(7.1, own, (), table) if each[0] == MULTIHOP]
     sent = decode_gossip(payload)
     assert (sent.id, sent.stamp_s, sent.records, sent.summary) == (3, 7.1, (), SUMMARY)
 
 
 def test_no_summary_goes_out_with_the_multihop_channel_off():
-    sender, own = broadcast(round_s=inf), msgspec.structs.replace(STILL, summary=SUMMARY)
+    sender, own = broadcast(round_s=inf), replace(STILL, summary=SUMMARY)
     for tick in range(40):
         assert [c for c, _ in sender.frames(tick * 0.05, own, (), RecordTable(3, 2.0))] == [LOCAL]

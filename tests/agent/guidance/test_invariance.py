@@ -1,6 +1,8 @@
 """Invariance: the origin, the direction of north and the agents' ids decide nothing."""
 
+from dataclasses import replace
 from math import cos, dist, hypot, pi, remainder, sin, tau
+from operator import attrgetter
 from random import Random
 from typing import NamedTuple
 
@@ -54,18 +56,24 @@ def decided(controller, seed, move=STAY, ids=tuple(range(TEAM))):
     claims = [each if random.random() < 0.5 else None for each in formation.layout(TEAM).places]
     random.shuffle(claims)
     heard = sorted(
-        Heard(
-            id=ids[i],
-            age_s=0.05,
-            position=move.moved(place[i]),
-            velocity=move.turned(speed[i]),
-            target=move.moved(goal[i]),
-            place=claims[i],
-        )
-        for i in range(1, TEAM)
+        [
+            Heard(
+                id=ids[i],
+                age_s=0.05,
+                position=move.moved(place[i]),
+                velocity=move.turned(speed[i]),
+                target=move.moved(goal[i]),
+                place=claims[i],
+            )
+            for i in range(1, TEAM)
+        ],
+        key=attrgetter("id"),
     )
     team = tuple(
-        sorted(Peer(id=ids[i], position=move.moved(place[i]), place=claims[i]) for i in range(TEAM))
+        sorted(
+            (Peer(ids[i], move.moved(place[i]), claims[i]) for i in range(TEAM)),
+            key=attrgetter("id"),
+        )
     )
     near = [tuple(b - a for a, b in zip(place[0], p, strict=True)) for p in place[1:]]
     senses = Senses(
@@ -79,7 +87,7 @@ def decided(controller, seed, move=STAY, ids=tuple(range(TEAM))):
         mission=Flown(key=0, formation=formation, frame=Frame(move.shift, move.yaw)),
     )
     made = load(controller)(setup(ids[0]))
-    made.decide(msgspec.structs.replace(senses, now_s=0.0))  # it listens first
+    made.decide(replace(senses, now_s=0.0))  # it listens first
     return made.decide(senses)
 
 

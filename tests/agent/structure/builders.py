@@ -1,5 +1,7 @@
 """Builders for the Q-structure's tests: a test names only the fields that matter to it."""
 
+from operator import attrgetter
+
 import msgspec
 
 from agent.config import AgentSetup, Comms, Control, Vehicle
@@ -108,7 +110,7 @@ def subtree(**fields):
 
 def view(formation, now_s, neighbours=(), *, at=ZERO, link=None, summaries=None, blocked=()):
     """Return an agent's view. link: of a radio without loss or latency if left out."""
-    made = View(now_s, at, sorted(neighbours), 0, formation, Frame())
+    made = View(now_s, at, sorted(neighbours, key=attrgetter("id")), 0, formation, Frame())
     made.timing = timing_of(link or Link(0.0, 0.0, 100.0), BEACON_S)
     made.summaries = summaries if summaries is not None else [None] * formation.vertices
     made.blocked = frozenset(blocked)

@@ -1,10 +1,10 @@
 """Small teams by the whole structure: they form the layout exactly, and then keep still."""
 
 from collections import Counter
+from dataclasses import replace
 from math import dist
 from random import Random
 
-import msgspec
 import pytest
 
 from agent.assignment.allocation import allocate
@@ -157,7 +157,7 @@ class TeamWithBody(Team):
         senses = super()._senses(member)
         if self.body is None:
             return senses
-        return msgspec.structs.replace(senses, silent=(self.body,))
+        return replace(senses, silent=(self.body,))
 
     def formed(self):
         """Whether the team has the places that the body leaves, and all stand in them."""
