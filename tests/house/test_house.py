@@ -61,5 +61,12 @@ def test_of_netem_the_agents_core_may_import_only_the_channels() -> None:
     (core,) = [each for each in contracts if "agent.core" in each.get("source_modules", [])]
     files = (ROOT / "netem").rglob("*.py")
     modules = {".".join(file.relative_to(ROOT).with_suffix("").parts) for file in files}
-    modules -= {"netem.__init__", "netem.wire.__init__", "netem.wire.channels"}
+    modules -= {"netem.__init__", "netem.compiled", "netem.wire.__init__", "netem.wire.channels"}
     assert {each for each in core["forbidden_modules"] if each.startswith("netem")} == modules
+
+
+def test_what_is_to_be_compiled_exists() -> None:
+    hot = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["qswarm"]
+    assert all([*ROOT.glob(each)] for each in hot["compiled"])
+    found = {str(file.relative_to(ROOT)) for each in hot["compiled"] for file in ROOT.glob(each)}
+    assert found.issuperset(hot["plain"])
