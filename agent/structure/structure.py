@@ -32,6 +32,7 @@ from agent.structure.election import Election
 from agent.structure.gathering import Gathering
 from agent.structure.head_count import HeadCount
 from agent.structure.leader import Leader
+from agent.structure.leader_place import LeaderPlace
 from agent.structure.likely_slot import nearest_slot, slot_by_order, standing_slot
 from agent.structure.link_timing import timing_of
 from agent.structure.numbers import Numbers
@@ -46,9 +47,6 @@ from agent.structure.view import View
 DECISION_HZ = 10.0
 PATIENCE_S = 0.3
 """So long an agent without a number stays where it is: most have one by then, and need not turn."""
-CERTAIN_S, CERTAIN_HOPS = 0.5, 2.0
-"""A leader leaves its vertex, or returns to it, once it has been taken, or free, for so long, and
-for as long as news of it takes over so many hops."""
 SETTLED_S = 1.0
 """So long an agent without a number looks each tick, for much is new to it."""
 FAR_M = 2.5
@@ -90,12 +88,11 @@ class Structure:
         self._numbers = Numbers(own_id, now_s)
         self._swaps = Swaps(own_id)
         self._direct = DirectRule(own_id, now_s)
+        self._leader_place = LeaderPlace(self._numbers, self._direct)
         points = PlacePoints(setup.control.spacing_m)
         self._occupied = OccupiedSlots(points, "proximity" in setup.vehicle.sensors)
         self._leader: Leader | None = None
         self._followed = False
-        self._misplaced_since_s: float | None = None
-        """Since when the leader stands in a vertex that is taken, or beside a free one [s]."""
         self._started_s = now_s
         self._next_decision_s = now_s
         self._blocked: frozenset[Place] = frozenset()
@@ -194,7 +191,7 @@ class Structure:
         if not self.claim.leads:
             self._decide_as_member(view)
         else:
-            self._decide_as_leader(view)
+            self._leader_place.choose(view, self.claim)
         self._followed = any(
             branch is not None and branch.parent == self._own_id
             for h in view.heard
@@ -220,27 +217,6 @@ class Structure:
             self._leader = Leader(claim.vertex, key, view.now_s, self._round_s, view.expected)
             self._head_count.note_own(view, claim)
         self._slow.news = True
-
-    def _decide_as_leader(self, view: View) -> None:
-        """Stand in the vertex, or while a vehicle has taken it, in the queue (E18)."""
-        claim = self.claim
-        taken, in_queue = self._map.vertex_places[claim.vertex] in view.blocked, claim.number > 0
-        if taken == in_queue:
-            self._misplaced_since_s = None
-            if in_queue and self._direct.applies:
-                self._direct.choose(view, claim)
-            elif in_queue:
-                self._numbers.keep_up(view, claim)
-            return
-        # What is seen flickers while teams meet again; a leader that followed it would too.
-        if self._misplaced_since_s is None:
-            self._misplaced_since_s = view.now_s
-        elif view.now_s - self._misplaced_since_s >= CERTAIN_S + CERTAIN_HOPS * view.timing.hop_s:
-            self._misplaced_since_s = None
-            if taken:
-                self._numbers.take_first(view, claim)
-            else:
-                claim.lead(claim.vertex, view.to_vertex(claim.vertex), view.now_s)
 
     def _decide_as_member(self, view: View) -> None:
         claim = self.claim
