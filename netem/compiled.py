@@ -33,6 +33,20 @@ class UnfitError(ValueError):
     """Compiled modules that must not run; the text says why."""
 
 
+class _Loader(ExtensionFileLoader):
+    """Ends the process where a compiled module cannot be loaded: others run compiled by then."""
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        try:
+            return super().create_module(spec)
+        except ImportError as error:
+            if error.path != self.path:
+                raise  # something else that the module imports
+            remedy = f"{REMEDY}, and {PURE}=1 runs plain Python"
+            print(f"qswarm: compiled code cannot be loaded: {error}; {remedy}.", file=sys.stderr)
+            raise SystemExit(2) from error
+
+
 class Finder(MetaPathFinder):
     """Finds compiled modules. files: the extension of each module, by its name."""
 
@@ -46,9 +60,7 @@ class Finder(MetaPathFinder):
         file = self._files.get(fullname)
         if file is None:
             return None
-        return spec_from_file_location(
-            fullname, file, loader=ExtensionFileLoader(fullname, str(file))
-        )
+        return spec_from_file_location(fullname, file, loader=_Loader(fullname, str(file)))
 
 
 def fitting(root: Path, folder: Path) -> dict[str, Path]:
@@ -84,6 +96,12 @@ def _read(file: Path) -> dict[str, Any]:
         found = json.loads(file.read_text("utf-8"))
         if not {"abi", "sources", "extensions"} <= found.keys():
             raise UnfitError(f"{file.name} names no sources")
+        if not found["extensions"] or not all(
+            isinstance(name, str)
+            for key in ("sources", "extensions")
+            for name in found[key].values()
+        ):
+            raise UnfitError(f"{file.name} names no files")
     except (OSError, ValueError, AttributeError) as error:
         raise UnfitError(f"the build is unfinished ({error})") from error
     return found  # type: ignore[no-any-return]

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from importlib.machinery import ModuleSpec
+from importlib.util import module_from_spec
 from sysconfig import get_config_var
 
 import pytest
@@ -66,6 +67,31 @@ def test_half_a_build_does_not_run(root, text):
     file.unlink() if text is None else file.write_text(text)
     with pytest.raises(UnfitError):
         found(root)
+
+
+@pytest.mark.parametrize("key", ["sources", "extensions"])
+@pytest.mark.parametrize("value", [None, [], ["hot/core.py"], {"hot.core": 5}, {"hot.core": None}])
+def test_a_manifest_of_another_shape_is_half_a_build(root, key, value):
+    changed(root, **{key: value})
+    with pytest.raises(UnfitError, match="unfinished"):
+        found(root)
+
+
+def test_a_build_without_extensions_does_not_run(root):
+    changed(root, extensions={})
+    with pytest.raises(UnfitError, match="names no files"):
+        found(root)
+
+
+def test_an_extension_that_cannot_be_loaded_ends_the_process_in_one_line(root, capsys):
+    """Part of what runs is compiled by then, so nobody who catches ImportErrors may go on."""
+    spec = Finder(found(root)).find_spec("hot.core", None)
+    with pytest.raises(SystemExit) as ended:
+        module_from_spec(spec)
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert EXTENSION in line
+    assert PURE in line
 
 
 def test_a_build_without_one_of_its_extensions_does_not_run(root):
