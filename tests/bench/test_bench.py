@@ -144,13 +144,16 @@ def test_the_command_compares_with_saved_figures(quick, capsys, tmp_path):
 
 
 @pytest.mark.parametrize(("most", "status"), [("19", 1), ("20", 0), ("30", 0)])
-def test_a_slowdown_fails_the_command_only_where_asked(quick, tmp_path, most, status):
+def test_a_slowdown_fails_the_command_only_where_asked(quick, capsys, tmp_path, most, status):
     file = str(tmp_path / "before.json")
     quick([3.0], [36.0])
     assert command(["bench", "--repeats", "1", "--save", file]) == 0
     quick([3.0], [30.0])  # 20 % worse, counted on the inverse
     arguments = ["bench", "--repeats", "1", "--against", file, "--fail-over", most]
     assert command(arguments) == status
+    lines = capsys.readouterr().out.splitlines()
+    assert ("WORSE" in lines[-2]) == bool(status)
+    assert lines[-1].endswith(f"{status} worse by more than {most} %{': more' * status}")
 
 
 def test_a_bad_file_is_named_before_anything_is_measured(capsys, tmp_path):

@@ -73,7 +73,7 @@ BAD = [
     (("bench", "--against", "small.toml"), "small.toml: not JSON: "),
     (("bench", "--fail-over", "10"), "--fail-over: needs --against"),
     (("bench", "--seconds", "10"), "--seconds: needs --processes"),
-    (("bench", "--only", "agent stop*"), "--only: no row matches 'agent stop*'; a name as"),
+    (("bench", "--only", "Agent stop*"), "--only: no row matches 'Agent stop*'; a name as"),
     (("bench", "--only", "processes*"), "--only: 'processes*' needs --processes"),
     (
         ("bench", "--repeats", "1000"),

@@ -63,7 +63,7 @@ def chosen(measures: Iterable[Measure], patterns: Iterable[str]) -> list[Measure
 
     Raises LookupError with the first pattern that no name matches.
     """
-    measures, patterns = list(measures), [pattern.lower() for pattern in patterns]
+    measures, patterns = list(measures), list(patterns)
     for pattern in patterns:
         if not any(_matches(measure, pattern) for measure in measures):
             raise LookupError(pattern)
@@ -75,4 +75,4 @@ def chosen(measures: Iterable[Measure], patterns: Iterable[str]) -> list[Measure
 
 
 def _matches(measure: Measure, pattern: str) -> bool:
-    return fnmatchcase(measure.name.lower(), pattern)
+    return fnmatchcase(measure.name.lower(), pattern.lower())

@@ -87,6 +87,7 @@ def bench(
     """
     from netem.wire.shutdown import interrupt_on_signals
     from worldsim.bench.circumstances import circumstances
+    from worldsim.bench.comparison import MARKED_PERCENT
     from worldsim.bench.lines import summary_line
     from worldsim.bench.saved_figures import content, of, saved
     from worldsim.results.run_folder import write_json
@@ -102,11 +103,12 @@ def bench(
     print(f"code: {measured_with['code']}", flush=True)
     if before is not None:
         _warn(of(content([], measured_with, repeats, seconds)), before)
-    rows, changes = _printed(measures, repeats, before)
+    marked = MARKED_PERCENT if fail_over is None else fail_over  # what fails is what is marked
+    rows, changes = _printed(measures, repeats, before, marked)
     if save is not None:
         write_json(save, content(rows, measured_with, repeats, seconds))
     if before is not None:
-        print(summary_line(changes, str(against)))
+        print(summary_line(changes, str(against), marked))
     failed = fail_over is not None and any(each.worse_by(fail_over) for each in changes.values())
     return FAIL if failed else PASS
 
@@ -149,7 +151,7 @@ def _warn(now: "Saved", then: "Saved") -> None:
 
 
 def _printed(
-    measures: "list[Measure]", repeats: int, before: "Saved | None"
+    measures: "list[Measure]", repeats: int, before: "Saved | None", marked: float
 ) -> "tuple[list[Row], dict[str, Change]]":
     """Measure and print all rows; return them, and the change of each by its name."""
     from worldsim.bench.comparison import change
@@ -161,7 +163,7 @@ def _printed(
         rows.append(row)
         if before is not None:
             changes[row.name] = change(row, then.get(row.name), measure.grain)
-        print(line(row, changes.get(row.name)), flush=True)
+        print(line(row, changes.get(row.name), marked), flush=True)
     return rows, changes
 
 
