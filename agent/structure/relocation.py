@@ -71,8 +71,11 @@ _Pose = tuple[float, float, float, float]
 @lru_cache(PLANS_KEPT)
 def _plan(move: _Move, old_pose: _Pose, new_pose: _Pose) -> dict[Place, Place]:
     """Return the new place of each old one; nothing where a team of that size has not room."""
-    old, new = move.before.layout(move.members, move.blocked), move.after.layout(move.members)
-    if len(new.places) != len(old.places):
+    # What is blocked is known of the places of old; they may be those of now.
+    is_same = move.before is move.after and old_pose == new_pose
+    old = move.before.layout(move.members, move.blocked)
+    new = old if is_same else move.after.layout(move.members)
+    if not old.places or len(new.places) != len(old.places):
         return {}
     here, there = (Frame(pose[:3], pose[3]) for pose in (old_pose, new_pose))
     starts = [here.to_world(old.slots[place].point) for place in old.places]

@@ -69,6 +69,20 @@ def test_no_place_follows_where_the_new_queues_have_no_room():
     assert relocated(held, flown(closed, Frame(), 1), 0.0, SPACING_M) is None
 
 
+def test_where_the_places_stay_nobody_is_sent_into_a_blocked_one():
+    blocked = frozenset({Place(0, 0)})
+    for place in LINE.formation.layout(6, blocked).places:
+        held = Held(place, 6, blocked, flown(LINE, ASIDE), 0.0)
+        assert relocated(held, flown(LINE, ASIDE, 1), 0.0, SPACING_M) == Relocated(place, 6)
+
+
+def test_a_team_all_of_whose_places_are_blocked_has_no_plan():
+    closed = next(m for m in map(library, LIBRARY) if all(m.closed))
+    blocked = frozenset(Place(q, k) for q in range(closed.queues) for k in range(200))
+    held = Held(Place(0, 0), 6, blocked, flown(closed, Frame()), 0.0)
+    assert relocated(held, flown(LINE, ASIDE, 1), 0.0, SPACING_M) is None
+
+
 def test_a_place_beyond_the_team_is_none_of_its_places():
     held = Held(Place(0, 6), 6, frozenset(), flown(LINE, Frame()), 0.0)
     assert relocated(held, flown(LINE, ASIDE, 1), 0.0, SPACING_M) is None
