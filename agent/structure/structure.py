@@ -204,6 +204,7 @@ class Structure:
         self._place_given = None
         vertex, queue = self._map.vertex_of.get(place), place.queue
         if vertex is not None:
+            self.claim.give_up(queue, view.now_s)  # there it stands while the vertex is taken
             self._election.lead(view, self.claim, self.trees[vertex], vertex)
             self._begin_to_lead(view)
         else:

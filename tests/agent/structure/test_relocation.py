@@ -114,3 +114,14 @@ def test_a_member_that_is_lost_on_the_way_leaves_no_gap():
     team.members = {k: m for k, m in team.members.items() if not m.leads}
     assert team.until_formed(40.0)
     assert all(dist(m.at, (0.0, 0.0, 0.0)) > 2.0 for m in team.members.values())
+
+
+@pytest.mark.parametrize("formation", [LINE, TWO, WEDGE])
+def test_who_leads_keeps_a_queue_to_stand_in_while_its_vertex_is_taken(formation):
+    team = Team(formation, [(-float(k), 0.2 * (k % 3), 0.0) for k in range(8)])
+    assert team.until_formed(20.0)
+    team.fly(Frame((3.0, 0.0, 0.0)))
+    team.run(0.5)
+    leaders = [member for member in team.members.values() if member.leads]
+    assert len(leaders) == formation.vertices
+    assert all(member.words.standing.queue >= 0 for member in leaders)
