@@ -2,8 +2,9 @@
 
 Who holds a place knows the places of all others: they are the layout for the size of the team. So
 each member finds the same plan from all old places to the new ones, without a word, and takes what
-follows from its own. The plan is the assignment of least squared ways; of those with the same sum
-it is one whose longest ways are short.
+follows from its own. The plan is that of the assignment: exchanges of two until none gains, from
+the places that both formations have. Of those with the same sum it is one whose longest ways are
+short.
 """
 
 from functools import lru_cache
