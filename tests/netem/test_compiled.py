@@ -1,6 +1,7 @@
 """Compiled modules run only while they fit: this Python, whole, and made of the present sources."""
 
 import json
+import os
 import subprocess
 import sys
 from importlib.machinery import ModuleSpec
@@ -121,8 +122,14 @@ compiled.prefer()
 compiled.prefer()
 print(compiled.running(), os.environ[{PURE!r}])
 """
+    asked = {name: value for name, value in os.environ.items() if name != PURE}
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=30
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=30,
+        env=asked,
     )
     assert done.stdout.split() == ["plain", "Python", "1"]
     (line,) = done.stderr.splitlines()

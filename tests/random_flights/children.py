@@ -5,6 +5,7 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from time import monotonic
 from typing import Any, NamedTuple
 
@@ -63,12 +64,19 @@ def _begun(number: int, work: Work, deadline_s: float) -> Child:
 
 
 def _work(work: Work, number: int, answer: Connection) -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_B, MEMORY_B))
+    most_b = _address_space_b() + MEMORY_B
+    resource.setrlimit(resource.RLIMIT_AS, (most_b, most_b))
     try:
         row = work(number)
     except BaseException as error:  # whatever it is, it is what this flight showed
         row = {"failure": "exception", "detail": _last_line(error), "where": traceback.format_exc()}
     answer.send(row)
+
+
+def _address_space_b() -> int:
+    """Return the address space of this process [B]: a child begins with all that its parent has."""
+    pages = int(Path("/proc/self/statm").read_text("ascii").split()[0])
+    return pages * resource.getpagesize()
 
 
 def _last_line(error: BaseException) -> str:
