@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 from agent.messages import MAX_LABELS_B, MAX_TEAM, Summary
 from agent.structure.label_code import FIRST_VERTEX, queue_of_code
+from agent.structure.label_news import OWN, LabelNews
 
 QUANTUM_S = 0.25
 """Resolution of a label's time [s]."""
@@ -71,8 +72,7 @@ class Census:
         """The codes of the labels; 0 of a member of which nothing is known."""
         self._lag_s: list[float] = []
         """How old labels are when they arrive, by member [s]."""
-        self._changed: set[int] = set()
-        """Members of which others are to be told: their code changed, or they are asked for."""
+        self._news = LabelNews()
         self._asked_s: dict[int, float] = {}
         """When a member was last asked for [s]."""
         self._from = 0
@@ -91,12 +91,12 @@ class Census:
     @property
     def has_news(self) -> bool:
         """Whether there is a member of which others are to be told."""
-        return bool(self._changed)
+        return self._news.has_untold
 
     @property
     def news_number(self) -> int:
         """How many news one frame would hold, if there is room."""
-        return min(len(self._changed), NEWS)
+        return min(len(self._news), NEWS)
 
     @property
     def labels(self) -> int:
@@ -113,7 +113,7 @@ class Census:
             self._lag_s[member] *= 1.0 - LAG_SMOOTHING
             self._set(member, label, stamp_s)
 
-    def merge(self, summary: Summary, stamp_s: float, now_s: float) -> None:
+    def merge(self, summary: Summary, stamp_s: float, now_s: float, sender: int) -> None:
         """Take the labels of another agent, as they were at its stamp [s]."""
         greatest = int(stamp_s / QUANTUM_S) * CODES + CODES - 1
         known = len(self._labels)
@@ -121,12 +121,15 @@ class Census:
             label = greatest - wire
             # Most news is known already: that has to cost little.
             told = member < known and 0 <= self._labels[member] - label < WORTH_QUANTA * CODES
-            if not told and member < self._ids and wire != UNKNOWN:
-                self._compare(member, label, now_s)
+            if told:
+                if label % CODES == self._codes[member]:
+                    self._news.hear(member, sender)
+            elif member < self._ids and wire != UNKNOWN:
+                self._compare(member, label, now_s, sender)
         if summary.labels:
             self._merge_run(summary.first, summary.labels, greatest, now_s)
 
-    def _compare(self, member: int, label: int, now_s: float) -> None:
+    def _compare(self, member: int, label: int, now_s: float, sender: int) -> None:
         """Take a later label of a member; answer a much older one."""
         if member >= len(self._labels):
             self._make_room(member + 1)
@@ -136,9 +139,9 @@ class Census:
                 self._adopt(member, label, now_s)  # no event, but an answer: repeated as well
             else:
                 self._expect_later(member, now_s - label // CODES * QUANTUM_S)
-                self._set(member, label, now_s)
+                self._set(member, label, now_s, sender)
         elif label + WORTH_QUANTA * CODES <= known:
-            self._changed.add(member)
+            self._news.add(member)
 
     def _expect_later(self, member: int, age_s: float) -> None:
         """Estimate a new member's lag by the age of its first label, which came as news [s]."""
@@ -155,7 +158,7 @@ class Census:
             known = self._labels[member] > forgotten
             if known and now_s - self._asked_s.get(member, 0.0) >= ASK_S:
                 self._asked_s[member] = now_s
-                self._changed.add(member)
+                self._news.add(member)
 
     def _merge_run(self, first: int, labels: bytes, greatest: int, now_s: float) -> None:
         wire = _unpacked(labels)
@@ -177,11 +180,11 @@ class Census:
         self._lag_s[member] += LAG_SMOOTHING * (lag_s - self._lag_s[member])
         self._set(member, label, now_s)
 
-    def _set(self, member: int, label: int, now_s: float) -> None:
+    def _set(self, member: int, label: int, now_s: float, source: int = OWN) -> None:
         code = label % CODES
         if code != self._codes[member]:
             self._codes[member] = code
-            self._changed.add(member)
+            self._news.add_event(member, source)
             self.version += 1
             if member != self._own and now_s > self._changed_s:
                 self._changed_s = now_s
@@ -222,10 +225,12 @@ class Census:
         self._from = end if end < len(self._labels) else 0
         return first, _packed(_on_the_radio(self._labels[first:end], now_s))
 
-    def news(self, now_s: float, most: int = NEWS) -> tuple[tuple[int, int], ...]:
-        """Return the labels that others are to be told; from then on they count as told."""
-        told = sorted(self._changed)[: min(most, NEWS)]
-        self._changed.difference_update(told)
+    def news(
+        self, now_s: float, most: int = NEWS, tellings: int = 1
+    ) -> tuple[tuple[int, int], ...]:
+        """Return the labels that others are to be told. tellings: how many of one are enough."""
+        self._news.enough = tellings
+        told = self._news.take(min(most, NEWS))
         wire = _on_the_radio([self._labels[member] for member in told], now_s)
         return tuple(zip(told, wire, strict=True))
 

@@ -3,9 +3,12 @@
 from math import dist
 
 from agent.qstructure.formation import Slot
-from agent.structure.numbers import STANDS_M
 from agent.structure.queue_choice import likely_length
 from agent.structure.view import View
+
+WAITS_M = 0.5
+"""Who is nearer than this to a slot waits in it for a number. If it went on to where it stands in
+the order of those known so far, a line of few links would break before all are known."""
 
 
 def standing_slot(view: View, queue: int, members: int) -> Slot | None:
@@ -13,10 +16,10 @@ def standing_slot(view: View, queue: int, members: int) -> Slot | None:
 
     members: so many are looked at.
     """
-    number = view.number_near(queue, members, STANDS_M)
+    number = view.number_near(queue, members, WAITS_M)
     slots = [view.map.slot(queue, number, view.extent(queue, number))] if number else []
     slots += [view.map.vertex_slot(v) for v in view.map.vertices_of[queue]]
-    near = [each for each in slots if each and dist(each.point, view.origin) < STANDS_M]
+    near = [each for each in slots if each and dist(each.point, view.origin) < WAITS_M]
     return near[0] if near else None
 
 

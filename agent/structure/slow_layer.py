@@ -7,6 +7,7 @@ out each round; with news sooner, as a Trickle timer does (RFC 6206).
 
 from collections.abc import Collection, Sequence
 from math import ceil, inf, log
+from operator import gt
 
 import msgspec
 
@@ -27,7 +28,7 @@ from agent.structure.summary_frame import (
 )
 from agent.structure.tree import Tree, latest_version
 
-NEWS_SHARE = 0.25
+NEWS_SHARE = 0.15
 """With news the next summary comes after this share of a round."""
 NEWS_LOST, LEAST_LOSS = 0.2, 0.05
 """News is repeated until a neighbour has missed it with less than this probability, if beacons are
@@ -66,6 +67,8 @@ class SlowLayer:
         self._offered: list[set[tuple[int, int]]] = [set() for _ in vertices]
         self._next_round_s = self._sent_s = -inf
         self._rounds = self._repeats = 0
+        self._tellings = 1
+        """How often a neighbour has to be told news, so that it most likely hears them."""
         self._turns = ReportTurns()
         self._labels = 0
         """How many labels are still to be sent in this round."""
@@ -75,7 +78,7 @@ class SlowLayer:
         for sender, stamp_s, summary in heard:
             if summary.mission != self._mission:
                 continue
-            self._census.merge(summary, stamp_s, now_s)
+            self._census.merge(summary, stamp_s, now_s, sender)
             if self._gathering is not None and summary.lines is not None:
                 self._gathering.hear(sender, summary.lines, stamp_s, now_s)
             for report in summary.trees:
@@ -138,6 +141,7 @@ class SlowLayer:
             found = msgspec.structs.replace(found, blocked=tuple(places))
         if found is not self._subtrees[vertex]:
             self._note_candidates(vertex, found)
+            self._note_gap(vertex, found.highest)
             self._subtrees[vertex] = found
         return found
 
@@ -153,6 +157,13 @@ class SlowLayer:
         self.news = self.news or bool(offered - self._offered[vertex])
         self._offered[vertex] = offered
 
+    def _note_gap(self, vertex: int, highest: Sequence[int]) -> None:
+        """Report soon that a queue has a gap: its last number is above its count."""
+        known = self.summaries[vertex]
+        if known is not None and known.go and _exceed(highest, known.counts):
+            before = self._subtrees[vertex]
+            self.news = self.news or before is None or not _exceed(before.highest, known.counts)
+
     def due(self, trees: Sequence[Tree], timing: Timing, now_s: float) -> Summary | None:
         """Return what is due on the multihop channel, None where nothing is."""
         gathering = self._gathering
@@ -166,6 +177,7 @@ class SlowLayer:
         if gathering is not None:
             gathering.news = False
         self._repeats = max(0, self._repeats - 1)
+        self._tellings = _enough_repeats(timing.loss)
         self._begin_round(timing.loss, now_s)
         return self._filled([self._report(v, tree) for v, tree in enumerate(trees)], now_s)
 
@@ -188,7 +200,7 @@ class SlowLayer:
         if self._gathering is not None:
             lines, lines_b = self._gathering.wire(now_s, room_b // 2)
             room_b -= lines_b
-        news = self._census.news(now_s, news_that_fit(room_b, self._labels))
+        news = self._census.news(now_s, news_that_fit(room_b, self._labels), self._tellings)
         room_b -= NEWS_B * len(news)
         first, labels = self._census.wire(now_s, min(self._labels, room_b // LABEL_B))
         self._labels -= len(labels) // LABEL_B
@@ -213,4 +225,9 @@ def _differ(a: LeaderSummary, b: LeaderSummary) -> bool:
     """Whether two summaries differ in what agents act on at once."""
     return (a.root, a.total, a.counts, a.go, a.order, a.blocked) != (
         *(b.root, b.total, b.counts, b.go, b.order, b.blocked),
-    )
+    ) or _exceed(a.highest, a.counts) != _exceed(b.highest, b.counts)
+
+
+def _exceed(highest: Sequence[int], counts: Sequence[int]) -> bool:
+    """Whether a queue's last number is above its count: then some number is free."""
+    return any(map(gt, highest, counts))

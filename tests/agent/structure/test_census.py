@@ -60,11 +60,11 @@ def test_the_order_of_merging_does_not_matter_nor_does_merging_twice(tellers, ra
     spoken = [told(census(*heard, own=1)) for heard in tellers]
     one, other = census(), census()
     for summary in spoken:
-        one.merge(summary, NOW_S, NOW_S)
+        one.merge(summary, NOW_S, NOW_S, sender=1)
     shuffled = [*spoken, *spoken]
     random.shuffle(shuffled)
     for summary in shuffled:
-        other.merge(summary, NOW_S, NOW_S)
+        other.merge(summary, NOW_S, NOW_S, sender=1)
     assert content(one) == content(other)
     assert counted(one).total == counted(other).total
 
@@ -73,12 +73,12 @@ def test_the_order_of_merging_does_not_matter_nor_does_merging_twice(tellers, ra
 @given(st.lists(labels, max_size=8), st.lists(labels, max_size=8), st.lists(labels, max_size=8))
 def test_merging_is_associative(a, b, c):
     left = census(*a)
-    left.merge(told(census(*b, own=1)), NOW_S, NOW_S)
-    left.merge(told(census(*c, own=2)), NOW_S, NOW_S)
+    left.merge(told(census(*b, own=1)), NOW_S, NOW_S, sender=1)
+    left.merge(told(census(*c, own=2)), NOW_S, NOW_S, sender=1)
     middle = census(*b, own=1)
-    middle.merge(told(census(*c, own=2)), NOW_S, NOW_S)
+    middle.merge(told(census(*c, own=2)), NOW_S, NOW_S, sender=1)
     right = census(*a)
-    right.merge(told(middle), NOW_S, NOW_S)
+    right.merge(told(middle), NOW_S, NOW_S, sender=1)
     assert content(left) == content(right) or {m for m, *_ in (*b, *c)} & {1, 2}
 
 
@@ -88,7 +88,7 @@ def test_each_member_counts_once_by_its_latest_label(heard):
     known, latest = census(), {}
     for member, stamp_s, code in heard:
         known.hear(member, stamp_s, code)
-        known.merge(told(census((member, stamp_s, code), own=39)), NOW_S, NOW_S)
+        known.merge(told(census((member, stamp_s, code), own=39)), NOW_S, NOW_S, sender=1)
         latest[member] = max(latest.get(member, (0.0, 0)), (stamp_s, code))
     found, present = counted(known), [code for _, code in latest.values()]
     assert found.total == len(latest)
@@ -114,7 +114,7 @@ def test_no_agent_ever_counts_more_than_there_are(seed, loss):
         due = [each for each in air if each[0] <= now_s]
         air = [each for each in air if each[0] > now_s]
         for _, to, stamp_s, summary in due:
-            known[to].merge(summary, stamp_s, now_s)
+            known[to].merge(summary, stamp_s, now_s, sender=1)
         found = [counted(mine, now_s) for mine in known]
         assert max(each.total for each in found) <= ring
         if loss == 0.0 and now_s > 5.0:
@@ -136,7 +136,7 @@ def test_who_is_gone_expires_everywhere_and_stays_away():
         for k, mine in enumerate(chain):
             for near in (k - 1, k + 1):
                 if 0 <= near < len(chain):
-                    mine.merge(spoken[near], now_s, now_s + 0.1)
+                    mine.merge(spoken[near], now_s, now_s + 0.1, sender=1)
         totals = [counted(mine, now_s).total for mine in chain]
         if 10.0 < now_s < left_s:
             assert totals == [6] * 5
@@ -181,7 +181,7 @@ def test_labels_survive_the_wire(ids):
     for _ in range(-(-ids // SHARED_LABELS)):
         first, run = known.wire(NOW_S)
         assert len(run) <= 2 * SHARED_LABELS
-        other.merge(Summary(0, first, run, (), ()), NOW_S, NOW_S)
+        other.merge(Summary(0, first, run, (), ()), NOW_S, NOW_S, sender=1)
     assert counted(other) == counted(known)
     assert counted(other).total == ids
 
@@ -191,13 +191,13 @@ def test_a_label_too_old_for_the_wire_is_unknown():
     late_s = NOW_S + (MAX_QUANTA + 1) * QUANTUM_S
     assert known.news(late_s) == ((3, UNKNOWN),)
     other = census()
-    other.merge(told(known, late_s), late_s, late_s)
+    other.merge(told(known, late_s), late_s, late_s, sender=1)
     assert content(other) == content(census())
 
 
 def test_others_cannot_speak_for_the_own_agent():
     known = census((OWN, NOW_S - 1.0, FIRST_QUEUE))
-    known.merge(told(census((OWN, NOW_S, FIRST_QUEUE + 1), own=1)), NOW_S, NOW_S)
+    known.merge(told(census((OWN, NOW_S, FIRST_QUEUE + 1), own=1)), NOW_S, NOW_S, sender=1)
     assert counted(known).members == (1, 0, 0)
 
 
@@ -210,7 +210,7 @@ def test_others_cannot_speak_for_the_own_agent():
 )
 def test_hostile_labels_count_only_ids_of_the_run(first, run, news, stamp_s):
     known = census((OWN, NOW_S, FIRST_QUEUE))
-    known.merge(Summary(0, first, run, tuple(news), ()), stamp_s, NOW_S)
+    known.merge(Summary(0, first, run, tuple(news), ()), stamp_s, NOW_S, sender=1)
     found = counted(known)
     assert 1 <= found.total <= IDS
     assert sum(found.members) + sum(found.holders) <= found.total
@@ -271,7 +271,7 @@ def test_nobody_asks_for_members_whose_labels_take_long_as_usual(seed):
             for near in (each - 1, each + 1):
                 if 0 <= near < line:
                     known[near].hear(each, now_s, FIRST_QUEUE)
-                    known[near].merge(summary, now_s, now_s)
+                    known[near].merge(summary, now_s, now_s, sender=1)
         if now_s > settled_s:
             counts = [mine.population(now_s, LOST_S + ANSWER_S, QUEUES, 0) for mine in known]
             assert {each.total for each in counts} == {line}

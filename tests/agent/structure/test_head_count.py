@@ -25,7 +25,7 @@ def test_all_find_the_same_order_along_the_queue_by_what_they_tell_each_other():
             first, labels = teller.census.wire(1.0)
             told = Summary(mission=0, first=first, labels=labels, news=(), trees=())
             for other in team.values():
-                other.census.merge(told, 1.0, 1.0)
+                other.census.merge(told, 1.0, 1.0, sender=1)
     for each in team.values():
         assert each.order(view(LINE, 1.1), 0) == [2, 3, 1, 4]
 

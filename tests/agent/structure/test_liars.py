@@ -196,7 +196,7 @@ def test_no_label_makes_others_forget_a_member_that_is_there(told, stamp_s):
     for member in (1, 2, 3):
         census.hear(member, NOW_S - 0.5, FIRST_QUEUE)
     for summary in told:
-        census.merge(summary, stamp_s, NOW_S)
+        census.merge(summary, stamp_s, NOW_S, sender=1)
     assert population(census, NOW_S).total >= 3
     for member in (1, 2, 3):
         census.hear(member, NOW_S + QUANTUM_S, FIRST_QUEUE + 1)
@@ -209,7 +209,7 @@ def test_invented_members_are_those_of_the_run_and_end_after_the_liar(told, stam
     census = Census(1, IDS)
     for k in range(20):
         for summary in told:
-            census.merge(summary, stamp_s + 0.5 * k, NOW_S + 0.5 * k)
+            census.merge(summary, stamp_s + 0.5 * k, NOW_S + 0.5 * k, sender=1)
     assert population(census, NOW_S + 10.0).total <= IDS
     silent_s = NOW_S + 10.0 + LOST_S + LAGS * MAX_LAG_S + 2.0 * QUANTUM_S
     assert population(census, silent_s).total == 0
@@ -219,7 +219,7 @@ def test_a_label_of_anothers_queue_holds_until_the_member_itself_is_heard_later(
     census = Census(1, IDS)
     census.hear(3, NOW_S - 0.5, FIRST_QUEUE)
     lie = Summary(0, 0, b"", ((3, 255 - FIRST_VERTEX),), ())
-    census.merge(lie, NOW_S, NOW_S)
+    census.merge(lie, NOW_S, NOW_S, sender=1)
     assert population(census, NOW_S).holders == (1,)
     census.hear(3, NOW_S + QUANTUM_S, FIRST_QUEUE)
     assert population(census, NOW_S + QUANTUM_S).members == (1, 0)
