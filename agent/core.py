@@ -32,6 +32,7 @@ from agent.messages import (
     MAX_COST_MM,
     MAX_HEARD,
     MAX_PLACES,
+    NO_MISSION,
     ZERO,
     Beacon,
     Command,
@@ -42,6 +43,7 @@ from agent.messages import (
     Telemetry,
     Vector,
 )
+from agent.places.place_points import PlacePoints
 from agent.sensing.obstacle_perception import ObstaclePerception
 from netem.wire import channels
 from netem.wire.channels import Channel
@@ -105,8 +107,10 @@ class Agent:
         self._unidentified_vehicles = UnidentifiedVehicles(setup.fleet_max_speed_mps)
         self._unidentified: tuple[Vector, ...] = ()
         self._blocked: frozenset[Place] = frozenset()
+        self._blocked_in = NO_MISSION  # key of the mission whose places these are
         self._intent: Intent | None = None
         self._neighbour_lacks_mission = False
+        self._points = PlacePoints(setup.control.spacing_m)
         self._blocks_within_m = 0.5 * setup.control.spacing_m + SAME_VEHICLE_M
         self._housekeeping_at_s = 0.0
         self._record_age_s = 0.0
@@ -205,6 +209,8 @@ class Agent:
         if now_s >= self._housekeeping_at_s:
             self._housekeeping_at_s = now_s + HOUSEKEEPING_S
             self._do_housekeeping(observation)
+        if key != self._blocked_in:
+            self._note_blocked(key)
         place = self._intent.place if self._intent is not None else None
         cost_m = self._intent.cost_m if self._intent is not None else None
         own = Peer(id=self.id, position=observation.position, place=place, cost_m=cost_m)
@@ -256,14 +262,18 @@ class Agent:
         self._safety_monitor.relay(self._table.newest())
         self._perception.sensor_health.compare(observation, beacons)
         self._neighbour_lacks_mission = self._neighbours.any_behind(self._missions.key)
-        self._blocked = self._table.blocked(self._missions.key)
+        self._note_blocked(self._missions.key)
         self._link = self._neighbours.link(observation.position)
+
+    def _note_blocked(self, mission: int) -> None:
+        self._blocked, self._blocked_in = self._table.blocked(mission), mission
 
     def _reports_vehicle(self, agents: int) -> ReportsVehicle:
         """Return a function: whether a neighbour reports an unidentified vehicle at a position.
 
         agents: size of the team. A beacon names places, each taken by a vehicle within d_ir / 2,
-        and at most MAX_PLACES of them. A neighbour that flies another mission contradicts nothing.
+        and at most MAX_PLACES of them. A neighbour that flies another mission contradicts nothing,
+        nor does one while the vehicle takes no place: it cannot report it.
         """
         mission = self._missions.flown
 
@@ -273,11 +283,12 @@ class Agent:
             if len(witness.blocked) >= MAX_PLACES:
                 return True
             slots = [mission.formation.slot(Place(*place), agents) for place in witness.blocked]
-            return any(
+            reported = any(
                 slot is None
                 or dist(mission.frame.to_world(slot.point), vehicle) <= self._blocks_within_m
                 for slot in slots
             )
+            return reported or not self._points.taken_by(mission, agents, (vehicle,), self._blocked)
 
         return reports_vehicle
 

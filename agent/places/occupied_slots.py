@@ -4,6 +4,9 @@ An unidentified vehicle may be a dead one that hovers, or a vehicle of a team be
 Then both teams take each other's vehicles for unidentified, and each makes way for the other. Two
 rules end that: an agent that stands in its place keeps it, whatever vehicle comes near; and a place
 that a vehicle has left is not available again at once.
+
+The vehicles hover in the world, whatever the team forms: in a new mission the places at which they
+hover are found anew, before anybody reports them.
 """
 
 from collections.abc import Sequence
@@ -39,6 +42,7 @@ class OccupiedSlots:
         self._senses_vehicles = senses_vehicles
         self._recent: dict[Place, float] = {}
         self._agents, self._grown_s = 0, 0.0
+        self._mission: Flown | None = None  # of the recent places, with its frame at that time
 
     def update(
         self,
@@ -55,13 +59,24 @@ class OccupiedSlots:
         """
         if agents > self._agents:
             self._grown_s = senses.now_s
-        self._agents = agents
+        self._carry_over(mission, agents)
+        self._agents, self._mission = agents, mission
         seen = self._points.taken_by(mission, agents, senses.silent, reported)
         if not (seen or reported or self._recent):
             self.seen = ()
             return NO_PLACES
         occupied = self._occupied(senses, mission, holders, reported, seen)
         return self._with_recent(senses.now_s, occupied)
+
+    def _carry_over(self, mission: Flown, agents: int) -> None:
+        """Find the places of a new mission at those that were taken until now."""
+        last = self._mission
+        if last is None or last.key == mission.key or not self._recent:
+            return
+        points = [self._points.point(last, self._agents, place) for place in self._recent]
+        there = [point for point in points if point is not None]
+        taken = self._points.taken_by(mission, agents, there)
+        self._recent = dict.fromkeys(sorted(taken), max(self._recent.values()))
 
     def _occupied(
         self,

@@ -1,13 +1,14 @@
 """A member of the Q-structure: the structure of the mission that it flies.
 
-With each mission the structure begins anew, but for the places: they follow from those before.
+With each mission the structure begins anew, but for the places: they follow from those before, and
+those that unidentified vehicles take are found at the same points.
 """
 
 from agent.config import AgentSetup
 from agent.controller import Flown, Senses, Words
 from agent.messages import DISTRESS, Place
-from agent.places.place_points import OwnTarget
-from agent.structure.queue_map import map_of
+from agent.places.occupied_slots import OccupiedSlots
+from agent.places.place_points import OwnTarget, PlacePoints
 from agent.structure.relocation import relocated
 from agent.structure.structure import Structure
 
@@ -22,6 +23,8 @@ class StructureMember:
         self._setup, self._kind = setup, structure
         self._structure: Structure | None = None
         self._mission = -1
+        points = PlacePoints(setup.control.spacing_m)
+        self._occupied = OccupiedSlots(points, "proximity" in setup.vehicle.sensors)
 
     @property
     def cost_m(self) -> float:
@@ -31,7 +34,7 @@ class StructureMember:
     @property
     def blocked(self) -> tuple[Place, ...]:
         """The places that the agent sees taken by an unidentified vehicle (E18)."""
-        return self._structure.blocked if self._structure is not None else ()
+        return self._occupied.seen
 
     def select(self, senses: Senses) -> OwnTarget | None:
         """Return the own target now; None for an agent without one."""
@@ -48,7 +51,7 @@ class StructureMember:
         held = self._structure.held if self._structure is not None else None
         spacing_m = self._setup.control.spacing_m
         before = relocated(held, mission, now_s, spacing_m) if held is not None else None
-        return self._kind(self._setup, map_of(mission.formation), mission.key, now_s, before)
+        return self._kind(self._setup, mission, now_s, self._occupied, before)
 
     def words(self, now_s: float) -> Words:
         """Return what the agent says of its part; call it once a tick, after ``select``."""

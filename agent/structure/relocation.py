@@ -4,7 +4,7 @@ Who holds a place knows the places of all others: they are the layout for the si
 each member finds the same plan from all old places to the new ones, without a word, and takes what
 follows from its own. The plan is that of the assignment: exchanges of two until none gains, from
 the places that both formations have. Of those with the same sum it is one whose longest ways are
-short.
+short. It sends nobody to where a vehicle hovers in a place of old.
 """
 
 from functools import lru_cache
@@ -14,6 +14,7 @@ from typing import NamedTuple
 from agent.assignment.allocation import allocate
 from agent.controller import Flown, Peer
 from agent.messages import Place
+from agent.places.place_points import PlacePoints
 from agent.qstructure.formation import Formation
 from agent.qstructure.target_frame import Frame
 from agent.structure.longest_way import shortened
@@ -72,13 +73,11 @@ _Pose = tuple[float, float, float, float]
 @lru_cache(PLANS_KEPT)
 def _plan(move: _Move, old_pose: _Pose, new_pose: _Pose) -> dict[Place, Place]:
     """Return the new place of each old one; nothing where a team of that size has not room."""
-    # What is blocked is known of the places of old; they may be those of now.
-    is_same = move.before is move.after and old_pose == new_pose
+    here, there = (Frame(pose[:3], pose[3]) for pose in (old_pose, new_pose))
     old = move.before.layout(move.members, move.blocked)
-    new = old if is_same else move.after.layout(move.members)
+    new = move.after.layout(move.members, _taken(move, here, there))
     if not old.places or len(new.places) != len(old.places):
         return {}
-    here, there = (Frame(pose[:3], pose[3]) for pose in (old_pose, new_pose))
     starts = [here.to_world(old.slots[place].point) for place in old.places]
     ends = [there.to_world(new.slots[place].point) for place in new.places]
     known = {place: column for column, place in enumerate(new.places)}
@@ -90,6 +89,14 @@ def _plan(move: _Move, old_pose: _Pose, new_pose: _Pose) -> dict[Place, Place]:
     columns = [known[place] for k in range(len(team)) if (place := found[k]) is not None]
     columns = shortened(columns, starts, ends, move.spacing_m)
     return {place: new.places[k] for place, k in zip(old.places, columns, strict=True)}
+
+
+def _taken(move: _Move, here: Frame, there: Frame) -> frozenset[Place]:
+    """Return the new places at those of old that are blocked: the vehicles there stay."""
+    slots = [move.before.slot(place, move.members) for place in sorted(move.blocked)]
+    points = [here.to_world(slot.point) for slot in slots if slot is not None]
+    mission = Flown(0, move.after, there)
+    return PlacePoints(move.spacing_m).taken_by(mission, move.members, points)
 
 
 def _later(frame: Frame, after_s: float) -> Frame:

@@ -24,7 +24,7 @@ from agent.messages import (
     Summary,
 )
 from agent.places.occupied_slots import OccupiedSlots
-from agent.places.place_points import OwnTarget, PlacePoints
+from agent.places.place_points import OwnTarget
 from agent.structure.claim import NO_QUEUE, Claim
 from agent.structure.convergecast import own_part
 from agent.structure.direct_rule import DirectRule
@@ -37,7 +37,7 @@ from agent.structure.likely_slot import nearest_slot, slot_by_order, standing_sl
 from agent.structure.link_timing import timing_of
 from agent.structure.numbers import Numbers
 from agent.structure.queue_choice import QueueChoice
-from agent.structure.queue_map import QueueMap
+from agent.structure.queue_map import map_of
 from agent.structure.relocation import Held, Relocated
 from agent.structure.slow_layer import SlowLayer
 from agent.structure.swaps import Swaps
@@ -56,19 +56,20 @@ FAR_M = 2.5
 class Structure:
     """One agent's part in the structure of one mission.
 
-    before: what follows from the mission before; ``held`` is the same for the next mission.
+    occupied: it stays from mission to mission. before: what follows from the mission before;
+    ``held`` is the same for the next mission.
     """
 
     def __init__(
         self,
         setup: AgentSetup,
-        formation: QueueMap,
-        mission: int,
+        mission: Flown,
         now_s: float,
+        occupied: OccupiedSlots,
         before: Relocated | None = None,
     ) -> None:
-        own_id = setup.id
-        self._own_id, self._map = own_id, formation
+        own_id, formation = setup.id, map_of(mission.formation)
+        self._own_id, self._map, self._occupied = own_id, formation, occupied
         self._beacon_s = 1.0 / setup.comms.local_hz
         self._round_s = 1.0 / setup.comms.multihop_hz if setup.comms.multihop_hz > 0.0 else inf
         self.claim = Claim(now_s)
@@ -81,7 +82,7 @@ class Structure:
         self._gathering = Gathering(setup, formation) if setup.control.gather else None
         census = self._head_count.census
         self._slow = SlowLayer(
-            own_id, mission, formation, census, self._round_s, gathering=self._gathering
+            own_id, mission.key, formation, census, self._round_s, gathering=self._gathering
         )
         self._queue_choice = QueueChoice(own_id)
         self._election = Election(own_id, now_s)
@@ -89,8 +90,6 @@ class Structure:
         self._swaps = Swaps(own_id)
         self._direct = DirectRule(own_id, now_s)
         self._leader_place = LeaderPlace(self._numbers, self._direct)
-        points = PlacePoints(setup.control.spacing_m)
-        self._occupied = OccupiedSlots(points, "proximity" in setup.vehicle.sensors)
         self._leader: Leader | None = None
         self._followed = False
         self._started_s = now_s
@@ -103,11 +102,6 @@ class Structure:
         """Size of the team that takes its places over, until a leader's count of it is steady."""
         self.held: Held | None = None
         """The own place, with the frame in which the team stands in its places."""
-
-    @property
-    def blocked(self) -> tuple[Place, ...]:
-        """The places that the agent sees taken by an unidentified vehicle (E18)."""
-        return self._occupied.seen
 
     def update(self, senses: Senses, mission: Flown) -> OwnTarget | None:
         """Return the own target now; None for an agent without a place."""
@@ -293,7 +287,7 @@ class Structure:
             if tree.parent < 0 and not leads:
                 continue
             own = self._own_part(view, v)
-            subtree = self._slow.collect(v, own, self.blocked, view.now_s, view.timing)
+            subtree = self._slow.collect(v, own, self._occupied.seen, view.now_s, view.timing)
             if leads and self._leader is not None:
                 # Only what is seen goes down, not what came down before: that would never end.
                 blocked = frozenset([Place(*place) for place in subtree.blocked])

@@ -7,11 +7,11 @@ from random import Random
 import msgspec
 import pytest
 
-from agent.codec import add_checksum, decode_command, encode, strip_checksum
+from agent.codec import add_checksum, decode_command, encode, encode_formation, strip_checksum
 from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.controller import Intent, Senses, Words
 from agent.core import Agent
-from agent.messages import Beacon, Observation, Place
+from agent.messages import AT_HOME, Beacon, Mission, Observation, Place
 from agent.qstructure.formation import FormationSpec, formation_of
 from netem.wire.channels import LOCAL, MAX_PAYLOAD_B, MULTIHOP
 from netem.wire.frame import Outgoing, Transmission, pack, unpack_transmission
@@ -334,16 +334,18 @@ CLOSED = msgspec.convert(
 )
 
 
+def counting_core(formation):
+    control = Control(controller=f"{__name__}:Counting")
+    return Agent(msgspec.structs.replace(AGENT_SETUP, formation=formation, control=control))
+
+
 @pytest.mark.parametrize(("agents", "kept"), [(9, True), (5, False)])
 def test_reported_places_of_a_closed_queue_are_those_of_the_team_that_is_counted(
     monkeypatch, agents, kept
 ):
     """Of a team of nine an agent hears one; the place that this one reports is one of nine."""
     monkeypatch.setattr(Counting, "agents", agents)
-    setup = msgspec.structs.replace(
-        AGENT_SETUP, formation=CLOSED, control=Control(controller=f"{__name__}:Counting")
-    )
-    core = Agent(setup)
+    core = counting_core(CLOSED)
     place = Place(0, 4)
     body = formation_of(CLOSED, 1.0).slot(place, 9).point
     x, _, _ = body
@@ -354,3 +356,27 @@ def test_reported_places_of_a_closed_queue_are_those_of_the_team_that_is_counted
         deliver(core, witness, now_s)
         core.step(observation(tick, at, [(0.0, 1.0, 0.0)] if near else []))
     assert bool(Counting.seen.silent) == kept
+
+
+@pytest.mark.parametrize(("at", "kept"), [((3.0, 0.0, 0.0), True), (ORIGIN, False)])
+def test_a_neighbour_contradicts_only_a_vehicle_that_it_could_report(at, kept):
+    """Off the places nobody reports a vehicle; in the next mission it may be in the way."""
+    core = counting_core(WEDGE)
+    x, _, _ = at
+    for tick in range(120):
+        now_s, near = tick * TICK_S, tick < 60
+        deliver(core, beacon(3, tick + 1, now_s, at=(x, 1.0, 0.0)), now_s)
+        here = (x, -1.0 if near else -4.0, 0.0)
+        core.step(observation(tick, here, [(0.0, 1.0, 0.0)] if near else []))
+    assert bool(Counting.seen.silent) == kept
+
+
+def test_places_that_others_see_taken_are_of_the_mission_that_is_flown():
+    core = counting_core(CLOSED)
+    deliver(core, beacon(3, 1, 0.0, blocked=(Place(0, 4),)), 0.0)
+    core.step(observation(0))
+    assert Counting.seen.blocked == {Place(0, 4)}
+    order = Mission(key=0, frame=AT_HOME, formation=encode_formation(WEDGE))
+    core.step(msgspec.structs.replace(observation(1), orders=(order,)))
+    assert Counting.seen.mission.formation.name == "wedge"
+    assert Counting.seen.blocked == frozenset()

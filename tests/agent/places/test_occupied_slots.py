@@ -39,9 +39,9 @@ def senses(now_s, unidentified=(), vehicles=(), at=ME[1]):
     )
 
 
-def update(occupied, near, team=(ME, FAR), reported=frozenset()):
+def update(occupied, near, team=(ME, FAR), reported=frozenset(), mission=MISSION):
     """Return the places that are not available. team: place and position of each member."""
-    return occupied.update(near, MISSION, team, len(team), frozenset(reported))
+    return occupied.update(near, mission, team, len(team), frozenset(reported))
 
 
 @pytest.fixture
@@ -87,6 +87,17 @@ def test_a_place_that_a_vehicle_has_left_is_not_free_at_once(occupied):
     assert update(occupied, senses(START_S + 0.9 * FREED_S)) == {SECOND}
     assert occupied.seen == ()
     assert update(occupied, senses(START_S + 1.1 * FREED_S)) == frozenset()
+
+
+def test_in_a_new_mission_the_places_at_the_same_points_are_taken(occupied):
+    """A neighbour has reported the vehicle; in the new mission it has not spoken yet."""
+    far_off, farther = (9.0, 0.0, 0.0), (8.0, 0.0, 0.0)
+    team = ((None, far_off), (None, farther))
+    update(occupied, senses(START_S, at=far_off), team, {SECOND})
+    new = Flown(1, LINE, Frame((-1.2, 0.0, 0.0)))
+    assert update(occupied, senses(START_S + 0.1, at=far_off), team, mission=new) == {ME[0]}
+    elsewhere = Flown(2, LINE, Frame((-9.0, 0.0, 0.0)))
+    assert update(occupied, senses(START_S + 0.2, at=far_off), team, mission=elsewhere) == set()
 
 
 def test_a_place_is_not_free_while_an_unknown_vehicle_is_near(occupied):

@@ -76,6 +76,20 @@ def test_where_the_places_stay_nobody_is_sent_into_a_blocked_one():
         assert relocated(held, flown(LINE, ASIDE, 1), 0.0, SPACING_M) == Relocated(place, 6)
 
 
+@pytest.mark.parametrize("after", [TWO, WEDGE])
+def test_in_another_formation_nobody_is_sent_to_a_vehicle_that_hovers_there(after):
+    """The vertex is at the same point of the world, though not of the frame."""
+    blocked, ahead = frozenset({Place(0, 0)}), Frame((2.0, 0.0, 0.0))
+    to_the_side = lines((-2.0, 0.0, 0.0)).formation
+    for before in (LINE.formation, to_the_side):
+        places = before.layout(6, blocked).places
+        frame = ahead if before is to_the_side else Frame()
+        mission = Flown(0, before, frame)
+        held = [Held(place, 6, blocked, mission, 0.0) for place in places]
+        found = {relocated(each, flown(after, Frame(), 1), 0.0, SPACING_M).place for each in held}
+        assert found == set(after.formation.layout(6, blocked).places)
+
+
 def test_a_team_all_of_whose_places_are_blocked_has_no_plan():
     closed = next(m for m in map(library, LIBRARY) if all(m.closed))
     blocked = frozenset(Place(q, k) for q in range(closed.queues) for k in range(200))
