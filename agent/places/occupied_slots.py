@@ -5,8 +5,8 @@ Then both teams take each other's vehicles for unidentified, and each makes way 
 rules end that: an agent that stands in its place keeps it, whatever vehicle comes near; and a place
 that a vehicle has left is not available again at once.
 
-The vehicles hover in the world, whatever the team forms: in a new mission the places at which they
-hover are found anew, before anybody reports them.
+The vehicles hover in the world, whatever the team forms: in a new mission or frame the places at
+which they hover are found anew, before anybody reports them.
 """
 
 from collections.abc import Sequence
@@ -69,9 +69,13 @@ class OccupiedSlots:
         return self._with_recent(senses.now_s, occupied)
 
     def _carry_over(self, mission: Flown, agents: int) -> None:
-        """Find the places of a new mission at those that were taken until now."""
+        """Find the places of a new mission or frame at those that were taken until now."""
         last = self._mission
-        if last is None or last.key == mission.key or not self._recent:
+        if (
+            last is None
+            or (last.key, last.frame_key) == (mission.key, mission.frame_key)
+            or not self._recent
+        ):
             return
         points = [self._points.point(last, self._agents, place) for place in self._recent]
         there = [point for point in points if point is not None]

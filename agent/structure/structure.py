@@ -130,7 +130,8 @@ class Structure:
             self.held = None
         elif mission.frame_key == mission.key:
             self.held = Held(own.place, view.total, view.blocked, mission, view.now_s)
-        elif self.held is not None:
+        elif self.held is not None and view.blocked == self.held.blocked:
+            # Where others are blocked, the team changes to other places, one member after another.
             self.held = self.held._replace(place=own.place, members=view.total)
 
     def _flown(self, now_s: float) -> OwnTarget | None:

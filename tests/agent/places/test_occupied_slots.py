@@ -96,7 +96,7 @@ def test_in_a_new_mission_the_places_at_the_same_points_are_taken(occupied):
     update(occupied, senses(START_S, at=far_off), team, {SECOND})
     new = Flown(1, LINE, Frame((-1.2, 0.0, 0.0)))
     assert update(occupied, senses(START_S + 0.1, at=far_off), team, mission=new) == {ME[0]}
-    elsewhere = Flown(2, LINE, Frame((-9.0, 0.0, 0.0)))
+    elsewhere = Flown(1, LINE, Frame((-9.0, 0.0, 0.0)), frame_key=2)
     assert update(occupied, senses(START_S + 0.2, at=far_off), team, mission=elsewhere) == set()
 
 

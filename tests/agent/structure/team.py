@@ -81,12 +81,17 @@ class Team:
         self.drops: Drops = lambda *_: self.random.random() < loss
         self.members = {k: Member(k, at, self) for k, at in enumerate(points)}
         self.now_s = 0.0
+        self.silent = ()  # unidentified vehicles [m], which all know
         self._air = []
 
     def fly(self, frame):
         """Give the whole team a mission: the same formation in another frame."""
         key = self.mission.key + 1
         self.mission = Flown(key, self.map.formation, frame, key)
+
+    def hear_frame(self, frame):
+        """Let the frame of the next mission come before the mission."""
+        self.mission = self.mission._replace(frame=frame, frame_key=self.mission.key + 1)
 
     def join(self, at):
         """Let another agent take off."""
@@ -147,6 +152,7 @@ class Team:
             neighbours=tuple(neighbours),
             team=tuple,
             mission=self.mission,
+            silent=self.silent,
             link=self.link,
             summaries=tuple(member.summaries),
         )

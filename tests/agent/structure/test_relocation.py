@@ -130,6 +130,22 @@ def test_a_member_that_is_lost_on_the_way_leaves_no_gap():
     assert all(dist(m.at, (0.0, 0.0, 0.0)) > 2.0 for m in team.members.values())
 
 
+@pytest.mark.parametrize("ahead_s", [0.2, 1.5, 5.0])
+def test_where_a_frame_comes_before_its_mission_all_go_on_from_places_of_one_time(ahead_s):
+    """In the new frame no vehicle hovers in the vertex, so the team would take other places."""
+    team = Team(LINE, [(-float(k), 0.1, 0.0) for k in range(1, 7)])
+    team.silent = ((0.0, 0.0, 0.0),)
+    team.run(15.0)
+    blocked = frozenset({Place(0, 0)})
+    assert set(team.places()) == set(LINE.formation.layout(6, blocked).places)
+    team.hear_frame(ASIDE)
+    team.run(ahead_s)
+    team.fly(ASIDE)
+    team.run(0.2)
+    assert set(team.places()) == set(LINE.formation.layout(6).places)
+    assert team.until_formed(20.0)
+
+
 @pytest.mark.parametrize("formation", [LINE, TWO, WEDGE])
 def test_who_leads_keeps_a_queue_to_stand_in_while_its_vertex_is_taken(formation):
     team = Team(formation, [(-float(k), 0.2 * (k % 3), 0.0) for k in range(8)])
