@@ -10,6 +10,7 @@ from msgspec.structs import replace
 from agent.config import AgentSetup
 from agent.controller import Controller, Intent, Senses, load
 from agent.messages import MAX_ANGLE_RAD, MAX_FORCE, MAX_M, MAX_SPEED_MPS, Vector
+from netem.compiled import UnloadableError
 
 NUMBERS = 13
 """Numbers in an intent besides its target: three vectors, two tilt angles, yaw and force."""
@@ -28,7 +29,8 @@ class CheckedController:
     """One agent's controller. Raises ControllerError if it cannot be loaded.
 
     Any error of the controller's constructor or ``decide`` is raised as FaultyControllerError,
-    SystemExit and KeyboardInterrupt included; Ctrl-C passes.
+    SystemExit and KeyboardInterrupt included; Ctrl-C passes, and so does compiled code that cannot
+    be loaded.
     """
 
     def __init__(self, setup: AgentSetup) -> None:
@@ -47,7 +49,9 @@ class CheckedController:
             raise self._fault(f"at {senses.now_s:g} s", error) from error
 
     def _fault(self, when: str, error: BaseException) -> FaultyControllerError:
-        """Return the error that names the controller; raise ``error`` itself if it is Ctrl-C."""
+        """Return the error that names the controller; re-raise one that is not its own."""
+        if isinstance(error, UnloadableError):
+            raise error
         if isinstance(error, KeyboardInterrupt) and _ctrl_c_raises():
             raise error
         if isinstance(error, MemoryError):

@@ -1,9 +1,9 @@
-"""Compiled modules: they run instead of the plain ones for as long as they match them.
+"""Compiled modules: they run instead of the pure ones for as long as they match them.
 
 ``deploy/compile.sh`` compiles what is hot, into ``build/compiled`` beside the packages, and writes
 a manifest last. The compiled modules run only if the manifest fits this Python and every source
-file: after an edit, or half a build, plain Python runs, and a line says why. It is never a mixture.
-QSWARM_PURE=1 asks for plain Python.
+file: after an edit, or half a build, pure Python runs, and a line says why. It is never a mixture.
+QSWARM_PURE=1 asks for pure Python.
 
 This module comes before all others, so it imports none of them.
 """
@@ -25,12 +25,19 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "build" / "compiled"
 MANIFEST = "manifest.json"
 PURE = "QSWARM_PURE"
-"""The environment variable that asks for plain Python, here and in processes begun from here."""
+"""The environment variable that asks for pure Python, here and in processes begun from here."""
 REMEDY = "deploy/compile.sh compiles anew"
 
 
 class UnfitError(ValueError):
     """Compiled modules that must not run; the text says why."""
+
+
+class UnloadableError(SystemExit):
+    """Ends the process with status 2: a person has been told why. Nobody may go on from it."""
+
+    def __init__(self) -> None:
+        super().__init__(2)
 
 
 class _Loader(ExtensionFileLoader):
@@ -42,9 +49,9 @@ class _Loader(ExtensionFileLoader):
         except ImportError as error:
             if error.path != self.path:
                 raise  # something else that the module imports
-            remedy = f"{REMEDY}, and {PURE}=1 runs plain Python"
+            remedy = f"{REMEDY}, and {PURE}=1 runs pure Python"
             print(f"qswarm: compiled code cannot be loaded: {error}; {remedy}.", file=sys.stderr)
-            raise SystemExit(2) from error
+            raise UnloadableError from error
 
 
 class Finder(MetaPathFinder):
@@ -116,7 +123,7 @@ def prefer() -> None:
     except UnfitError as error:
         os.environ[PURE] = "1"  # the processes begun from here need not say it again
         print(
-            f"qswarm: plain Python runs, not the compiled code: {error}. {REMEDY}.", file=sys.stderr
+            f"qswarm: pure Python runs, not the compiled code: {error}. {REMEDY}.", file=sys.stderr
         )
         return
     if files:
@@ -125,8 +132,3 @@ def prefer() -> None:
 
 def _installed() -> bool:
     return any(isinstance(each, Finder) for each in sys.meta_path)
-
-
-def running() -> str:
-    """Return which code runs, for a person: compiled or plain."""
-    return "compiled" if _installed() else "plain Python"

@@ -15,6 +15,7 @@ from agent.config import AgentSetup
 from agent.controller import ControllerError, Heard, Intent, Senses, load
 from agent.guidance.flocking import Flocking
 from agent.guidance.q_structure import QStructure
+from netem.compiled import UnloadableError
 from worldsim.scenario.file import load as load_scenario
 
 SCENARIO = Path(__file__).parents[2] / "deploy" / "scenarios" / "flocking-9.toml"
@@ -184,6 +185,13 @@ def test_a_failure_at_the_start_names_controller_and_agent(controller_with: Any)
         controller_with(OSError("no battery"))
     begin = f"controller '{__name__}:StubController' of agent 3 failed in its constructor: "
     assert str(failed.value) == begin + "OSError: no battery"
+
+
+def test_compiled_code_that_cannot_be_loaded_is_not_the_controllers_fault(
+    controller_with: Any,
+) -> None:
+    with pytest.raises(UnloadableError):
+        controller_with(UnloadableError()).decide(SENSES)
 
 
 def heard(x: float, velocity: tuple[float, float, float] = REST) -> Heard:

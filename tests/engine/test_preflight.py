@@ -1,9 +1,12 @@
 """Checks before a run starts: room for those who join, found in bounded work."""
 
+import sys
+from pathlib import Path
 from time import process_time
 
 import pytest
 
+from netem.compiled import Finder, UnloadableError
 from tests.small_scenario import SMALL
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS, admit
 from worldsim.scenario.file import parse
@@ -33,3 +36,18 @@ def test_a_timeline_that_asks_for_too_many_formations_is_refused() -> None:
     overrides = {"event": f"[{event}]", "fleet.agents": "500", "fleet.start": "{ kind = 'box' }"}
     with pytest.raises(ScenarioError, match="500 events change what 1000 agents form"):
         parse(SMALL, overrides=overrides)
+
+
+def test_a_compiled_module_that_cannot_be_loaded_is_told_of_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is not the controller's fault, and nobody can go on."""
+    broken = tmp_path / "broken.so"
+    broken.write_text("x = 1\n")
+    monkeypatch.setattr(sys, "meta_path", [Finder({"hot_core": broken}), *sys.meta_path])
+    scenario = parse(SMALL, overrides={"control.controller": "hot_core:Any"})
+    with pytest.raises(UnloadableError) as ended:
+        admit(scenario, "small.toml", VIRTUAL_COMMAND_TICKS)
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "broken.so" in line

@@ -9,6 +9,7 @@ from pathlib import Path
 from agent.checked_controller import described
 from agent.controller import ControllerError
 from agent.controller import load as load_controller
+from netem.compiled import UnloadableError
 from worldsim.scenario.faults import Join, ProcessFault
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.rules import speed_problem
@@ -58,6 +59,8 @@ def _controller(scenario: Scenario) -> Problem | None:
         load_controller(name)
     except ControllerError as error:
         return Problem("control.controller", str(error))
+    except UnloadableError:
+        raise  # not the controller's fault
     except (Exception, SystemExit, GeneratorExit) as error:  # a user's module may raise anything
         return Problem(
             "control.controller",
