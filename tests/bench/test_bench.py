@@ -17,6 +17,16 @@ from worldsim.bench.ticking import ticking
 from worldsim.commands.app import command
 
 
+@pytest.fixture(autouse=True)
+def signals():
+    """Restore the handlers that a benchmark sets."""
+    numbers = (signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.getsignal(number) for number in numbers}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 @pytest.fixture
 def quick(monkeypatch):
     """Set the figures of two measures that take no time: each call returns the next one."""
@@ -154,6 +164,41 @@ def test_a_slowdown_fails_the_command_only_where_asked(quick, capsys, tmp_path, 
     lines = capsys.readouterr().out.splitlines()
     assert ("WORSE" in lines[-2]) == bool(status)
     assert lines[-1].endswith(f"{status} worse by more than {most} %{': more' * status}")
+
+
+def test_a_limit_is_an_error_where_nothing_can_be_compared(quick, capsys, tmp_path, monkeypatch):
+    """The one row is new, and the other one was saved in another unit."""
+    file = str(tmp_path / "before.json")
+    assert command(["bench", "--repeats", "1", "--save", file]) == 0
+    less, more = table.MEASURES
+    monkeypatch.setattr(table, "MEASURES", (less._replace(name="new"), more._replace(unit="s")))
+    capsys.readouterr()
+    arguments = ["bench", "--repeats", "1", "--against", file]
+    assert command([*arguments, "--fail-over", "5"]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    (line,) = printed.err.splitlines()
+    assert line.startswith(f"{file}: rows: --fail-over has nothing to compare")
+    assert command(arguments) == 0
+
+
+@pytest.mark.parametrize("save", [True, False])
+def test_an_interrupted_benchmark_saves_the_rows_that_it_has(monkeypatch, capsys, tmp_path, save):
+    def interrupt():
+        raise KeyboardInterrupt
+
+    rows = [("first", lambda: 1.0), ("second", interrupt), ("third", lambda: 3.0)]
+    measures = tuple(Measure(name, "us", None, False, measure) for name, measure in rows)
+    monkeypatch.setattr(table, "MEASURES", measures)
+    file = tmp_path / "part.json"
+    assert command(["bench", *(["--save", str(file)] * save)]) == 130
+    (line,) = capsys.readouterr().err.splitlines()
+    if save:
+        assert line == f"qswarm: interrupted; 1 of 3 rows are in {file}"
+        assert [row["name"] for row in json.loads(file.read_text())["rows"]] == ["first"]
+    else:
+        assert line == "qswarm: interrupted"
+        assert not file.exists()
 
 
 def test_a_bad_file_is_named_before_anything_is_measured(capsys, tmp_path):

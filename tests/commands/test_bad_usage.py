@@ -72,6 +72,10 @@ BAD = [
     (("bench", "--against", "none.json"), "none.json: no such file"),
     (("bench", "--against", "small.toml"), "small.toml: not JSON: "),
     (("bench", "--fail-over", "10"), "--fail-over: needs --against"),
+    (
+        ("bench", "--against", "x.json", "--fail-over", "inf"),
+        "--fail-over: got inf; at most 1000000",
+    ),
     (("bench", "--seconds", "10"), "--seconds: needs --processes"),
     (("bench", "--only", "Agent stop*"), "--only: no row matches 'Agent stop*'; a name as"),
     (("bench", "--only", "processes*"), "--only: 'processes*' needs --processes"),

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from math import inf
 from typing import NamedTuple
 
-from worldsim.bench.measures import Row
+from worldsim.bench.measures import Measure, Row
 from worldsim.bench.saved_figures import Saved, SavedRow
 
 MARKED_PERCENT = 10.0
@@ -24,17 +24,23 @@ class Change(NamedTuple):
         return self.worse_percent > percent + 1e-9
 
 
+def incomparable(figure: Measure | Row, before: SavedRow | None) -> str | None:
+    """Return why a figure cannot be compared with what is saved; None where it can."""
+    if before is None:
+        return "not in the file"
+    if (before.unit, before.more) != (figure.unit, figure.more):
+        return f"saved in {before.unit}: not comparable"
+    return "saved as invalid" if before.measured is None else None
+
+
 def change(row: Row, before: SavedRow | None, grain: float = 0.0) -> Change:
     """Compare a row. grain: differences up to this one mean nothing [the row's unit].
 
     Where a greater figure is better, worse counts on the inverse: half the speed is 100 % worse.
     """
-    if before is None:
-        return Change(None, 0.0, "not in the file")
-    if (before.unit, before.more) != (row.unit, row.more):
-        return Change(None, 0.0, f"saved in {before.unit}: not comparable")
-    if before.measured is None:
-        return Change(None, 0.0, "saved as invalid")
+    reason = incomparable(row, before)
+    if before is None or before.measured is None or reason is not None:
+        return Change(None, 0.0, reason or "")
     note = f"{before.measured:.4g}"
     if row.measured is None:
         return Change(None, inf, note)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from worldsim.commands.options import complain, examples
-from worldsim.results.exit_status import FAIL, PASS
+from worldsim.results.exit_status import FAIL, INTERRUPTED, PASS
 
 if TYPE_CHECKING:
     from worldsim.bench.comparison import Change
@@ -76,6 +76,7 @@ def bench(
         typer.Option(
             metavar="PERCENT",
             min=0.0,
+            max=1e6,
             help="Exit with 1 if a figure is worse by more (needs --against).",
         ),
     ] = None,
@@ -95,18 +96,24 @@ def bench(
     if fail_over is not None and against is None:
         raise typer.BadParameter("needs --against", param_hint="--fail-over")
     measures = _chosen(processes, seconds, only or [])
-    if processes:
-        interrupt_on_signals()  # the fleet of the moment ends, and its folder is removed
     _check_writable(save)
-    measured_with = circumstances()
     before = saved(against) if against is not None else None
+    if against is not None and before is not None and fail_over is not None:
+        _check_comparable(measures, before, against)
+    if processes or save is not None:
+        interrupt_on_signals()  # the fleet of the moment ends, and what was measured is saved
+    measured_with = circumstances()
     print(f"code: {measured_with['code']}", flush=True)
     if before is not None:
         _warn(of(content([], measured_with, repeats, seconds)), before)
     marked = MARKED_PERCENT if fail_over is None else fail_over  # what fails is what is marked
-    rows, changes = _printed(measures, repeats, before, marked)
-    if save is not None:
+    rows, changes, interrupted = _printed(measures, repeats, before, marked)
+    if save is not None and rows:
         write_json(save, content(rows, measured_with, repeats, seconds))
+    if interrupted:
+        saved_in = f"; {len(rows)} of {len(measures)} rows are in {save}" if save and rows else ""
+        complain(f"qswarm: interrupted{saved_in}")
+        return INTERRUPTED
     if before is not None:
         print(summary_line(changes, str(against), marked))
     failed = fail_over is not None and any(each.worse_by(fail_over) for each in changes.values())
@@ -143,6 +150,18 @@ def _check_writable(file: Path | None) -> None:
         raise ScenarioError(file, "", "cannot be written: no such folder, or not writable")
 
 
+def _check_comparable(measures: "list[Measure]", before: "Saved", file: Path) -> None:
+    """Raise ScenarioError if none of the rows to measure has a figure in the file."""
+    from worldsim.bench.comparison import incomparable
+    from worldsim.scenario.toml import ScenarioError
+
+    then = {row.name: row for row in before.rows}
+    if all(incomparable(measure, then.get(measure.name)) for measure in measures):
+        raise ScenarioError(
+            file, "rows", "--fail-over has nothing to compare with what is measured"
+        )
+
+
 def _warn(now: "Saved", then: "Saved") -> None:
     from worldsim.bench.comparison import differences
 
@@ -152,19 +171,22 @@ def _warn(now: "Saved", then: "Saved") -> None:
 
 def _printed(
     measures: "list[Measure]", repeats: int, before: "Saved | None", marked: float
-) -> "tuple[list[Row], dict[str, Change]]":
-    """Measure and print all rows; return them, and the change of each by its name."""
+) -> "tuple[list[Row], dict[str, Change], bool]":
+    """Measure and print all rows; return them, their changes by name, and whether Ctrl-C came."""
     from worldsim.bench.comparison import change
     from worldsim.bench.lines import line
 
     then = {row.name: row for row in before.rows} if before is not None else {}
     rows, changes = [], {}
-    for measure, row in _measured(measures, repeats):
-        rows.append(row)
-        if before is not None:
-            changes[row.name] = change(row, then.get(row.name), measure.grain)
-        print(line(row, changes.get(row.name), marked), flush=True)
-    return rows, changes
+    try:
+        for measure, row in _measured(measures, repeats):
+            rows.append(row)
+            if before is not None:
+                changes[row.name] = change(row, then.get(row.name), measure.grain)
+            print(line(row, changes.get(row.name), marked), flush=True)
+    except KeyboardInterrupt:
+        return rows, changes, True
+    return rows, changes, False
 
 
 def _measured(measures: "list[Measure]", repeats: int) -> "Iterator[tuple[Measure, Row]]":
