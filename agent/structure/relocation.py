@@ -2,9 +2,9 @@
 
 Who holds a place knows the places of all others: they are the layout for the size of the team. So
 each member finds the same plan from all old places to the new ones, without a word, and takes what
-follows from its own. The plan is that of the assignment: exchanges of two until none gains, from
-the places that both formations have. Of those with the same sum it is one whose longest ways are
-short. It sends nobody to where a vehicle hovers in a place of old.
+follows from its own. The plan is that of the assignment: the nearest first, then exchanges of two
+until none gains. Of those with the same sum it is one whose longest ways are short. It sends nobody
+to where a vehicle hovers in a place of old.
 """
 
 from functools import lru_cache
@@ -80,13 +80,11 @@ def _plan(move: _Move, old_pose: _Pose, new_pose: _Pose) -> dict[Place, Place]:
         return {}
     starts = [here.to_world(old.slots[place].point) for place in old.places]
     ends = [there.to_world(new.slots[place].point) for place in new.places]
-    known = {place: column for column, place in enumerate(new.places)}
-    team = [
-        Peer(k, start, place if place in known else None)
-        for k, (start, place) in enumerate(zip(starts, old.places, strict=True))
-    ]
-    found = allocate(team, new.places, ends)
-    columns = [known[place] for k in range(len(team)) if (place := found[k]) is not None]
+    # The old places are no claims on the new ones: those of one name may be far from each other.
+    team = [Peer(k, start, None) for k, start in enumerate(starts)]
+    column_of = {place: column for column, place in enumerate(new.places)}
+    found = allocate(team, new.places, ends, hysteresis_m2=0.0)
+    columns = [column_of[place] for place in found.values() if place is not None]
     columns = shortened(columns, starts, ends, move.spacing_m)
     return {place: new.places[k] for place, k in zip(old.places, columns, strict=True)}
 

@@ -7,6 +7,7 @@ import pytest
 from agent.controller import Flown
 from agent.messages import Place
 from agent.qstructure.target_frame import Frame
+from agent.structure.longest_way import MOST_MEMBERS
 from agent.structure.relocation import Held, Relocated, relocated
 from tests.agent.structure.builders import LIBRARY, LINE, TWO, library, lines, rays
 from tests.agent.structure.team import Team
@@ -42,6 +43,18 @@ def test_each_member_gets_a_place_of_its_own(before, after):
 def test_a_team_that_is_displaced_keeps_its_places(formation):
     found = plan(formation, formation, Frame(), Frame((30.0, 5.0, -2.0), radians(10.0)), 9)
     assert all(each.place == place for place, each in found.items())
+
+
+def test_a_plan_heeds_where_places_are_and_not_what_they_are_called():
+    """Two lines exchange their names; a bonus for names would exchange the members, too.
+
+    They are too many for exchanges that shorten the longest ways.
+    """
+    first, second = (0.0, 0.0, 0.0), (0.0, 0.6, 0.0)
+    found = plan(lines(first, second), lines(second, first), Frame(), Frame(), 2 * MOST_MEMBERS)
+    assert {(place, each.place) for place, each in found.items()} == {
+        (Place(q, k), Place(1 - q, k)) for q in range(2) for k in range(MOST_MEMBERS)
+    }
 
 
 def test_a_line_that_turns_back_is_led_by_its_last():
