@@ -42,6 +42,7 @@ class DirectRule:
         self._guessed: tuple[int, ...] | None = None
         """Among which members the last guess was made."""
         self._guess: Place | None = None
+        self._guessed_s = -inf
         self._around: tuple[int, ...] = ()
         self._around_since_s = now_s
 
@@ -105,7 +106,8 @@ class DirectRule:
         """Return the place that the assignment over all neighbours gives, without claiming it.
 
         Where they are the whole team this is the place that the agent will take. None where a
-        neighbour hears more, or where so many are heard that it takes too long.
+        neighbour hears more, or where so many are heard that it takes too long. It lasts for as
+        long as a member may be silent, and is made anew only once the same ones are heard.
         """
         if not 0 < len(view.around) <= MOST_GUESSED:
             return None
@@ -115,9 +117,11 @@ class DirectRule:
         if any(h.standing is not None and h.standing.heard > len(ids) + 1 for h in view.around):
             return None
         settled = view.now_s - self._around_since_s >= GUESS_AFTER_S + view.timing.latency_s
-        if settled and self._guessed != ids:
+        lasts = view.now_s - self._guessed_s <= view.timing.lost_s
+        if settled and not (lasts and self._guessed == ids):
             self._guessed, self._guess = ids, self._likely_place(view)
-        return self._guess
+            self._guessed_s, lasts = view.now_s, True
+        return self._guess if lasts else None
 
     def _likely_place(self, view: View) -> Place | None:
         """Return the place that the own agent is likely to get.

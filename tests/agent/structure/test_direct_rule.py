@@ -11,7 +11,7 @@ from tests.agent.structure.builders import LINE, TWO, heard, leader_summary, lin
 
 TICK_S = 0.1
 TEAM = 4
-APEX = Place(0, 0)
+APEX, APEX_POINT = Place(0, 0), (0.0, 0.0, 0.0)
 
 
 def told(total=TEAM, **fields):
@@ -221,3 +221,24 @@ def test_it_holds_on_for_an_agent_that_is_alone():
         applied.append(rule.applies)
     assert applied[-1]
     assert applied == sorted(applied), "once it holds it goes on"
+
+
+def test_a_guess_does_not_outlast_a_flickering_radio():
+    """Every other moment the radio drops one of two; by then both have flown away."""
+    rule, first, second = DirectRule(9, 0.0), (-1.0, 0.0, 0.0), (-2.0, 0.0, 0.0)
+    for now_s in (0.0, 1.0):
+        both = [heard(1, first, heard=3), heard(2, second, heard=3)]
+        assert rule.likely(view(LINE, now_s, both)) == (APEX if now_s else None)
+    lost_s = view(LINE, 0.0).timing.lost_s
+    away = [heard(1, APEX_POINT, heard=2), heard(2, first, heard=2)]
+    found = [
+        rule.likely(view(LINE, 1.0 + 0.02 * k, away[: 1 + k % 2], at=second))
+        for k in range(1, round(2.0 * lost_s / 0.02))
+    ]
+    assert found[0] == APEX
+    assert found[-1] is None
+    now_s = 1.0 + 2.0 * lost_s
+    assert [rule.likely(view(LINE, now_s + late_s, away, at=second)) for late_s in (0.0, 0.2)] == [
+        None,
+        Place(0, 2),
+    ]
