@@ -1,6 +1,6 @@
 """How long the steps of a fleet's agents last, in memory that all processes of a run share.
 
-Each agent writes its own row. Whoever reads it knows whether the agent's code, its controller
+Each agent writes its own row. A reader of it knows whether the agent's code, its controller
 included, has returned: an agent that hangs cannot say so itself.
 """
 

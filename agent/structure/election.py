@@ -97,7 +97,7 @@ class Election:
             if view.map.vertices > 1:
                 listen_s *= NEAREST  # first those to whom the assignment gives a vertex
             ordered = claim.since_s > self._started_s + listen_s
-            # Whoever was ordered here waits for others that were ordered at the same time.
+            # An agent that was ordered here waits for others that were ordered at the same time.
             began_s = claim.since_s if ordered else self._started_s
             return now_s - began_s >= listen_s and self._is_nearest(view, vertex)
         wait_s = timing.lost_s + self._turn_s(view, claim, vertex)

@@ -235,7 +235,7 @@ class Gathering:
         if settled and self._totals[line.queue].ready >= members:
             # Reports of members that went to other queues may still be on their way.
             since_s = self._ready_s.setdefault(line.queue, view.now_s)
-            # Whoever hears of it hears of it by then, and the line speeds up slowly.
+            # All members have heard of it by then, and the line speeds up slowly.
             leaves_s = view.now_s + view.timing.answer_s
             steady = view.now_s - since_s >= view.timing.settle_s
             if steady and leaves_s < line.leaves / VERSIONS_PER_S:

@@ -171,7 +171,7 @@ def test_it_keeps_pace_with_the_frame_of_a_tier_and_says_nothing_of_it() -> None
             assert sent.standing is None
         if tick in (79, 150):
             away_m = dist(at, (start[0] + DRIFT_MPS * tick * TICK_S, *start[1:]))
-            assert away_m < 0.1, "also where the frame is extrapolated"
+            assert away_m < 0.1, "it loses the frame while that is extrapolated"
     stopped_m = start[0] + DRIFT_MPS * (79 * TICK_S + MAX_EXTRAPOLATION_S)
     assert at[0] == pytest.approx(stopped_m, abs=0.1)
     assert outbox.command.velocity == ZERO

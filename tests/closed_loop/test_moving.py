@@ -32,7 +32,7 @@ def test_a_moving_slot_is_held(change):
         if STARTS_S + SETTLED_S < time_s < TURNS_S:
             straight_m = max(straight_m, error_m)
     assert straight_m < 0.03
-    assert worst_m < 0.3, "where the frame takes another direction, vehicles turn first"
+    assert worst_m < 0.3, "vehicles are too far behind a frame that turns"
     assert fleet.loop.judge.phases[0].residual_m < 0.01
 
 

@@ -76,12 +76,18 @@ def test_fig_4_five_agents_on_one_queue():
 def test_an_agent_that_hears_no_other_flies_to_the_vertex():
     fleet = line((0.0, 1.0, 30.0), 2.5)
     fly(fleet, 0.3)
-    assert [each.role for each in telemetry_of(fleet)] == [DISTRESS] * 3, "all listen first"
+    assert [each.role for each in telemetry_of(fleet)] == [DISTRESS] * 3, (
+        "an agent takes a role before it has listened"
+    )
     fly(fleet, 1.2)
-    assert [each.role for each in telemetry_of(fleet)] == [VERTEX, MEMBER, DISTRESS], "late beacons"
+    assert [each.role for each in telemetry_of(fleet)] == [VERTEX, MEMBER, DISTRESS], (
+        "an agent that hears nobody does not wait for late beacons"
+    )
     fly(fleet, 0.8)
     assert [each.role for each in telemetry_of(fleet)] == [VERTEX, MEMBER, VERTEX]
-    assert telemetry_of(fleet)[2].target == (0.0, 0.0, 0.0), "it is the vertex agent by itself"
+    assert telemetry_of(fleet)[2].target == (0.0, 0.0, 0.0), (
+        "the third agent does not lead a vertex alone"
+    )
 
 
 def root_of(telemetry, agent):
@@ -113,7 +119,9 @@ def test_the_team_fills_the_slots_around_a_dead_apex_agent(seed, lossy):
     places = sorted(tuple(telemetry[agent].place) for agent in living)
     assert places == [(queue, rank) for queue in range(4) for rank in (1, 2)]
     (head,) = [agent for agent in living if telemetry[agent].role == VERTEX]
-    assert telemetry[head].place[1] == 1, "it leads the shared vertex from the first slot behind it"
+    assert telemetry[head].place[1] == 1, (
+        "the leader is not in the first slot behind the shared vertex"
+    )
     assert {root_of(telemetry, agent) for agent in living} == {head}
     assert fleet.loop.judge.min_separation_m >= 0.25
     assert max(fleet.loop.figures.slot_error[living]) < 0.01

@@ -121,7 +121,7 @@ def curved_upwards_at_the_targets() -> None:
 
 
 def energy_never_grows() -> None:
-    """(29): along the closed loop U falls from tick to tick, whoever is where.
+    """(29): along the closed loop U falls from tick to tick, wherever the agents are.
 
     Targets are as near as a formation may have them (E1), vehicles as near as the filter lets them.
     """

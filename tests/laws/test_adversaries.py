@@ -31,7 +31,7 @@ def test_no_pair_ever_comes_nearer_than_d_ob(fleet):
     count, nearest, closed = violations(fleet, 6000, seed=2)
     assert count == 0
     assert nearest >= D_OB - 1e-9
-    assert closed < 0.4, "the adversaries did not even try"
+    assert closed < 0.4, "the adversaries never came near"
 
 
 def test_the_fleets_are_within_the_filters_condition():

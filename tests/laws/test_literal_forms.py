@@ -1,4 +1,4 @@
-"""Each equation as printed breaks a law: whoever writes it back in is told by a failing test."""
+"""Each equation as printed breaks a law, so a test fails if it is written back in."""
 
 import pytest
 

@@ -136,8 +136,8 @@ def test_repeated_changes_of_place_become_ever_rarer():
     held = [made._hold_s(now_s + 0.1 * row, 0.05) for row in range(6)]
     assert held == pytest.approx([0.2, 0.4, 0.8, 1.6, 3.0, 3.0], abs=1e-6)
     assert made._hold_s(now_s + 10.0, 0.05) == pytest.approx(0.2, abs=1e-6), (
-        "calm since the last change"
+        "a calm time does not end the count of changes"
     )
     assert made._hold_s(now_s + 20.0, 0.7) == pytest.approx(1.4, abs=1e-6), (
-        "a message there and one back"
+        "a place is not kept for a message there and one back"
     )

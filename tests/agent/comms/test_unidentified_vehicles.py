@@ -237,7 +237,7 @@ def test_agents_look_after_a_dead_vehicle_ever_less_often():
         looks += at == AWAY and not found
         x = at[0] + STEP_S * 0.5 * (1.0 if found else -1.0)
         at = (min(AWAY[0], x), 0.0, 0.0)
-    assert 2 <= looks <= 6, "3600 s are less than 60 s (2^6 - 1)"
+    assert 2 <= looks <= 6, "six memories, of 60 s and each twice as long, last over 3600 s"
 
 
 def test_an_agent_that_wrongly_misses_a_dead_vehicle_does_so_ever_less_often():
@@ -249,7 +249,7 @@ def test_an_agent_that_wrongly_misses_a_dead_vehicle_does_so_ever_less_often():
         assert found == (VEHICLE,)
         found, now_s = seen_from(known, now_s, 20.0, here, ())
         lost += not found
-    assert lost <= 4, "20 s are less than 1.5 s 2^4"
+    assert lost <= 4, "a memory of 1.5 s, doubled four times, lasts over 20 s"
 
 
 @pytest.mark.parametrize("away_m", [1.0, UNMOVED_RANGE_M - 0.01])

@@ -64,9 +64,13 @@ def test_it_insists_on_no_point_that_others_need():
 def test_a_newer_mission_takes_it_along_but_a_contradiction_does_not():
     held = HeldPoint()
     held.target(senses(frame_at(3.0)))
-    assert target(held, frame_at(9.0)) == pytest.approx(AWAY), "two frames of one mission"
+    assert target(held, frame_at(9.0)) == pytest.approx(AWAY), (
+        "a second frame of the same mission moves the point"
+    )
     assert target(held, frame_at(3.0), key=1) == pytest.approx((-4.0, 1.0, 0.5))
-    assert target(held, frame_at(3.0), key=0) == pytest.approx(AWAY), "back to an older one"
+    assert target(held, frame_at(3.0), key=0) == pytest.approx(AWAY), (
+        "an older mission moves the point"
+    )
 
 
 OUT_OF_REACH = frame_at(1.1 * REACH_M)

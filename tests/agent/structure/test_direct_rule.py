@@ -220,7 +220,7 @@ def test_it_holds_on_for_an_agent_that_is_alone():
         rule.update(view(LINE, TICK_S * tick, summaries=[told(1)]), claim)
         applied.append(rule.applies)
     assert applied[-1]
-    assert applied == sorted(applied), "once it holds it goes on"
+    assert applied == sorted(applied), "the rule ends though it still holds"
 
 
 def test_a_guess_does_not_outlast_a_flickering_radio():

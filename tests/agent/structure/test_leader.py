@@ -118,7 +118,7 @@ def test_orders_never_exceed_what_a_queue_has_too_much(counts, each):
     for count, after, share in zip(counts, moved, shares, strict=True):
         assert min(count, share) <= after <= max(count, share)
     if each == 8 and max(c - s for c, s in zip(counts, shares, strict=True)) in (1, 2, 3):
-        assert moved == list(shares), "few are moved at once"
+        assert moved == list(shares), "a few are not all moved at once"
 
 
 def test_the_least_extra_way_is_ordered():
@@ -242,7 +242,7 @@ def test_a_leader_waits_for_those_of_the_mission_before_but_not_for_ever():
     seen = [flight.ask(few) for _ in range(round((EXPECTED_S - 0.5) / TICK_S))]
     assert not any(each.go or each.orders for each in seen)
     late = [flight.ask(few) for _ in range(round(2.0 / TICK_S))]
-    assert late[-1].orders, "whoever has not come by then is not waited for"
+    assert late[-1].orders, "the leader still waits for members after EXPECTED_S"
     soon = Flight(TWO, expected=7)
     assert not soon.ask(few).go
     assert any(soon.ask(all_are_there).go for _ in range(round(2.0 / TICK_S)))

@@ -45,7 +45,7 @@ def test_a_line_stays_until_it_leaves_and_then_flies_to_its_queue_below_its_spee
         assert dist(before, after) <= 1.02 * speed_mps * step_s
         assert hypot(*after) == pytest.approx(
             sum(a * b for a, b in zip(after, whole, strict=True)) / hypot(*whole)
-        ), "straight"
+        ), "it leaves the straight way"
 
 
 def test_a_line_speeds_up_slowly():

@@ -98,7 +98,7 @@ def test_who_stands_in_a_place_takes_its_number_though_it_hears_only_some():
 @settings(derandomize=True, deadline=None, max_examples=40)
 @given(st.lists(st.integers(1, 8), min_size=1, max_size=8), st.integers(0, 999))
 def test_any_numbers_become_those_from_1_to_the_count(numbers, seed):
-    """Whoever had which number, with gaps or twice: all hear all, and one in three is lost."""
+    """Numbers begin with gaps or twice; all hear all, and one beacon in three is lost."""
     members = [
         Ranked(k, Random(seed + k).uniform(0.5, 8.0), number, cost_m=float(k))
         for k, number in enumerate(numbers)
@@ -280,7 +280,7 @@ def test_who_takes_its_number_anew_waits_again_until_it_knows_of_as_many_as_the_
 
     assert [decide(0.5, 3), decide(0.6, 2)] == [0, 1]
     assert [decide(2.5, 9), decide(2.6, 9)] == [0, 0]
-    assert decide(4.0, 9) > 0, "but not for ever"
+    assert decide(4.0, 9) > 0, "the agent takes no place after 4 s"
 
 
 @pytest.mark.parametrize(("total", "number"), [(None, 3), (3, 2)], ids=["under way", "counted"])

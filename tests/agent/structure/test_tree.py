@@ -115,7 +115,7 @@ def check_spans(team, root=0):
         while at not in way and at >= 0:
             way.append(at)
             at = team.trees[at].parent
-        assert at == -1, "no loops"
+        assert at == -1, "the chain of parents has a loop"
 
 
 @settings(derandomize=True, deadline=None, max_examples=40)
