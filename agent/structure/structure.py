@@ -27,13 +27,13 @@ from agent.places.occupied_slots import OccupiedSlots
 from agent.places.place_points import OwnTarget
 from agent.structure.claim import NO_QUEUE, Claim
 from agent.structure.convergecast import own_part
+from agent.structure.destination import Destination
 from agent.structure.direct_rule import DirectRule
 from agent.structure.election import Election
 from agent.structure.gathering import Gathering
 from agent.structure.head_count import HeadCount
 from agent.structure.leader import Leader
 from agent.structure.leader_place import LeaderPlace
-from agent.structure.likely_slot import nearest_slot, slot_by_order, standing_slot
 from agent.structure.link_timing import timing_of
 from agent.structure.numbers import Numbers
 from agent.structure.queue_choice import QueueChoice
@@ -45,12 +45,8 @@ from agent.structure.tree import Follower, Tree
 from agent.structure.view import View
 
 DECISION_HZ = 10.0
-PATIENCE_S = 0.3
-"""So long an agent without a number stays where it is: most have one by then, and need not turn."""
 SETTLED_S = 1.0
 """So long an agent without a number looks each tick, for much is new to it."""
-FAR_M = 2.5
-"""Within this distance of its place an agent flies there even if it lies beyond the tail."""
 
 
 class Structure:
@@ -75,7 +71,6 @@ class Structure:
         self.claim = Claim(now_s)
         self.trees = [Tree(own_id, now_s) for _ in range(formation.vertices)]
         self._head_count = HeadCount(own_id, formation, setup.ids)
-        self._most_members = min(setup.ids, MAX_TEAM)
         self._order: Sequence[int] = ()
         """The known members of the own queue, in their order along it, until the agent has a number
         there."""
@@ -89,6 +84,8 @@ class Structure:
         self._numbers = Numbers(own_id, now_s)
         self._swaps = Swaps(own_id)
         self._direct = DirectRule(own_id, now_s)
+        most_members = min(setup.ids, MAX_TEAM)
+        self._destination = Destination(own_id, self._direct, most_members, now_s)
         self._leader_place = LeaderPlace(self._numbers, self._direct)
         self._leader: Leader | None = None
         self._followed = False
@@ -119,7 +116,7 @@ class Structure:
         if decides:
             self._next_decision_s = senses.now_s + 1.0 / DECISION_HZ - 1e-9
             self._decide(view, senses, mission)
-        self._own = self._target(view)
+        self._own = self._destination.choose(view, self.claim)
         self._note_held(view, mission)
         return self._flown(senses.now_s)
 
@@ -248,35 +245,6 @@ class Structure:
         self._blocked = view.blocked = self._occupied.update(
             senses, mission, peers, self.agents, frozenset(reported)
         )
-
-    def _target(self, view: View) -> OwnTarget | None:
-        """Return where to fly. An agent without a claim waits by the nearest place of its queue.
-
-        Who stands in any place of it waits there.
-        """
-        claim = self.claim
-        if claim.leads or claim.number > 0:
-            return self._shortened(view, view.target(claim))
-        if claim.queue == NO_QUEUE:
-            return None
-        slot = standing_slot(view, claim.queue, self._most_members)
-        slot = slot or self._direct.guess(view)
-        slot = slot or slot_by_order(view, claim.queue, self._own_id)
-        if slot is None and view.now_s - self._started_s < PATIENCE_S:
-            return None
-        slot = slot or nearest_slot(view, claim.queue)
-        return OwnTarget(None, slot, False) if slot is not None else None
-
-    def _shortened(self, view: View, own: OwnTarget | None) -> OwnTarget | None:
-        """Return the target for now: a push may lead past the tail, which is no place to fly to."""
-        claim = self.claim
-        count = view.counts[claim.queue] if claim.number > 0 else 0
-        if self._direct.applies or not 0 < count < claim.number:
-            return own
-        if view.distance(claim.queue, claim.number) <= FAR_M:
-            return own
-        slot = self._map.slot(claim.queue, count, view.extent(claim.queue, count))
-        return own._replace(slot=slot) if own is not None and slot is not None else own
 
     def _report(self, view: View) -> None:
         """Bring up to date what goes up each tree; as a leader, the own summary."""

@@ -48,14 +48,13 @@ from worldsim.judge.run_events import (
     SensorChanged,
     SlotChanged,
 )
+from worldsim.judge.shared_places import Claims, SharedPlaces
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import CONVERGED_S, Scenario
 
 COMPONENTS_EVERY_S = 1.0
 """Interval at which connectivity is computed anew [s]."""
 MAX_ROLE_CHANGES = 3
-Claims = list[tuple[int, int]]
-"""The place (queue, rank) that each agent claims; row i = agent i."""
 
 
 class InvariantTally(msgspec.Struct):
@@ -87,7 +86,7 @@ class Invariants:
     def __init__(self, scenario: Scenario, hovering: HoveringVehicles) -> None:
         self.tallies = {name: InvariantTally() for name in ("I2", "I3", "I4", "I6", "I7")}
         self._connectivity, self._load = Connectivity(scenario), RadioLoad()
-        self._local = scenario.control.allocation == "structure"
+        self._shared = SharedPlaces(local=scenario.control.allocation == "structure")
         self._places = BlockedPlaces(
             hovering, ["proximity" in each.sensors for each in scenario.vehicles]
         )
@@ -105,10 +104,6 @@ class Invariants:
         """For each component, the places in which others hover."""
         self._breaches: Breaches | None = None
         """None where it is clear of no component whom its agents know."""
-        self._shared: list[bool] = []
-        """For each agent, whether another agent of its component claims its place."""
-        self._shared_since: dict[int, tuple[tuple[int, int], float]] = {}
-        """For each agent that shares its place: the place, and since when [s; simulated time]."""
         self._role_changes: Counter[int] = Counter()
         """Of each agent since the last fault."""
         self._excess_role_changes = 0
@@ -160,7 +155,7 @@ class Invariants:
             return
         self.tallies["I6"].count(self._excess_role_changes)
         self._excess_role_changes = 0
-        self.tallies["I4"].count(self._count_lasting(tick.time_s))
+        self.tallies["I4"].count(self._shared.count_lasting(tick.time_s, self._twice_s))
         if tick.time_s >= self._settled_s and self._breaches is not None:
             self.tallies["I2"].count(self._breaches.vertices)
             self.tallies["I3"].count(self._breaches.shares)
@@ -200,7 +195,7 @@ class Invariants:
     def _excuse(self, time_s: float) -> None:
         """Evaluate nothing at a tick at which news takes no bounded time, and start anew then."""
         self._restart_premises(time_s)
-        self._shared_since = {}
+        self._shared.forget()
         self._excess_role_changes = 0
 
     def _restart_premises(self, time_s: float) -> None:
@@ -218,8 +213,8 @@ class Invariants:
         if last is not None and not last.same_as(found):
             self._restart_premises(tick.time_s)
             self._before = last.hops, last.loss
-        if self._local and len(self._claims):
-            self._shared = self._find_shared(self._members)
+        if self._shared.local and len(self._claims):
+            self._shared.find(self._claims, self._members, found.hears)
         team = int(np.count_nonzero(tick.alive))
         self._twice_s = 2.0 * self._connectivity.dissemination_s(team, found.hops, found.loss)
         # Agents wait for those whom they heard before as long as news may come from there.
@@ -245,7 +240,8 @@ class Invariants:
             self._fault_s = max(self._fault_s, tick.time_s)
         self._claims = self._claims if claims == self._claims else claims
         self._breaches = self._judged(phase, blocked)
-        self._shared = self._find_shared(members)
+        hears = self._components.hears if self._components is not None else None
+        self._shared.find(self._claims, members, hears)
 
     def _members_key(self) -> tuple[bytes, ...]:
         """Return what changes with the components."""
@@ -293,47 +289,6 @@ class Invariants:
         shares = phase.formation.divide(len(rows), blocked)
         wrong = sum(abs(own[queue] - share) > 1 for queue, share in enumerate(shares))
         return Breaches(vertices, wrong)
-
-    def _find_shared(self, members: list[list[int]]) -> list[bool]:
-        """Return for each agent whether another agent that need know it claims its place.
-
-        Under leaders and trees an agent knows the claims of those that it hears. Under the
-        assignment it knows those of its whole component.
-        """
-        shared = [False] * len(self._claims)
-        for rows in members:
-            held = Counter(self._claims[row] for row in rows)
-            for row in rows:
-                claim = self._claims[row]
-                twice = claim[0] >= 0 and held[claim] > 1
-                shared[row] = twice and (not self._local or self._hears_rival(row, rows))
-        return shared
-
-    def _hears_rival(self, row: int, rows: list[int]) -> bool:
-        """Whether an agent of the component that it hears, and that hears it, claims its place."""
-        if self._components is None:
-            return False
-        hears = self._components.hears
-        return any(
-            other != row
-            and self._claims[other] == self._claims[row]
-            and bool(hears[row, other] and hears[other, row])
-            for other in rows
-        )
-
-    def _count_lasting(self, time_s: float) -> int:
-        """Return the number of agents that have shared their present place for longer than 2B."""
-        if not any(self._shared):
-            self._shared_since = {}
-            return 0
-        since = {}
-        for row, shared in enumerate(self._shared):
-            if shared:
-                claim, from_s = self._shared_since.get(row, (None, time_s))
-                now = self._claims[row]
-                since[row] = (now, from_s if claim == now else time_s)
-        self._shared_since = since
-        return sum(time_s - from_s > self._twice_s for _, from_s in since.values())
 
     def _evaluate_quiet(self, tick: Tick, last_claims: Claims, in_place: bool) -> None:
         """Evaluate I7 once every agent of a settled team has been in its place for 2 s."""
