@@ -82,7 +82,7 @@ def _hot_modules() -> list[str]:
     """Return the files of ``[tool.qswarm]``, relative to the root."""
     hot = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["qswarm"]
     found = {str(file.relative_to(ROOT)) for each in hot["compiled"] for file in ROOT.glob(each)}
-    return sorted(name for name in found - {*hot["plain"]} if not name.endswith("__init__.py"))
+    return sorted(name for name in found - {*hot["pure"]} if not name.endswith("__init__.py"))
 
 
 setup(cmdclass={"build_py": BuildWhole, "compile": Compile})

@@ -69,4 +69,4 @@ def test_what_is_to_be_compiled_exists() -> None:
     hot = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["qswarm"]
     assert all([*ROOT.glob(each)] for each in hot["compiled"])
     found = {str(file.relative_to(ROOT)) for each in hot["compiled"] for file in ROOT.glob(each)}
-    assert found.issuperset(hot["plain"])
+    assert found.issuperset(hot["pure"])
