@@ -1,5 +1,7 @@
 """Events of the timeline in virtual time: their operations, their effects and their reports."""
 
+from msgspec.structs import replace
+
 from netem.faults import FaultOrder, Flap, Jam, Partition, RadioEvent
 from tests.scenario.test_timeline import LINE, scenario
 from worldsim.engine.operations import GiveMission, Operation
@@ -7,6 +9,7 @@ from worldsim.engine.step import SlotLoop, world_of
 from worldsim.engine.virtual import Flight, fly
 from worldsim.judge.radio_events import Flapped, Healed, Jammed
 from worldsim.judge.run_events import RunEvent, as_row
+from worldsim.scenario.tables import Scenario
 
 JAM = "jam = { centre_m = [0, 0, 0], radius_m = 50 }"
 
@@ -23,6 +26,11 @@ def carried_out(*events: str) -> list[tuple[float, Operation]]:
         loop.open()
         loop.close(b"")
     return found
+
+
+def short(*events: str, radio: str = "") -> Scenario:
+    """Return a scenario of 10 s: all that happens here happens within 8 s."""
+    return replace(scenario(*events, radio=radio), duration_s=10.0)
 
 
 def of_kind(flight: Flight, kind: type[RunEvent]) -> list[RunEvent]:
@@ -53,9 +61,7 @@ def test_a_partition_that_was_healed_does_not_end_again() -> None:
 
 def test_two_partitions_end_independently() -> None:
     flight = fly(
-        scenario(
-            "at_s = 1\nfor_s = 6\npartition = [[0, 1]]", "at_s = 2\nfor_s = 2\npartition = [[0]]"
-        )
+        short("at_s = 1\nfor_s = 6\npartition = [[0, 1]]", "at_s = 2\nfor_s = 2\npartition = [[0]]")
     )
     healed = [as_row(event) for event in of_kind(flight, Healed)]
     assert [(row["t_s"], row["number"]) for row in healed] == [(4.0, 1), (7.0, 0)]
@@ -81,11 +87,11 @@ def test_a_mission_keeps_the_part_that_it_does_not_change() -> None:
 
 
 def dropped(*events: str, radio: str = "") -> int:
-    return fly(scenario(*events, radio=radio)).medium_counters.fates["dropped_partition"]
+    return fly(short(*events, radio=radio)).medium_counters.fates["dropped_partition"]
 
 
 def test_jammed_and_cut_frames_count_as_dropped_by_partition() -> None:
-    flight = fly(scenario(f"at_s = 1\nfor_s = 2\n{JAM}"))
+    flight = fly(short(f"at_s = 1\nfor_s = 2\n{JAM}"))
     jams = [event.jam for event in flight.loop.events if isinstance(event, Jammed)]
     assert jams == [Jam((0.0, 0.0, 0.0), 50.0), None]
     beacons = 2 * 20 * 4 * 3
@@ -95,14 +101,14 @@ def test_jammed_and_cut_frames_count_as_dropped_by_partition() -> None:
 
 
 def test_a_flap_reports_its_own_start() -> None:
-    flight = fly(scenario("at_s = 1.003\nfor_s = 2\nflap = { period_s = 1 }"))
+    flight = fly(short("at_s = 1.003\nfor_s = 2\nflap = { period_s = 1 }"))
     begun, ended = of_kind(flight, Flapped)
     assert as_row(begun)["flap"] == {"period_s": 1.0, "links": (), "from_s": 1.003}
     assert (begun.t_s, as_row(ended)["flap"]) == (1.0125, None)
 
 
 def test_corrupt_frames_are_rejected_and_counted_and_the_team_converges() -> None:
-    flight = fly(scenario(radio="corrupt_percent = 30\nduplicate_percent = 10"))
+    flight = fly(short(radio="corrupt_percent = 30\nduplicate_percent = 10"))
     counters = flight.medium_counters
     assert counters.corrupted > 0.25 * counters.fates["delivered"]
     assert counters.corrupted <= flight.rejected <= counters.corrupted + counters.duplicated

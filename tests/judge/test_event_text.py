@@ -157,7 +157,8 @@ def test_an_event_is_one_sentence(row: dict[str, Any], words: str) -> None:
 
 
 def test_every_event_of_a_run_names_its_agent() -> None:
-    scenario = load(find_scenario("join-leave-12"))
+    events = "[{ at_s = 5, join = 1 }, { at_s = 7, leave = ['random:4'] }]"
+    scenario = load(find_scenario("join-leave-12"), {"event": events, "duration_s": "10"})
     events = fly(scenario).loop.events
     assert {"join", "leave", "slot", "queue", "role"} <= {event.kind for event in events}
     queues = [queue.name for queue in scenario.formation.queue]
