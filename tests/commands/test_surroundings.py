@@ -153,18 +153,17 @@ def test_control_characters_of_a_path_and_a_name_are_escaped() -> None:
     assert len(ended.stderr.splitlines()) == 1
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recorded run, whose summary each test writes anew."""
-    folder = tmp_path_factory.mktemp("recorded")
-    (folder / "small.toml").write_text(SMALL)
-    assert command(["sim", str(folder / "small.toml"), "--out", str(folder / "out")]) == 0
-    return folder / "out"
+@pytest.fixture
+def recorded(tmp_path: Path) -> Path:
+    """A recorded run."""
+    (tmp_path / "small.toml").write_text(SMALL)
+    assert command(["sim", str(tmp_path / "small.toml"), "--out", str(tmp_path / "out")]) == 0
+    return tmp_path / "out"
 
 
-@pytest.mark.parametrize("content", ["[" * 100_000, '{"a":' * 100_000, "\x00", "[]", "3"])
-def test_a_summary_that_is_none_is_one_line(recorded: Path, qswarm: Command, content: str) -> None:
-    (recorded / "summary.json").write_text(content)
+def test_a_summary_that_is_none_is_no_traceback(recorded: Path, qswarm: Command) -> None:
+    """More such files are compared in the recording's test_edited_summary.py."""
+    (recorded / "summary.json").write_text("[" * 100_000)
     ended = qswarm("verify", recorded)
     assert ended.status != 0
     assert "Traceback" not in ended.err + ended.out

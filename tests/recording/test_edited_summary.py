@@ -137,8 +137,14 @@ def test_a_key_that_a_summary_lacks_is_named(
         assert compared(judged, tmp_path / "summary.json").exit_status == 3, key
 
 
-@pytest.mark.parametrize("text", ["", "{", "[" * 100_000, "nan", "\udcff"])
-def test_a_summary_that_cannot_be_read_proves_nothing(
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "{", "[" * 100_000, '{"a":' * 100_000, "nan", "\udcff", "\x00"),
+        *("[]", "3"),
+    ],
+)
+def test_a_summary_that_is_none_proves_nothing(
     judged: Verification, tmp_path: Path, text: str
 ) -> None:
     (tmp_path / "summary.json").write_bytes(text.encode(errors="surrogateescape"))

@@ -1,6 +1,8 @@
 """The verdict recomputed from the recording alone, and differences from a false summary."""
 
 import json
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from shutil import copy
 from typing import Any
@@ -12,7 +14,13 @@ from tests.recording.flights import record, straight_flight, wedge
 from worldsim.judge.invariants import InvariantTally
 from worldsim.judge.verdict import Judge
 from worldsim.recording.recorder import RunRecorder
-from worldsim.recording.verify import Difference, verify
+from worldsim.recording.verify import (
+    Difference,
+    Verification,
+    compared,
+    judged_again,
+    verify,
+)
 from worldsim.results.verdict_text import verified
 from worldsim.scenario.tables import Scenario
 
@@ -31,6 +39,17 @@ def judge(tmp_path: Path, recorded: tuple[Path, Judge]) -> Judge:
     file, judge = recorded
     copy(file, tmp_path)
     return judge
+
+
+@pytest.fixture(scope="module")
+def judged(recorded: tuple[Path, Judge]) -> Verification:
+    return judged_again(recorded[0].parent, recorded[0])
+
+
+@pytest.fixture
+def compare(tmp_path: Path, judged: Verification) -> Callable[[], Verification]:
+    """What ``verify`` does with the summary in ``tmp_path``; the recording is read once for all."""
+    return lambda: compared(replace(judged, run=tmp_path), tmp_path / "summary.json")
 
 
 def summary_of(judge: Judge, scenario: Scenario | None = None) -> dict[str, Any]:
@@ -92,9 +111,11 @@ def test_without_a_summary_the_recording_is_judged_but_inconclusive(
 
 
 @pytest.mark.parametrize("reason", ["interrupted after 2.0 s", "the host was too slow"])
-def test_an_inconclusive_run_stays_inconclusive(tmp_path: Path, judge: Judge, reason: str) -> None:
+def test_an_inconclusive_run_stays_inconclusive(
+    tmp_path: Path, judge: Judge, compare: Callable[[], Verification], reason: str
+) -> None:
     write_summary(tmp_path, judge, outcome="inconclusive", reason=reason)
-    verification = verify(tmp_path)
+    verification = compare()
     assert verification.differences == ()
     assert not verification.held
     assert verification.exit_status == 3
@@ -123,30 +144,40 @@ def test_a_true_summary_does_not_differ(tmp_path: Path, judge: Judge) -> None:
     ("key", "changed"),
     [("min_separation_m", 0.9), ("turns_over_limit_fraction", 0.0), ("invariants", {})],
 )
-def test_a_changed_summary_differs(tmp_path: Path, judge: Judge, key: str, changed: object) -> None:
-    (tmp_path / "summary.json").write_text(json.dumps({**summary_of(judge), key: changed}))
-    verification = verify(tmp_path)
+def test_a_changed_summary_differs(
+    tmp_path: Path,
+    judge: Judge,
+    compare: Callable[[], Verification],
+    key: str,
+    changed: object,
+) -> None:
+    write_summary(tmp_path, judge, **{key: changed})
+    verification = compare()
     assert {difference.key.split(".")[0] for difference in verification.differences} == {key}
     assert verification.exit_status == 3
     assert f"inconclusive (summary.json differs in {key}" in verified(verification)
 
 
-def test_a_changed_figure_in_a_list_differs(tmp_path: Path, judge: Judge) -> None:
+def test_a_changed_figure_in_a_list_differs(
+    tmp_path: Path, judge: Judge, compare: Callable[[], Verification]
+) -> None:
     summary = summary_of(judge)
     residual_m = summary["phases"][0]["residual_m"]
     summary["phases"][0]["residual_m"] = residual_m + 1e-15
     (tmp_path / "summary.json").write_text(json.dumps(summary))
-    assert verify(tmp_path).differences == (
+    assert compare().differences == (
         Difference("phases.0.residual_m", residual_m + 1e-15, residual_m),
     )
 
 
 @pytest.mark.parametrize("text", ["[]", "null", "{}"])
-def test_a_summary_without_figures_differs_in_all(tmp_path: Path, judge: Judge, text: str) -> None:
+def test_a_summary_without_figures_differs_in_all(
+    tmp_path: Path, judged: Verification, compare: Callable[[], Verification], text: str
+) -> None:
     (tmp_path / "summary.json").write_text(text)
-    keys = {difference.key for difference in verify(tmp_path).differences}
+    keys = {difference.key for difference in compare().differences}
     assert {"min_separation_m", "phases.0.converged", "expectations.0.held"} <= keys
-    assert judge.ticks
+    assert judged.ticks
 
 
 def test_held_is_exit_0_and_a_missed_expectation_1(tmp_path: Path) -> None:
