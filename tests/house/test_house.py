@@ -40,6 +40,18 @@ def test_scripts_are_executable() -> None:
     assert all(os.access(script, os.X_OK) for script in SCRIPTS if script != sourced)
 
 
+def test_tests_of_processes_are_in_the_folders_that_the_checks_name() -> None:
+    checks = (ROOT / "deploy" / "test.sh").read_text()
+    (named,) = re.findall(r"^ *processes=\((.*)\)$", checks, re.MULTILINE)
+    marked = [
+        str(file.relative_to(ROOT))
+        for file in (ROOT / "tests").rglob("test_*.py")
+        if re.search(r"mark\.(processes|real_time)\b", file.read_text())
+    ]
+    assert marked
+    assert [file for file in marked if not file.startswith(tuple(named.split()))] == []
+
+
 def test_constraints_are_names_and_versions_only() -> None:
     lines = (ROOT / "constraints.txt").read_text().splitlines()
     pins = [line for line in lines if not line.startswith("#")]

@@ -37,6 +37,12 @@ def scenario(tmp_path: Path) -> Callable[[float], str]:
 
 
 @pytest.fixture
+def port_by_hand(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A free port for deploy/by-hand.sh, of which another test may use the default one."""
+    monkeypatch.setenv("QSWARM_PORT", endpoint.rpartition(":")[2])
+
+
+@pytest.fixture
 def endpoint() -> str:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

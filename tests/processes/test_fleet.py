@@ -94,6 +94,7 @@ def running(pid: int) -> bool:
         return False
 
 
+@pytest.mark.real_time
 def test_a_run_passes_and_leaves_all_of_its_files(start: Start, scenario: Write, run: Path) -> None:
     fleet = launched(start, scenario(6.0), run, "--speed", "2")
     assert fleet.status(40.0) == 0, fleet.text
@@ -127,10 +128,11 @@ def test_a_run_passes_and_leaves_all_of_its_files(start: Start, scenario: Write,
     none_left(pids(run))
 
 
+@pytest.mark.real_time
 def test_a_killed_agent_is_reported_at_once_and_the_run_ends_with_a_verdict(
     start: Start, scenario: Write, run: Path
 ) -> None:
-    fleet = launched(start, scenario(5.0), run, "--no-recording")
+    fleet = launched(start, scenario(4.0), run, "--no-recording")
     fleet.wait_for_output("least separation")
     os.kill(pids(run)["agent-2"], signal.SIGKILL)
     fleet.wait_for_output(
@@ -141,7 +143,7 @@ def test_a_killed_agent_is_reported_at_once_and_the_run_ends_with_a_verdict(
     assert fleet.status(20.0) in (0, 1)
     kills = [event for event in events_of(run) if event["kind"] == "kill"]
     assert [(kill["agent"], kill["signal"], kill["planned"]) for kill in kills] == [(2, 9, False)]
-    assert kills[0]["t_s"] < 5.0
+    assert kills[0]["t_s"] < 4.0
     assert summary_of(run)["outcome"] in ("pass", "fail")
 
 
@@ -238,6 +240,7 @@ def test_kill_9_of_the_launcher_leaves_no_process_and_a_summary(
     assert not (run / "users").exists()
 
 
+@pytest.mark.real_time
 def test_a_stopped_netem_is_named_not_the_host(start: Start, scenario: Write, run: Path) -> None:
     fleet = launched(start, scenario(5.0), run, "--no-recording")
     fleet.wait_for_output("least separation")

@@ -9,7 +9,7 @@ import pytest
 
 from tests.processes.harness import QSWARM, Started
 
-pytestmark = pytest.mark.processes
+pytestmark = [pytest.mark.processes, pytest.mark.real_time]
 
 Start = Callable[..., Started]
 FLOODED = 10_000 * 5

@@ -74,6 +74,7 @@ def test_a_running_fleet_carries_out_commands_and_refuses_impossible_ones(
     assert by_operator == ["netem", "formation", "kill", "jam", "pause", "resume"]
 
 
+@pytest.mark.usefixtures("port_by_hand")
 def test_in_a_fleet_started_by_hand_only_the_radio_can_be_changed(
     start: Start, scenario: Callable[[float], str], tmp_path: Path
 ) -> None:

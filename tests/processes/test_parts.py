@@ -64,15 +64,17 @@ def test_netem_refuses_invalid_conditions(start: Start, endpoint: str) -> None:
         Bus(session, Keys("odd")).query("medium", None, b'{"seed": -1}', timeout_s=5.0)
 
 
+@pytest.mark.real_time
 def test_a_fleet_started_by_a_shell_loop_passes(
     start: Start, scenario: Callable[[float], str], tmp_path: Path
 ) -> None:
-    fleet = start("bash", str(REPOSITORY / "deploy/by-hand.sh"), scenario(6.0), f"{tmp_path}/run")
+    fleet = start("bash", str(REPOSITORY / "deploy/by-hand.sh"), scenario(5.0), f"{tmp_path}/run")
     assert fleet.status(30.0) == 0, fleet.text
     assert json.loads((tmp_path / "run/summary.json").read_text())["outcome"] == "pass"
     assert "outcome: pass" in fleet.text
 
 
+@pytest.mark.usefixtures("port_by_hand")
 def test_a_shell_loop_refuses_bad_input_and_reports_no_earlier_run(
     start: Start, scenario: Callable[[float], str], tmp_path: Path
 ) -> None:
@@ -87,16 +89,12 @@ def test_a_shell_loop_refuses_bad_input_and_reports_no_earlier_run(
     assert "outcome" not in late.text
 
 
+@pytest.mark.usefixtures("port_by_hand")
 def test_a_shell_loop_does_not_use_the_netem_of_another_fleet(
-    start: Start,
-    scenario: Callable[[float], str],
-    endpoint: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    start: Start, scenario: Callable[[float], str], endpoint: str, tmp_path: Path
 ) -> None:
     other = start(*PYTHON, "netem", "--listen", endpoint)
     other.wait_for_output("netem listens at")
-    monkeypatch.setenv("QSWARM_PORT", endpoint.rpartition(":")[2])
     out = tmp_path / "run"
     fleet = start("bash", str(REPOSITORY / "deploy/by-hand.sh"), scenario(8.0), str(out))
     assert fleet.status(30.0) == 2, fleet.text

@@ -49,23 +49,25 @@ def process_events(run: Path) -> list[tuple[float, str, int, bool]]:
     ]
 
 
+@pytest.mark.real_time
 def test_killed_agents_restart_as_new_processes(start: Start, timeline: Write, run: Path) -> None:
-    summary = summary_after(start, timeline(12.5, "at_s = 4\nkill = [1, 2]\nfor_s = 1.5"), run)
+    summary = summary_after(start, timeline(11.0, "at_s = 3\nkill = [1, 2]\nfor_s = 1.5"), run)
     assert process_events(run) == [
-        (4.0, "kill", 1, True),
-        (4.0, "kill", 2, True),
-        (5.5, "restart", 1, True),
-        (5.5, "restart", 2, True),
+        (3.0, "kill", 1, True),
+        (3.0, "kill", 2, True),
+        (4.5, "restart", 1, True),
+        (4.5, "restart", 2, True),
     ]
     assert (run / "logs/agent-1.log").read_text().count("flies in run") == 2
     assert [recovery["kind"] for recovery in summary["recoveries"]] == ["kill", "restart"]
     assert summary["recoveries"][1]["reformed_s"] is not None
     claims = [
-        e for e in events_of(run) if e["kind"] == "slot" and e["agent"] == 1 and e["t_s"] > 5.5
+        e for e in events_of(run) if e["kind"] == "slot" and e["agent"] == 1 and e["t_s"] > 4.5
     ]
-    assert claims[0]["t_s"] >= 6.0
+    assert claims[0]["t_s"] >= 5.0
 
 
+@pytest.mark.real_time
 def test_agents_join_and_leave(start: Start, timeline: Write, run: Path) -> None:
     places = "{ kind = 'list', positions_m = [[-4.2, 0.3, 0], [-5.1, 0, 0]] }"
     joins = f"at_s = 4\njoin = {{ count = 2, start = {places} }}"
@@ -80,14 +82,16 @@ def test_agents_join_and_leave(start: Start, timeline: Write, run: Path) -> None
     assert [recovery["reformed_s"] is not None for recovery in summary["recoveries"]] == [True] * 2
 
 
+@pytest.mark.real_time
 def test_a_paused_agent_is_silent_and_continues(start: Start, timeline: Write, run: Path) -> None:
-    summary = summary_after(start, timeline(11.0, "at_s = 4\npause = [1]\nfor_s = 3"), run)
-    assert process_events(run) == [(4.0, "pause", 1, True), (7.0, "resume", 1, True)]
-    assert not [e for e in events_of(run) if e["agent"] == 1 and 4.0 < e["t_s"] < 7.0]
+    summary = summary_after(start, timeline(9.5, "at_s = 3\npause = [1]\nfor_s = 3"), run)
+    assert process_events(run) == [(3.0, "pause", 1, True), (6.0, "resume", 1, True)]
+    assert not [e for e in events_of(run) if e["agent"] == 1 and 3.0 < e["t_s"] < 6.0]
     assert [recovery["reformed_s"] is not None for recovery in summary["recoveries"]] == [True] * 2
     assert (run / "logs/agent-1.log").read_text().count("flies in run") == 1
 
 
+@pytest.mark.real_time
 def test_the_radio_is_partitioned_healed_and_degraded(
     start: Start, timeline: Write, run: Path
 ) -> None:

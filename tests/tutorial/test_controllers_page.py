@@ -15,6 +15,7 @@ PAGE = (ROOT / "docs" / "controllers.md").read_text()
 
 
 @pytest.mark.processes
+@pytest.mark.real_time
 def test_followed_word_for_word_it_works(tmp_path: Path) -> None:
     newcomer = Newcomer(tmp_path, set_up(tmp_path))
     steps = blocks(PAGE)
