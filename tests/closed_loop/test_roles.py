@@ -50,7 +50,7 @@ def test_remark_5_a_line_with_a_radio_range_of_one_spacing():
     assert [parent for _, parent, _ in settled] == list(range(-1, 7))
     assert [role for _, _, role in settled] == [VERTEX, *[SUB_VERTEX] * 6, MEMBER]
     flips = 0
-    for _ in range(60 * 20):
+    for _ in range(30 * 20):
         fly(fleet, 0.05)
         now = [(each.tier, each.parent, each.role) for each in telemetry_of(fleet)]
         flips += now != settled
@@ -111,7 +111,7 @@ def wedge_without(place, seed, **overrides):
 
 
 @pytest.mark.parametrize("lossy", [False, True])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_team_fills_the_slots_around_a_dead_apex_agent(seed, lossy):
     radio = {"netem.loss_percent": "50", "netem.delay_ms": "200"} if lossy else {}
     fleet, living = wedge_without((0, 0), seed, **radio)

@@ -23,7 +23,7 @@ from worldsim.scenario.schema import schema
 BASE = 11
 SHORT = 300
 """Steps of all agents in a flight of the suite."""
-DOZENS = 36
+DOZENS = 24
 
 
 def test_short_flights_of_random_scenarios_show_no_failure(tmp_path: Path) -> None:
