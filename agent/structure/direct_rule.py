@@ -38,6 +38,12 @@ class DirectRule:
         """Since when members or leaders are missing, and since when some hear fewer members [s]."""
         self._next_choice_s = now_s
         self.applies = False
+        self._joins: bool | None = None
+        """Whether the team was counted before the agent came; None until a leader is heard."""
+        self.is_near = False
+        """Whether all members are heard, so that the rule will apply if nothing changes."""
+        self._awaited_since_s = inf
+        """When an agent that joins first heard as many members as a leader counts [s]."""
         self.heard = 1
         self._guessed: tuple[int, ...] | None = None
         """Among which members the last guess was made."""
@@ -61,6 +67,21 @@ class DirectRule:
             self._leave(view, short=short, uneven=least < self.heard)
         else:
             self._enter(not short and self.heard == view.total <= least, view, claim)
+        awaits = self._awaits(view, short=short)
+        self.is_near = not self.applies and (self._full_since_s is not None or awaits)
+
+    def _awaits(self, view: View, *, short: bool) -> bool:
+        """Whether an agent that joins a team waits until all others have heard it, too.
+
+        If it took a place before, it would soon have another one under the rule.
+        """
+        timing, known = view.timing, any(each is not None for each in view.summaries)
+        if self._joins is None and known:
+            self._joins = view.latest is not None
+        if self._joins and not short:
+            self._awaited_since_s = min(self._awaited_since_s, view.now_s)
+        waited_s = view.now_s - self._awaited_since_s
+        return 0.0 <= waited_s < max(timing.resettle_s, timing.answer_s)
 
     def _within_s(self, timing: Timing) -> float:
         """Return how recently a member must have been heard to count [s]."""
@@ -71,7 +92,7 @@ class DirectRule:
         self._short_since_s = _since(self._short_since_s, view.now_s, holds=short)
         self._uneven_since_s = _since(self._uneven_since_s, view.now_s, holds=uneven)
         short_s, uneven_s = view.now_s - self._short_since_s, view.now_s - self._uneven_since_s
-        if short_s > LEAVE_S + view.timing.lost_s or uneven_s > LEAVE_S:
+        if short_s > LEAVE_S + view.timing.lost_s or uneven_s > view.timing.resettle_s:
             self.applies, self._full_since_s = False, None
 
     def _enter(self, full: bool, view: View, claim: Claim) -> None:
@@ -91,11 +112,6 @@ class DirectRule:
     def all_hear_the_same(self, view: View) -> bool:
         """Whether everyone heard hears as many members as the own agent."""
         return all(h.standing is None or h.standing.heard == self.heard for h in view.heard)
-
-    @property
-    def is_near(self) -> bool:
-        """Whether all members are heard, so that the rule will apply if nothing changes."""
-        return self._full_since_s is not None and not self.applies
 
     def guess(self, view: View) -> Slot | None:
         """Return the slot of the likely place, so that the agent flies there at once."""

@@ -113,6 +113,20 @@ def test_a_team_forms_anew_when_leaders_leave_and_others_join(name, radio):
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("loss", "latency_s"), [(0.5, 0.2), (0.8, 0.5)])
+def test_who_joins_waits_until_the_team_counts_it_and_so_keeps_its_first_place(
+    loss, latency_s, seed
+):
+    """Where all hear all; if they took the nearest numbers at once they would change them."""
+    flown = team(WEDGE, 9, seed, loss=loss, latency_s=latency_s)
+    assert flown.until_formed(30.0)
+    for at in ((-3.0, -3.0, 0.0), (3.0, 3.0, 1.0), (2.0, 0.0, 0.0)):
+        flown.join(at)
+    assert flown.until_formed(12.0)
+    assert sum(flown.members[joined].changes for joined in (9, 10, 11)) <= 1
+
+
+@pytest.mark.parametrize("seed", range(3))
 def test_two_halves_that_meet_again_form_one_team(seed):
     flown = team(WEDGE, 10, seed)
     apart = flown.drops
