@@ -48,7 +48,9 @@ def test_nine_agents_form_the_wedge_under_loss_and_delay(seed):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_without_ranging_sensors_speed_promises_keep_agents_apart(seed):
-    judge = flown(seed, **LOSSY, **{"vehicle.sensors": "[]"}).loop.judge
+    """Blind agents give way in wide arcs; of 20 seeds the slowest needs 23.2 s."""
+    blind = {"vehicle.sensors": "[]", "duration_s": "26", "expect.converge_within_s": "24"}
+    judge = flown(seed, **{**LOSSY, **blind}).loop.judge
     assert [each.name for each in judge.expectations() if not each.held] == []
 
 
