@@ -5,7 +5,7 @@ first vertex, its *home*. A number is a place's rank, counted from the first ran
 """
 
 from collections.abc import Iterable, Sequence
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import permutations
 from math import dist, inf
 from typing import NamedTuple
@@ -88,10 +88,16 @@ class QueueMap:
         self.members = lru_cache(maxsize=64)(self._members)
         self.blocked_numbers = lru_cache(maxsize=64)(self._blocked_numbers)
         self._closed_row = lru_cache(maxsize=64)(self._measured_row)
+        self._nearest_pairs: list[tuple[int, int]] | None = None
 
-    @cached_property
+    @property
     def nearest_pairs(self) -> list[tuple[int, int]]:
         """All pairs of two queues, by the distance between their first members' places."""
+        if self._nearest_pairs is None:
+            self._nearest_pairs = self._pairs_by_distance()
+        return self._nearest_pairs
+
+    def _pairs_by_distance(self) -> list[tuple[int, int]]:
         firsts = [self.slot(j, 1, 1) for j in range(self.queues)]
         points = [slot.point if slot is not None else ZERO for slot in firsts]
         pairs = permutations(range(self.queues), 2)

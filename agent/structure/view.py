@@ -1,7 +1,6 @@
 """What one agent knows of the structure at one time: those it hears, and what leaders said."""
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from math import dist
 
 from agent.controller import Heard
@@ -45,15 +44,32 @@ class View:
         """Members of the team that took its places over from another mission; holds until a
         leader's count is steady."""
         self.origin = frame.to_frame(here)
+        # What follows is found when it is first asked for, and holds as long as the view.
+        self._by_id: Mapping[int, Heard] | None = None
+        self._counts: list[int] | None = None
+        self._highest: list[int] | None = None
+        self._latest: LeaderSummary | None = None
+        self._knows_latest = False
+        self._shares: tuple[int, ...] | None = None
+        self._vacant: list[int] | None = None
+        self._wanted: tuple[int, ...] | None = None
+        self._transfers: Mapping[int, Sequence[int]] | None = None
 
-    @cached_property
+    @property
     def by_id(self) -> Mapping[int, Heard]:
         """The members heard, by id."""
-        return {each.id: each for each in self.heard}
+        if self._by_id is None:
+            self._by_id = {each.id: each for each in self.heard}
+        return self._by_id
 
-    @cached_property
+    @property
     def counts(self) -> list[int]:
         """Members of each queue, as leaders count them."""
+        if self._counts is None:
+            self._counts = self._counted()
+        return self._counts
+
+    def _counted(self) -> list[int]:
         if self.is_under_way:
             return [*self.shares]
         counts = [0] * self.map.queues
@@ -63,9 +79,14 @@ class View:
                     counts[j] = count
         return counts
 
-    @cached_property
+    @property
     def highest(self) -> list[int]:
         """Number of the last claimed place of each queue."""
+        if self._highest is None:
+            self._highest = self._last_claimed()
+        return self._highest
+
+    def _last_claimed(self) -> list[int]:
         highest = [0] * self.map.queues
         for v, summary in enumerate(self.summaries):
             if summary is not None:
@@ -73,11 +94,14 @@ class View:
                     highest[j] = number
         return highest
 
-    @cached_property
+    @property
     def latest(self) -> LeaderSummary | None:
         """The latest summary of a leader whose counts were steady."""
-        steady = [each for each in self.summaries if each is not None and each.go]
-        return max(steady, key=lambda each: each.version, default=None)
+        if not self._knows_latest:
+            steady = [each for each in self.summaries if each is not None and each.go]
+            self._latest = max(steady, key=lambda each: each.version, default=None)
+            self._knows_latest = True
+        return self._latest
 
     @property
     def is_under_way(self) -> bool:
@@ -87,35 +111,47 @@ class View:
     @property
     def total(self) -> int:
         """Members of the team; without a leader's steady count those expected, 0 for none."""
-        return self.latest.total if self.latest is not None else self.expected
+        latest = self.latest
+        return latest.total if latest is not None else self.expected
 
-    @cached_property
+    @property
     def shares(self) -> tuple[int, ...]:
         """Members that each queue should have besides those in vertices, as counted so far."""
+        if self._shares is None:
+            self._shares = self._shared()
+        return self._shares
+
+    def _shared(self) -> tuple[int, ...]:
         if self.is_under_way:
             return self.map.members(self.expected, self.blocked)
         known = [each for each in self.summaries if each is not None]
         latest = max(known, key=lambda each: each.version, default=None)
         return self.map.members(latest.total if latest is not None else 0, self.blocked)
 
-    @cached_property
+    @property
     def vacant(self) -> list[int]:
         """The vertices that are available, and of whose leader nothing was heard."""
-        return [
-            v
-            for v, summary in enumerate(self.summaries)
-            if summary is None and self.map.vertex_places[v] not in self.blocked
-        ]
+        if self._vacant is None:
+            self._vacant = [
+                v
+                for v, summary in enumerate(self.summaries)
+                if summary is None and self.map.vertex_places[v] not in self.blocked
+            ]
+        return self._vacant
 
-    @cached_property
+    @property
     def wanted(self) -> tuple[int, ...]:
         """The shares, with those who are to lead a vertex that nobody is near."""
-        return self.map.with_vacancies(self.shares, self.counts, self.vacant)
+        if self._wanted is None:
+            self._wanted = self.map.with_vacancies(self.shares, self.counts, self.vacant)
+        return self._wanted
 
-    @cached_property
+    @property
     def transfers(self) -> Mapping[int, Sequence[int]]:
         """For each queue that is to give members away, how many each other one may take from it."""
-        return transfers(self.map, self.counts, self.wanted)
+        if self._transfers is None:
+            self._transfers = transfers(self.map, self.counts, self.wanted)
+        return self._transfers
 
     def home_of(self, queue: int) -> LeaderSummary | None:
         """Return the summary of the leader of a queue's first vertex."""
@@ -151,8 +187,9 @@ class View:
     def extent(self, queue: int, number: int = 1) -> int:
         """Return with how many members a queue's places are computed (a closed queue's shift)."""
         members = self.shares[queue] if self.total else 0
-        for taken in sorted(self.map.blocked_numbers(queue, self.blocked)):
-            members += taken <= members
+        if self.blocked:
+            for taken in sorted(self.map.blocked_numbers(queue, self.blocked)):
+                members += taken <= members
         return max(members, number, 1)
 
     def distance(self, queue: int, number: int) -> float:
