@@ -1,7 +1,9 @@
 """Virtual time: the whole fleet in one process, as fast as the host allows.
 
-The agents, the medium and the world are those of the processes, driven by the same slot loop. Every
-message is encoded and decoded; a payload that several agents hear is decoded once.
+The agents, the medium and the world are those of the processes, driven by the same slot loop. What
+an agent says by radio and commands is encoded and decoded, a payload that several agents hear once.
+The other messages are handed over as they are, since nobody can change them; in one slot of
+``CHECKED_EVERY`` they go through the codec too, as between processes, and must come out equal.
 """
 
 from collections import deque
@@ -9,16 +11,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from time import perf_counter, process_time
-from typing import Protocol, assert_never
+from typing import Protocol, TypeVar, assert_never
 
 from agent.codec import decode_beacon, decode_command, decode_gossip, decode_observation, encode
 from agent.core import Agent, Decoders
+from agent.messages import Observation
 from netem.faults import FaultOrder
 from netem.medium import Medium
 from netem.messages import MediumCounters
 from netem.wire.frame import (
     BATCH_RING,
     Batch,
+    Frame,
     Outgoing,
     Transmission,
     pack,
@@ -42,6 +46,9 @@ from worldsim.scenario.tables import Scenario
 
 PROGRESS_EVERY_S = 0.5
 """[s; wall time]"""
+CHECKED_EVERY = 61
+"""A prime, so that each agent's turn comes: agents step in every fourth slot."""
+_Message = TypeVar("_Message")
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +91,7 @@ class VirtualFleet:
         self._medium = Medium(scenario.medium_setup())
         self._decoders = decoders
         self._agents = {agent: self._new_agent(agent, 0) for agent in range(scenario.fleet.agents)}
-        self._inboxes = [deque[bytes](maxlen=BATCH_RING) for _ in range(scenario.rows)]
+        self._inboxes = [deque[tuple[Frame, ...]](maxlen=BATCH_RING) for _ in range(scenario.rows)]
         self.loop = SlotLoop(
             scenario, world_of(scenario, VIRTUAL_COMMAND_TICKS), recorder, self._medium.packets
         )
@@ -108,7 +115,7 @@ class VirtualFleet:
         self._slot = open_slot.slot
         self._medium.place(open_slot.positions)
         for agent, observation in open_slot.observations:
-            self._step(agent, encode(observation), open_slot)
+            self._step(agent, observation, open_slot)
         self._deliver(open_slot.slot + 1)
         self.loop.close(self._medium.digest())
 
@@ -141,21 +148,25 @@ class VirtualFleet:
         self._watch.leave()
         return core
 
-    def _step(self, agent: int, encoded: bytes, open_slot: OpenSlot) -> None:
-        core = self._agents[agent]
-        observation = decode_observation(encoded)
+    def _step(self, agent: int, observation: Observation, open_slot: OpenSlot) -> None:
+        core, now_s = self._agents[agent], open_slot.time_s
+        checks = open_slot.slot % CHECKED_EVERY == 0
+        if checks:
+            _check_codec(observation, decode_observation(encode(observation)))
         inbox = self._inboxes[agent]
         while inbox:
-            for frame in unpack_batch(inbox.popleft()).frames:
-                core.receive(frame.source, frame.channel, frame.payload, observation.time_s)
+            for frame in inbox.popleft():
+                core.receive(frame.source, frame.channel, frame.payload, now_s)
         if self._watch is not None:
             self._watch.enter(agent, open_slot.slot)
         outbox = core.step(observation)
         if self._watch is not None:
             self._watch.leave()
         outgoing = tuple([Outgoing(channel, payload) for channel, payload in outbox.frames])
-        transmission = pack(Transmission(open_slot.slot, outbox.command.incarnation, outgoing))
-        self._medium.transmit(agent, open_slot.time_s, unpack_transmission(transmission))
+        transmission = Transmission(open_slot.slot, outbox.command.incarnation, outgoing)
+        if checks:
+            _check_codec(transmission, unpack_transmission(pack(transmission)))
+        self._medium.transmit(agent, now_s, transmission)
         command = encode(outbox.command)
         self.loop.apply_command(agent, decode_command(command), command)
 
@@ -165,8 +176,17 @@ class VirtualFleet:
         alive, time_s = self.loop.members.alive.tolist(), clock.time_s(slot)
         for agent in range(slot % clock.slots_per_tick, len(alive), clock.slots_per_tick):
             if alive[agent]:
-                batch = Batch(slot, self._medium.collect(agent, time_s))
-                self._inboxes[agent].append(pack(batch))
+                frames = self._medium.collect(agent, time_s)
+                if slot % CHECKED_EVERY == 0:
+                    batch = Batch(slot, frames)
+                    _check_codec(batch, unpack_batch(pack(batch)))
+                self._inboxes[agent].append(frames)
+
+
+def _check_codec(sent: _Message, arrived: _Message) -> None:
+    """Raise ValueError if a message does not come out of the codec as it went in."""
+    if arrived != sent:
+        raise ValueError(f"the codec makes {arrived!r} of {sent!r}")
 
 
 def fly(
