@@ -13,6 +13,7 @@ import msgspec
 from agent.messages import MAX_PIECES, PIECE_B, Beacon, Command, Gossip, Observation, Summary
 from agent.qstructure.expression import MAX_EXPRESSION_LENGTH
 from agent.qstructure.formation import FormationSpec
+from agent.rejection import RejectedError
 from netem.wire.channels import MAX_PAYLOAD_B
 
 CHECKSUM_B = 4
@@ -20,24 +21,18 @@ MAX_MESSAGE_B = 4096
 MAX_OBSERVATION_B = 65536
 """Sensed vehicles, scans, and with them a mission: its formation and its frame's path."""
 
+_WITH_SUMMARY = Gossip, Summary
 _T = TypeVar("_T", bound=msgspec.Struct)
 _encode = msgspec.msgpack.Encoder().encode
-
-
-class RejectedError(ValueError):
-    """A rejected message; ``cause`` is one of messages.CAUSES, under which it is counted."""
-
-    def __init__(self, cause: str, detail: str) -> None:
-        super().__init__(f"{cause}: {detail}")
-        self.cause = cause
 
 
 def encode(message: msgspec.Struct) -> bytes:
     """Encode any message as msgpack; a summary that says nothing of lines, without that field."""
     data = _encode(message)
-    summary = message.summary if isinstance(message, Gossip) else message
-    if isinstance(summary, Summary) and summary.lines is None:
-        return _without_last_field(data, len(_encode(summary)))
+    if isinstance(message, _WITH_SUMMARY):
+        summary = message.summary if isinstance(message, Gossip) else message
+        if summary is not None and summary.lines is None:
+            return _without_last_field(data, len(_encode(summary)))
     return data
 
 

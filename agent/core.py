@@ -6,14 +6,13 @@ Zenoh, or virtual time) only carry bytes.
 
 from collections import Counter, deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import dist, hypot, inf
 from typing import NamedTuple, assert_never, final
 
 import msgspec
 
 from agent.checked_controller import CheckedController
-from agent.codec import RejectedError, decode_beacon, decode_gossip
+from agent.codec import decode_beacon, decode_gossip
 from agent.comms.broadcast import Broadcast, OwnState
 from agent.comms.gossip import RecordTable
 from agent.comms.mission import Missions
@@ -44,6 +43,7 @@ from agent.messages import (
     Vector,
 )
 from agent.places.place_points import PlacePoints
+from agent.rejection import RejectedError
 from agent.sensing.obstacle_perception import ObstaclePerception
 from netem.wire import channels
 from netem.wire.channels import Channel
@@ -58,12 +58,16 @@ exceed the limit: a controller may ask for more than its vehicle then flies."""
 
 
 @final
-@dataclass
 class Outbox:
     """An agent's output of one step: for its vehicle, and for its radio."""
 
-    command: Command
-    frames: tuple[tuple[Channel, bytes], ...]  # (channel, payload)
+    def __init__(
+        self,
+        command: Command,
+        frames: tuple[tuple[Channel, bytes], ...],  # (channel, payload)
+    ) -> None:
+        self.command = command
+        self.frames = frames
 
 
 class Decoders(NamedTuple):

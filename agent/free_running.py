@@ -6,9 +6,10 @@ cannot be decoded.
 
 from collections import deque
 
-from agent.codec import RejectedError, decode_observation
+from agent.codec import decode_observation
 from agent.config import AgentSetup
 from agent.messages import Observation
+from agent.rejection import RejectedError
 from agent.step_page import StepGuard
 from agent.stepping import AgentStepper
 from netem.wire.bus import Bus

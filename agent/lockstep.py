@@ -5,8 +5,9 @@ A message of another slot ends the run.
 
 from collections.abc import Callable
 
-from agent.codec import RejectedError, decode_observation
+from agent.codec import decode_observation
 from agent.config import AgentSetup
+from agent.rejection import RejectedError
 from agent.step_page import StepGuard
 from agent.stepping import AgentStepper
 from netem.wire.barrier import LOCKSTEP_RING, LockstepError, await_message, check_slot

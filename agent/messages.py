@@ -433,6 +433,13 @@ class Piece(Message, frozen=True):
     data: Annotated[bytes, Meta(max_length=1000)]
 
 
+class MissionData(Message, frozen=True):
+    """What travels in the pieces of a mission."""
+
+    frame: FramePath
+    formation: bytes  # a FormationSpec as msgpack
+
+
 class Gossip(Message, frozen=True):
     """One frame of the multihop channel: records of the sender's table, a piece, or a summary."""
 

@@ -63,15 +63,23 @@ class HeardSummary(NamedTuple):
 
 
 @final
-@dataclass
+@dataclass(init=False)
 class Peer:
     """A known member of the team, the own agent included; heard directly or through others."""
 
     id: int
     position: Vector  # last reported [m; world frame]
     place: Place | None  # the place that it claims
-    cost_m: float | None = None
+    cost_m: float | None
     """Reported distance to its place when it first claimed it [m]."""
+
+    def __init__(
+        self, id: int, position: Vector, place: Place | None, cost_m: float | None = None
+    ) -> None:
+        self.id = id
+        self.position = position
+        self.place = place
+        self.cost_m = cost_m
 
 
 class Flown(NamedTuple):
@@ -91,7 +99,7 @@ class HeardFrame(NamedTuple):
 
 
 @final
-@dataclass
+@dataclass(init=False)
 class Senses:
     """Everything that a controller decides on."""
 
@@ -104,12 +112,44 @@ class Senses:
     neighbours: tuple[Heard, ...]  # sorted by id
     team: Callable[[], tuple[Peer, ...]]  # all known members, sorted by id; gathered when called
     mission: Flown | None  # None: not briefed, and none heard yet
-    silent: tuple[Vector, ...] = ()  # unidentified vehicles [m; world frame] (E18)
-    blocked: frozenset[Place] = frozenset()
+    silent: tuple[Vector, ...]  # unidentified vehicles [m; world frame] (E18)
+    blocked: frozenset[Place]
     """Places that others see taken by an unidentified vehicle (E18)."""
-    link: Link = UNHEARD
-    summaries: tuple[HeardSummary, ...] = ()  # heard since the last step
-    obstacles: tuple[Vector, ...] = ()
+    link: Link
+    summaries: tuple[HeardSummary, ...]  # heard since the last step
+    obstacles: tuple[Vector, ...]
     """Near points of obstacles, relative to the own centre [m; world axes]."""
-    heard_frame: HeardFrame | None = None
+    heard_frame: HeardFrame | None
     """Without a mission: the frame that a neighbour with a tier reported last, for up to 5 s."""
+
+    def __init__(  # noqa: PLR0913, PLR0917
+        self,
+        now_s: float,
+        position: Vector,
+        velocity: Vector,
+        yaw: float,
+        vehicles: tuple[Vector, ...],
+        neighbours: tuple[Heard, ...],
+        team: Callable[[], tuple[Peer, ...]],
+        mission: Flown | None,
+        silent: tuple[Vector, ...] = (),
+        blocked: frozenset[Place] = frozenset(),
+        link: Link = UNHEARD,
+        summaries: tuple[HeardSummary, ...] = (),
+        obstacles: tuple[Vector, ...] = (),
+        heard_frame: HeardFrame | None = None,
+    ) -> None:
+        self.now_s = now_s
+        self.position = position
+        self.velocity = velocity
+        self.yaw = yaw
+        self.vehicles = vehicles
+        self.neighbours = neighbours
+        self.team = team
+        self.mission = mission
+        self.silent = silent
+        self.blocked = blocked
+        self.link = link
+        self.summaries = summaries
+        self.obstacles = obstacles
+        self.heard_frame = heard_frame

@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 import msgspec
 
 from agent.codec import (
-    RejectedError,
     add_checksum,
     decode_beacon,
     decode_command,
@@ -27,6 +26,7 @@ from agent.codec import (
 )
 from agent.core import Agent, Outbox
 from agent.messages import Beacon, Gossip, Observation
+from agent.rejection import RejectedError
 from netem.fault_queue import FaultQueue
 from netem.messages import SlotInput, SlotResult, Truth, unpack_slot_input, unpack_slot_result
 from netem.wire.frame import (

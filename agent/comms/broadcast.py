@@ -5,7 +5,6 @@ passed on.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import inf
 from typing import final
 
@@ -36,28 +35,44 @@ MAX_ECHOES = 8
 
 
 @final
-@dataclass
 class OwnState:
     """What an agent reports about itself; see Beacon."""
 
-    position: Vector  # [m; world frame]
-    velocity: Vector  # [m/s; world frame]
-    heading_for: Vector  # immediate target q_tg [m; world frame]
-    place: Place | None
-    speed_cap: float  # promised for the next 3 s [m/s]
-    mission: int = 0
-    frame_key: int = 0
-    frame: Pose = HOME
-    drift: Drift | None = None
-    blocked: tuple[Place, ...] = ()
-    cost_mm: int = 0  # [mm]
-    standing: Standing | None = None
-    summary: Summary | None = None
+    def __init__(  # noqa: PLR0913, PLR0917
+        self,
+        position: Vector,  # [m; world frame]
+        velocity: Vector,  # [m/s; world frame]
+        heading_for: Vector,  # immediate target q_tg [m; world frame]
+        place: Place | None,
+        speed_cap: float,  # promised for the next 3 s [m/s]
+        mission: int = 0,
+        frame_key: int = 0,
+        frame: Pose = HOME,
+        drift: Drift | None = None,
+        blocked: tuple[Place, ...] = (),
+        cost_mm: int = 0,  # [mm]
+        standing: Standing | None = None,
+        summary: Summary | None = None,
+    ) -> None:
+        self.position = position
+        self.velocity = velocity
+        self.heading_for = heading_for
+        self.place = place
+        self.speed_cap = speed_cap
+        self.mission = mission
+        self.frame_key = frame_key
+        self.frame = frame
+        self.drift = drift
+        self.blocked = blocked
+        self.cost_mm = cost_mm
+        self.standing = standing
+        self.summary = summary
 
     @property
     def claim(self) -> tuple[int, int, int]:
         """Queue and rank of the claimed place, -1 for none, and the claim's cost [mm]."""
-        return (*self.place, self.cost_mm) if self.place is not None else (-1, -1, 0)
+        place = self.place
+        return (place.queue, place.rank, self.cost_mm) if place is not None else (-1, -1, 0)
 
 
 class Broadcast:

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, assert_never
 
-from agent.codec import RejectedError, decode, decode_formation, encode, encode_formation
+from agent.codec import decode, decode_formation, encode, encode_formation
 from agent.comms.reported_frame import FrameFromTiers, ReportedFrame, check_stamp
 from agent.controller import Flown, HeardFrame
 from agent.messages import (
@@ -38,8 +38,8 @@ from agent.messages import (
     Beacon,
     Drift,
     FramePath,
-    Message,
     Mission,
+    MissionData,
     Piece,
     Pose,
 )
@@ -47,6 +47,7 @@ from agent.qstructure.formation import Formation, FormationError, FormationSpec,
 from agent.qstructure.frame_path import Track
 from agent.qstructure.mission_check import MissionError, check_drift, check_mission
 from agent.qstructure.target_frame import Frame
+from agent.rejection import RejectedError
 
 KEYS_PER_VERSION = AGENT_IDS
 MAX_MISSION_B = 4 * PIECE_B
@@ -75,13 +76,6 @@ def is_plausible(key: int, time_s: float) -> bool:
 def _check_key(key: int, time_s: float) -> None:
     if not is_plausible(key, time_s):
         raise RejectedError("mission", f"no team can have had so many missions: {key}")
-
-
-class _MissionData(Message, frozen=True):
-    """What travels in pieces."""
-
-    frame: FramePath
-    formation: bytes  # a FormationSpec as msgpack
 
 
 class _Pieces(NamedTuple):
@@ -166,13 +160,13 @@ class Missions:
             del self._pieces[sender]
             self._deaf_until_s[sender] = now_s + DEAF_AFTER_REJECTION_S
             encoded = b"".join(collected.parts[k] for k in sorted(collected.parts))
-            data = decode(encoded, _MissionData, MAX_MISSION_B)
+            data = decode(encoded, MissionData, MAX_MISSION_B)
             self._adopt(piece.key, data.frame, data.formation)
             self._deaf_until_s[sender] = now_s + DEAF_S
 
     def pieces(self) -> list[Piece]:
         """Return the present mission in pieces, for neighbours that fly an older one or none."""
-        data = encode(_MissionData(frame=self._path, formation=self._encoded))
+        data = encode(MissionData(frame=self._path, formation=self._encoded))
         parts = [data[at : at + PIECE_B] for at in range(0, len(data), PIECE_B)]
         return [
             Piece(key=self.key, index=index, count=len(parts), data=part)

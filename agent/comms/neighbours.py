@@ -8,9 +8,9 @@ from collections.abc import Collection
 from math import dist, inf, log
 from typing import final
 
-from agent.codec import RejectedError
 from agent.controller import UNHEARD, Heard, Link
 from agent.messages import NO_MISSION, Beacon, Place, Vector
+from agent.rejection import RejectedError
 
 MAX_AGE_S = 5.0
 """An older beacon is rejected."""

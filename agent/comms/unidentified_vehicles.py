@@ -18,7 +18,6 @@ survivor of a team has none.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import dist, inf
 from typing import NamedTuple, final
 
@@ -84,13 +83,18 @@ class _Track(NamedTuple):
 
 
 @final
-@dataclass
 class MemberPosition:
     """A team member's last reported position."""
 
-    id: int
-    position: Vector  # [m; world frame]
-    age_s: float  # age of the report [s]
+    def __init__(
+        self,
+        id: int,
+        position: Vector,  # [m; world frame]
+        age_s: float,  # age of the report [s]
+    ) -> None:
+        self.id = id
+        self.position = position
+        self.age_s = age_s
 
 
 class DepartedMember(NamedTuple):

@@ -13,7 +13,6 @@ from agent.codec import (
     CHECKSUM_B,
     MAX_MESSAGE_B,
     MAX_OBSERVATION_B,
-    RejectedError,
     add_checksum,
     decode_beacon,
     decode_command,
@@ -53,6 +52,7 @@ from agent.messages import (
     Telemetry,
     TreeReport,
 )
+from agent.rejection import RejectedError
 from netem.wire.channels import MAX_PAYLOAD_B
 
 MANY = 15_000

@@ -4,8 +4,8 @@ A direct link is an agent that is heard. Those that an agent needs are the paper
 """
 
 from collections import Counter
+from typing import NamedTuple
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +14,7 @@ from netem.messages import MediumCounters
 from netem.wire.channels import CHANNELS
 
 
-class Links(msgspec.Struct, frozen=True):
+class Links(NamedTuple):
     """Number of links of each agent; row i = agent i, None without a step that counts."""
 
     mean: list[float | None]

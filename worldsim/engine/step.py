@@ -7,7 +7,7 @@ to ``apply_command``, and then calls ``close``. The clock decides how messages t
 
 from collections.abc import Callable, Iterable
 from math import nan
-from typing import Protocol
+from typing import Protocol, final
 
 import msgspec
 import numpy as np
@@ -46,16 +46,25 @@ class Recorder(Protocol):
         """Record one event."""
 
 
-class OpenSlot(msgspec.Struct, frozen=True, kw_only=True, gc=False):
-    """The start of a slot: the truth for the medium, an observation for each agent that steps."""
+@final
+class OpenSlot:
+    """The start of a slot: the truth for the medium, an observation for each agent that steps.
 
-    slot: int
-    time_s: float
-    """[s; simulated time]"""
-    positions: tuple[Vector | None, ...]
-    """Row i = agent i's radio [m; world frame]; None where its process is not alive."""
-    observations: list[tuple[int, Observation]]
-    """(agent, observation), agents in ascending order."""
+    time_s: simulated time [s]. positions: row i = agent i's radio [m; world frame]; None where its
+    process is not alive. observations: (agent, observation), agents in ascending order.
+    """
+
+    def __init__(
+        self,
+        slot: int,
+        time_s: float,
+        positions: tuple[Vector | None, ...],
+        observations: list[tuple[int, Observation]],
+    ) -> None:
+        self.slot = slot
+        self.time_s = time_s
+        self.positions = positions
+        self.observations = observations
 
 
 def world_of(scenario: Scenario, command_ticks: int) -> World:

@@ -12,7 +12,8 @@ from typing import assert_never
 
 import msgspec
 
-from agent.codec import RejectedError, decode_command, encode
+from agent.codec import decode_command, encode
+from agent.rejection import RejectedError
 from netem.faults import FaultOrder
 from netem.messages import FaultOrders, MediumCounters, Truth
 from netem.wire.bus import Bus

@@ -9,7 +9,8 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import assert_never
 
-from agent.codec import RejectedError, decode_command, encode
+from agent.codec import decode_command, encode
+from agent.rejection import RejectedError
 from netem.delivery_log import Digest, joined_pages
 from netem.faults import FaultOrder
 from netem.messages import (

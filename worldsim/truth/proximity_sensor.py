@@ -1,6 +1,7 @@
 """The proximity sensor: relative positions of near vehicles and of near obstacles' surfaces."""
 
-import msgspec
+from typing import final
+
 import numpy as np
 
 from agent.messages import MAX_OBSTACLE_POINTS, PROXIMITY_RANGE_M, Vector
@@ -11,13 +12,17 @@ ARRAYS_FROM = 40
 """Number of vehicles from which arrays are faster."""
 
 
-class ProximityReading(msgspec.Struct, frozen=True, gc=False):
-    """What one agent's sensor reads, relative to the agent's own centre [m; world axes]."""
+@final
+class ProximityReading:
+    """What one agent's sensor reads, relative to the agent's own centre [m; world axes].
 
-    vehicles: tuple[Vector, ...]
-    """Centres of other vehicles, by agent id."""
-    obstacles: tuple[Vector, ...] = ()
-    """The nearest point of each obstacle's surface, in the order of the scenario."""
+    vehicles: the centres of other vehicles, by agent id. obstacles: the nearest point of each
+    obstacle's surface, in the order of the scenario.
+    """
+
+    def __init__(self, vehicles: tuple[Vector, ...], obstacles: tuple[Vector, ...] = ()) -> None:
+        self.vehicles = vehicles
+        self.obstacles = obstacles
 
 
 NO_READING = ProximityReading(())

@@ -1,6 +1,5 @@
 """Broadcasts: on time, numbered, and never longer than a frame may be."""
 
-from dataclasses import replace
 from itertools import pairwise
 from math import inf
 
@@ -21,6 +20,7 @@ from agent.messages import (
     Standing,
     Summary,
     Swap,
+    Vector,
 )
 from netem.wire.channels import LOCAL, MAX_PAYLOAD_B, MULTIHOP
 from tests.agent.comms.builders import (
@@ -33,7 +33,21 @@ from tests.agent.comms.builders import (
     record,
 )
 
-STILL = OwnState(position=ORIGIN, velocity=ORIGIN, heading_for=ORIGIN, place=None, speed_cap=0.5)
+
+def at_rest(
+    position: Vector = ORIGIN, place: Place | None = None, summary: Summary | None = None
+) -> OwnState:
+    return OwnState(
+        position=position,
+        velocity=ORIGIN,
+        heading_for=ORIGIN,
+        place=place,
+        speed_cap=0.5,
+        summary=summary,
+    )
+
+
+STILL = at_rest()
 FARTHEST = Place(2**15 - 1, 2**15 - 1)
 SWAP = Swap(partner=2**16 - 1, place=FARTHEST, other=FARTHEST)
 BRANCH = Branch(
@@ -150,7 +164,7 @@ def test_each_round_sends_the_whole_table():
 
 def test_the_own_record_agrees_with_the_beacon():
     sender, table = broadcast(incarnation=2), table_with(3, [record(4, 9)])
-    own = replace(STILL, position=(1.0, 2.0, 3.0), place=Place(1, 4))
+    own = at_rest(position=(1.0, 2.0, 3.0), place=Place(1, 4))
     (_, first), (_, second) = sender.frames(7.0, own, (), table)
     sent, (own_record, other) = decode_beacon(first), decode_gossip(second).records
     assert other == record(4, 9)
@@ -169,13 +183,13 @@ def test_who_relays_nothing_sends_no_record():
 def test_a_summary_goes_out_at_once_in_a_frame_of_its_own(relays):
     sender, table = broadcast(relays=relays), RecordTable(3, 2.0)
     sender.frames(7.0, STILL, (), table)
-    own = replace(STILL, summary=SUMMARY)
+    own = at_rest(summary=SUMMARY)
     ((_, payload),) = [each for each in sender.frames(7.1, own, (), table) if each[0] == MULTIHOP]
     sent = decode_gossip(payload)
     assert (sent.id, sent.stamp_s, sent.records, sent.summary) == (3, 7.1, (), SUMMARY)
 
 
 def test_no_summary_goes_out_with_the_multihop_channel_off():
-    sender, own = broadcast(round_s=inf), replace(STILL, summary=SUMMARY)
+    sender, own = broadcast(round_s=inf), at_rest(summary=SUMMARY)
     for tick in range(40):
         assert [c for c, _ in sender.frames(tick * 0.05, own, (), RecordTable(3, 2.0))] == [LOCAL]

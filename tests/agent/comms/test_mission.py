@@ -3,11 +3,12 @@
 import msgspec
 import pytest
 
-from agent.codec import RejectedError, encode_formation
+from agent.codec import encode_formation
 from agent.comms.mission import KEYS_PER_VERSION, Missions
 from agent.comms.reported_frame import MAX_EXTRAPOLATION_S
 from agent.messages import AT_HOME, HOME, NO_MISSION, Drift, FramePath, Mission, Pose
 from agent.qstructure.formation import FormationSpec
+from agent.rejection import RejectedError
 from tests.agent.comms.builders import beacon
 
 NOW_S = 3.0

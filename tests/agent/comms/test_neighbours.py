@@ -6,7 +6,6 @@ from random import Random
 
 import pytest
 
-from agent.codec import RejectedError
 from agent.comms.neighbours import (
     INCARNATION_LASTS_S,
     LEAST_SILENCE_S,
@@ -15,6 +14,7 @@ from agent.comms.neighbours import (
     Neighbours,
     Version,
 )
+from agent.rejection import RejectedError
 from tests.agent.comms.builders import beacon
 
 HZ = 20.0

@@ -2,10 +2,11 @@
 
 import pytest
 
-from agent.codec import RejectedError, encode_formation
+from agent.codec import encode_formation
 from agent.comms.mission import FIRST_VERSIONS, KEYS_PER_VERSION, Missions
 from agent.comms.reported_frame import MAX_EXTRAPOLATION_S
 from agent.messages import HOME, NO_MISSION, Branch, Drift, Mission, Pose, RootKey, Standing
+from agent.rejection import RejectedError
 from tests.agent.comms.builders import beacon
 from tests.agent.comms.test_mission import NOW_S, PATH, RAY, SECOND
 
