@@ -1,10 +1,13 @@
 """Which radios are in range of a sender, and at which distance.
 
-Small fleets are searched in a loop over plain floats, large ones as arrays. Both do the same
-operations (differences, a written-out sum of three squares, a square root) and so find equal
-numbers.
+Few receivers are searched in a loop over plain floats, many as arrays. Both do the same operations
+(differences, a written-out sum of three squares, a square root) and so find equal numbers.
+
+Of a large fleet only those near the sender are searched, as in a Verlet list: they were within the
+reach and a margin when it was made, and it holds until some radio has moved half of the margin.
 """
 
+from collections.abc import Sequence
 from math import nan, sqrt
 
 import numpy as np
@@ -14,8 +17,13 @@ from netem.faults import Position
 
 ARRAYS_FROM = 40
 """Number of receivers from which arrays are faster."""
+MARGIN_M = 0.5
+"""Receivers so far beyond the reach are kept among those that are near [m]."""
+MOST_MOVED_M = 0.499 * MARGIN_M
+"""Less than half of the margin by more than any rounding [m]."""
 InRange = list[tuple[int, float]]
 """Receivers and their distances [m], by receiver id."""
+Floats = NDArray[np.float64]
 
 
 class RangeIndex:
@@ -25,7 +33,12 @@ class RangeIndex:
         self._receivers = receivers
         self._rows = np.array(receivers, dtype=np.int64)
         self.positions: tuple[Position | None, ...] = (None,) * radios
-        self._array: NDArray[np.float64] | None = None
+        self._array: Floats | None = None
+        """The receivers' positions now, (3, R); None until they are needed."""
+        self._array_before: Floats = np.full((3, len(receivers)), nan)
+        """The receivers' positions when ``_near`` was begun, (3, R)."""
+        self._near: dict[tuple[int, float], tuple[Position, Sequence[int]]] = {}
+        """Where a sender was, and the receivers near it, by its id and reach."""
         self._found: dict[tuple[int, float], InRange] = {}
 
     def place(self, positions: tuple[Position | None, ...]) -> None:
@@ -42,16 +55,42 @@ class RangeIndex:
             if here is None:
                 found = []
             elif len(self._receivers) < ARRAYS_FROM:
-                found = self._by_loop(source, here, reach_m)
+                found = self._by_loop(source, here, reach_m, self._receivers)
             else:
-                found = self._by_array(source, here, reach_m)
+                found = self._among_near(source, here, reach_m)
             self._found[source, reach_m] = found
         return found
 
-    def _by_loop(self, source: int, here: Position, reach_m: float) -> InRange:
+    def _among_near(self, source: int, here: Position, reach_m: float) -> InRange:
+        positions = self._placed()
+        near = self._near.get((source, reach_m))
+        if near is None or not _is_within(here, near[0], MOST_MOVED_M):
+            pairs = self._by_array(self._array_before, source, here, reach_m + MARGIN_M)
+            near = here, [receiver for receiver, _ in pairs]
+            self._near[source, reach_m] = near
+        if len(near[1]) < ARRAYS_FROM:
+            return self._by_loop(source, here, reach_m, near[1])
+        return self._by_array(positions, source, here, reach_m)
+
+    def _placed(self) -> Floats:
+        """Return the receivers' positions (3, R) [m]; begin ``_near`` anew if any moved too far."""
+        if self._array is None:
+            known = [self.positions[receiver] or (nan, nan, nan) for receiver in self._receivers]
+            self._array = np.array(known).T.copy()
+            moved = self._array - self._array_before
+            square = moved * moved
+            stayed = square[0] + square[1] + square[2] <= MOST_MOVED_M**2
+            if not (stayed | np.isnan(self._array[0])).all():
+                self._array_before = self._array
+                self._near.clear()
+        return self._array
+
+    def _by_loop(
+        self, source: int, here: Position, reach_m: float, receivers: Sequence[int]
+    ) -> InRange:
         x, y, z = here
         found = []
-        for receiver in self._receivers:
+        for receiver in receivers:
             there = self.positions[receiver]
             if there is None or receiver == source:
                 continue
@@ -61,12 +100,14 @@ class RangeIndex:
                 found.append((receiver, distance_m))
         return found
 
-    def _by_array(self, source: int, here: Position, reach_m: float) -> InRange:
-        if self._array is None:
-            known = [self.positions[receiver] or (nan, nan, nan) for receiver in self._receivers]
-            self._array = np.array(known).T.copy()
-        dx, dy, dz = (self._array[axis] - here[axis] for axis in range(3))
+    def _by_array(self, positions: Floats, source: int, here: Position, reach_m: float) -> InRange:
+        dx, dy, dz = (positions[axis] - here[axis] for axis in range(3))
         distance_m = np.sqrt(dx * dx + dy * dy + dz * dz)
         within = np.flatnonzero(distance_m <= reach_m)
         pairs = zip(self._rows[within].tolist(), distance_m[within].tolist(), strict=True)
         return [pair for pair in pairs if pair[0] != source]
+
+
+def _is_within(a: Position, b: Position, distance_m: float) -> bool:
+    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return dx * dx + dy * dy + dz * dz <= distance_m * distance_m

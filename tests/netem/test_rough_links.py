@@ -223,3 +223,26 @@ def test_loop_and_arrays_find_the_same_receivers(seed):
         for reach_m in (2.0, float("inf")):
             near = by_array.in_range(source, reach_m)
             assert [each for each in near if each[0] in few] == by_loop.in_range(source, reach_m)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_receivers_that_move_are_found_as_if_they_were_looked_for_anew(seed):
+    random, radios = Random(seed), ARRAYS_FROM + 40
+    receivers = tuple(range(0, radios, 2)) if seed else tuple(range(radios))
+    kept = RangeIndex(radios, receivers)
+    places = [[random.uniform(-4.0, 4.0) for _ in range(3)] for _ in range(radios)]
+    speeds = [random.choice((0.0, 0.03, 0.2)) for _ in places]
+    for _ in range(60):
+        places = [
+            [x + random.uniform(-speed, speed) for x in place]
+            for place, speed in zip(places, speeds, strict=True)
+        ]
+        positions = [tuple(place) for place in places]
+        for absent in random.sample(range(radios), random.choice((0, 3))):
+            positions[absent] = None
+        anew = RangeIndex(radios, receivers)
+        for index in (kept, anew):
+            index.place(tuple(positions))
+        for source in random.sample(range(radios), 10):
+            for reach_m in (1.5, 4.0):
+                assert kept.in_range(source, reach_m) == anew.in_range(source, reach_m)
