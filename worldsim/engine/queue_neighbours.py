@@ -34,8 +34,11 @@ class QueueNeighbours:
         if claim is None:
             return None
         own, queues = self._queues[agent], self._queues
-        known = [other for other in telemetry.heard if other < len(queues)]
-        return sum(other == telemetry.parent or bool(own & queues[other]) for other in known)
+        parent, needed = telemetry.parent, 0
+        for other in telemetry.heard:
+            if other < len(queues) and (other == parent or not own.isdisjoint(queues[other])):
+                needed += 1
+        return needed
 
     def _queues_of(self, claim: tuple[int, int, int] | None) -> frozenset[tuple[int, int]]:
         if claim is None:

@@ -20,8 +20,6 @@ from worldsim.truth.vehicle import Floats
 SHAPE_M = 0.3
 """Largest error of a distance between two members that stand in their line [m]."""
 
-NOTHING: NDArray[np.bool_] = np.ones(0, dtype=np.bool_)
-
 
 class SubFormationsRow(TypedDict):
     """The sub-formations of one formation, as summary.json holds them."""
@@ -64,8 +62,8 @@ class SubFormations:
         """The members of each of them of which all have valid slots."""
         self._neighbours = _pairs_of([])
         """The neighbours along all these queues."""
-        self._others: dict[int, _Pairs] = {}
-        """All other pairs of a queue; they are found only once its neighbours stand."""
+        self._others: dict[tuple[int, ...], _Pairs] = {}
+        """All other pairs of some queues; they are found only once their neighbours stand."""
 
     @property
     def stands_s(self) -> list[float | None]:
@@ -102,10 +100,11 @@ class SubFormations:
         if slots is not self._slots:
             self._slots = slots
             self._find_pairs(tick, slots)
-        near = self._neighbours
-        broken = {*near.queue[~_kept(near, tick.position)].tolist()} if self._placed else set()
+        broken = _broken(self._neighbours, tick.position)
+        standing = tuple([queue for queue in self._placed if queue not in broken])
+        broken |= _broken(self._others_of(standing), tick.position)
         for queue in self._placed:
-            if queue in broken or not np.all(_kept(self._others_of(queue), tick.position)):
+            if queue in broken:
                 self._since_s[queue] = None
             elif self._since_s[queue] is None:
                 self._since_s[queue] = tick.time_s
@@ -122,12 +121,15 @@ class SubFormations:
         near = [pair for members in self._placed.values() for pair in pairwise(members)]
         self._neighbours = _pairs_of(near)
 
-    def _others_of(self, queue: int) -> _Pairs:
-        if queue not in self._others:
-            members = self._placed[queue]
-            pairs = [(a, b) for k, a in enumerate(members) for b in members[k + 2 :]]
-            self._others[queue] = _pairs_of(pairs)
-        return self._others[queue]
+    def _others_of(self, queues: tuple[int, ...]) -> _Pairs:
+        if queues not in self._others:
+            lines = [self._placed[queue] for queue in queues]
+            self._others = {
+                queues: _pairs_of(
+                    [(a, b) for line in lines for k, a in enumerate(line) for b in line[k + 2 :]]
+                )
+            }
+        return self._others[queues]
 
     def _members(self, tick: Tick) -> list[list[int]]:
         """Return the rows of each queue's members, in the order of their ranks."""
@@ -150,13 +152,13 @@ def _pairs_of(pairs: Sequence[tuple[_Placed, _Placed]]) -> _Pairs:
     return _Pairs(rows[:, 0], rows[:, 1], _lengths(points[:, 0] - points[:, 1]), queue)
 
 
-def _kept(pairs: _Pairs, position: Floats) -> NDArray[np.bool_]:
-    """Return for each pair whether its distance is that of the slots."""
+def _broken(pairs: _Pairs, position: Floats) -> set[int]:
+    """Return the queues of those pairs whose distance is not that of their slots."""
     if not len(pairs.one):
-        return NOTHING
+        return set()
     apart = _lengths(position[pairs.one] - position[pairs.other])
-    kept: NDArray[np.bool_] = np.abs(apart - pairs.apart) <= SHAPE_M
-    return kept
+    kept = np.abs(apart - pairs.apart) <= SHAPE_M
+    return set() if kept.all() else {*pairs.queue[~kept].tolist()}
 
 
 def _lengths(away: Floats) -> Floats:

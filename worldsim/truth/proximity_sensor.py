@@ -60,7 +60,7 @@ class ProximitySensor:
         operations.
         """
         if len(position) < ARRAYS_FROM:
-            rows = position.tolist()
+            rows: list[Vector] = list(map(tuple, position.tolist()))
             return [_vehicles_by_loop(rows, agent) for agent in agents]
         relative = position - position.take(agents, axis=0)[:, None]
         square = relative * relative
@@ -100,7 +100,7 @@ class ProximitySensor:
         return tuple([(x, y, z) for x, y, z in noisy.tolist()])
 
 
-def _vehicles_by_loop(rows: list[list[float]], agent: int) -> list[Vector]:
+def _vehicles_by_loop(rows: list[Vector], agent: int) -> list[Vector]:
     x, y, z = rows[agent]
     near: list[Vector] = []
     for row, (a, b, c) in enumerate(rows):

@@ -5,7 +5,6 @@ A pure state machine over slots. ``slot`` counts them; ``time_s`` is slot / slot
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isnan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +60,8 @@ class World:
         self.clock = clock
         self.slot = 0
         self.vehicles = Vehicles(start.position, start.yaw, limits)
+        self._absent = {*np.flatnonzero(np.isnan(start.position[:, 0])).tolist()}
+        """The agents without a vehicle in the world."""
         self.latest: list[Command | None] = [None] * rows
         """The last accepted command of each agent."""
         self.discarded = 0
@@ -84,17 +85,21 @@ class World:
 
     def positions(self) -> tuple[Vector | None, ...]:
         """Return true positions, row i = agent i [m; world frame], None where there is none."""
-        rows = self.vehicles.position.tolist()
-        return tuple([None if isnan(x) else (x, y, z) for x, y, z in rows])
+        found: list[Vector | None] = list(map(tuple, self.vehicles.position.tolist()))
+        for agent in self._absent:
+            found[agent] = None
+        return tuple(found)
 
     def enter(self, agent: int, position: Vector, yaw: float) -> None:
         """Put an agent's vehicle into the world [m; world frame, rad]; it hovers."""
         self.vehicles.place(agent, position, yaw)
+        self._absent.discard(agent)
         self._halt(agent)
 
     def leave(self, agent: int) -> None:
         """Take an agent's vehicle out of the world."""
         self.vehicles.remove(agent)
+        self._absent.add(agent)
         self._halt(agent)
 
     def observe(self, agents: list[int]) -> list[Observation]:
@@ -112,22 +117,22 @@ class World:
             ]
             scans = {a: self.sensor_faults.scans(a, each, self.slot) for a, each in scans.items()}
         slot, time_s = self.slot, self.time_s
-        position = self.vehicles.position.take(agents, axis=0).tolist()
-        velocity = self.vehicles.velocity.take(agents, axis=0).tolist()
+        position = map(tuple, self.vehicles.position.take(agents, axis=0).tolist())
+        velocity = map(tuple, self.vehicles.velocity.take(agents, axis=0).tolist())
         yaw = self.vehicles.yaw.take(agents).tolist()
         return [
             Observation(
                 slot,
                 time_s,
-                (x, y, z),
-                (u, v, w),
+                here,
+                motion,
                 heading,
                 each.vehicles,
                 each.obstacles,
                 (),
                 scans.get(agent, ()),
             )
-            for agent, (x, y, z), (u, v, w), heading, each in zip(
+            for agent, here, motion, heading, each in zip(
                 agents, position, velocity, yaw, readings, strict=True
             )
         ]
