@@ -8,7 +8,7 @@ from math import isfinite
 from msgspec.structs import replace
 
 from agent.config import AgentSetup
-from agent.controller import Controller, Intent, Senses, load
+from agent.controller import Controller, FaultyControllerError, Intent, Senses, load
 from agent.messages import MAX_ANGLE_RAD, MAX_FORCE, MAX_M, MAX_SPEED_MPS, Vector
 from netem.compiled import UnloadableError
 
@@ -19,10 +19,6 @@ SMALL = min(MAX_SPEED_MPS, MAX_ANGLE_RAD)
 
 MAX_ERROR_TEXT = 2000
 """Characters of an error's text that are kept."""
-
-
-class FaultyControllerError(RuntimeError):
-    """A controller failed; the text names the controller, the agent, the time and the error."""
 
 
 class CheckedController:

@@ -32,6 +32,7 @@ __all__ = [
     "UNHEARD",
     "Controller",
     "ControllerError",
+    "FaultyControllerError",
     "Flown",
     "Heard",
     "HeardFrame",
@@ -54,6 +55,10 @@ ENTRY_POINTS = "qswarm.controllers"
 
 class ControllerError(ValueError):
     """A controller that cannot be loaded; the text says why."""
+
+
+class FaultyControllerError(RuntimeError):
+    """A controller failed; the text names the controller, the agent, the time and the error."""
 
 
 class Words(NamedTuple):

@@ -45,8 +45,7 @@ from agent.messages import (
 from agent.places.place_points import PlacePoints
 from agent.rejection import RejectedError
 from agent.sensing.obstacle_perception import ObstaclePerception
-from netem.wire import channels
-from netem.wire.channels import Channel
+from netem.wire.channels import LOCAL, MULTIHOP, Channel
 
 MAX_SUMMARIES = 8
 """Most summaries of one sender taken in one step: its latest."""
@@ -123,13 +122,12 @@ class Agent:
     def receive(self, source: int, channel: Channel, payload: bytes, now_s: float) -> None:
         """Take a frame heard from ``source``; a rejected one is counted by its cause."""
         try:
-            match channel:
-                case channels.LOCAL:
-                    self._receive_beacon(source, payload, now_s)
-                case channels.MULTIHOP:
-                    self._receive_gossip(source, payload, now_s)
-                case _:
-                    assert_never(channel)
+            if channel == LOCAL:
+                self._receive_beacon(source, payload, now_s)
+            elif channel == MULTIHOP:
+                self._receive_gossip(source, payload, now_s)
+            else:
+                assert_never(channel)
         except RejectedError as error:
             self.rejected[error.cause] += 1
 
@@ -188,8 +186,8 @@ class Agent:
         u, v, w = beacon.velocity
         if u * u + v * v + w * w > self._implausible2:
             raise RejectedError("speed", f"agent {source} reports {hypot(u, v, w):.1f} m/s")
-        self._neighbours.receive(beacon, now_s, self._broadcast.sent_s)
-        self._table.adopt_beacon(beacon)
+        version = self._neighbours.receive(beacon, now_s, self._broadcast.sent_s)
+        self._table.adopt_beacon(beacon, version)
         self._safety_monitor.hear(beacon)
         if beacon.drift is not None or beacon.frame_key != self._missions.frame_key:
             self._missions.receive_frame(beacon)
@@ -297,14 +295,17 @@ class Agent:
         return reports_vehicle
 
     def _command(self, slot: int, intent: Intent, velocity: Vector) -> Command:
-        rejected = [(CAUSES.index(cause), count) for cause, count in sorted(self.rejected.items())]
+        rejected: tuple[tuple[int, int], ...] = ()
+        if self.rejected:
+            counts = sorted(self.rejected.items())
+            rejected = tuple([(CAUSES.index(cause), count) for cause, count in counts])
         telemetry = Telemetry(
             wanted=intent.wanted,
             force=intent.force,
             target=intent.target,
             place=intent.place,
             heard=self._neighbours.sorted_ids[:MAX_HEARD],
-            rejected=tuple(rejected),
+            rejected=rejected,
             mission=self._missions.key,
             tier=intent.words.tier,
             parent=intent.words.parent,

@@ -15,7 +15,7 @@ from types import MappingProxyType
 from typing import assert_never
 
 from agent.codec import CHECKSUM_B, add_checksum, encode
-from agent.comms.neighbours import NEVER_HEARD, Version, version_of
+from agent.comms.neighbours import NEVER_HEARD, Version
 from agent.comms.unidentified_vehicles import DepartedMember, MemberPosition
 from agent.controller import Peer
 from agent.messages import AGENT_IDS, MAX_TEAM, NO_MISSION, Beacon, Gossip, Piece, Place, Record
@@ -47,10 +47,9 @@ class RecordTable:
         period_s = 1.0 / multihop_hz if multihop_hz > 0.0 else 0.0
         self._relayed_silence_s = max(LEAST_RELAYED_SILENCE_S, RELAYED_SILENCE_ROUNDS * period_s)
 
-    def adopt_beacon(self, beacon: Beacon) -> None:
-        """Take a neighbour's beacon as the newest record of that neighbour."""
+    def adopt_beacon(self, beacon: Beacon, version: Version) -> None:
+        """Take a neighbour's beacon, of this version, as the newest record of that neighbour."""
         subject = beacon.id
-        version = version_of(beacon)
         if self._may_know(subject) and version.supersedes(self._last.get(subject, NEVER_HEARD)):
             self._last[subject] = version
             self._newest[subject] = beacon

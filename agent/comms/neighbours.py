@@ -105,11 +105,12 @@ class LinkQuality:
 class Neighbour:
     """One neighbour: its last beacon, and the radio's quality estimated from its sequence."""
 
-    __slots__ = ("beacon", "echoed_s", "latency_s", "mean_gap", "place", "version")
+    __slots__ = ("beacon", "echoed_s", "id", "latency_s", "mean_gap", "place", "version")
 
-    def __init__(self, beacon: Beacon, latency_s: float) -> None:
+    def __init__(self, beacon: Beacon, version: Version, latency_s: float) -> None:
+        self.id = beacon.id
         self.beacon = beacon
-        self.version = version_of(beacon)
+        self.version = version
         self.latency_s = latency_s
         self.mean_gap = 1.0
         self.place = _claimed_place(beacon)
@@ -121,13 +122,13 @@ class Neighbour:
 
         latency_s: its delay [s]; beacon_hz: the expected rate [Hz].
         """
-        before, self.version = self.beacon, version
+        before, last, self.version = self.beacon, self.version, version
         gap = 1.0
-        if beacon.incarnation == before.incarnation:
-            gap = float(beacon.sequence - before.sequence)
+        if version.incarnation == last.incarnation:
+            gap = float(version.sequence - last.sequence)
             if gap != 1:
                 # An invented sequence must not make a long silence seem likely.
-                most = 2.0 + 2.0 * (beacon.stamp_s - before.stamp_s) * beacon_hz
+                most = 2.0 + 2.0 * (version.stamp_s - last.stamp_s) * beacon_hz
                 gap = min(max(gap, 1), most)
             self.mean_gap += SMOOTHING * (gap - self.mean_gap)
         self.latency_s += SMOOTHING * (latency_s - self.latency_s)
@@ -163,8 +164,10 @@ class Neighbours:
         self._last: dict[int, Version] = {}
         self._quality = LinkQuality()
 
-    def receive(self, beacon: Beacon, now_s: float, own_sent_s: dict[int, float]) -> None:
+    def receive(self, beacon: Beacon, now_s: float, own_sent_s: dict[int, float]) -> Version:
         """Take a beacon, or raise RejectedError for a replay or an implausible stamp.
+
+        Returns its version.
 
         own_sent_s: sending time of each recent own sequence [s]. A beacon that echoes a sequence
         was sent after it (E22), whatever its stamp says.
@@ -176,7 +179,7 @@ class Neighbours:
         last = known.version if known is not None else self._last.get(sender, NEVER_HEARD)
         if not version.supersedes(last):
             raise RejectedError("replay", f"{version} of agent {sender} is not new")
-        age_s = now_s - beacon.stamp_s
+        age_s = now_s - version.stamp_s
         if age_s < -self._slack_s:
             raise RejectedError("future", f"the stamp is {-age_s:.3f} s ahead")
         if age_s > MAX_AGE_S:
@@ -184,23 +187,24 @@ class Neighbours:
         # A fresh stamp is later than every own beacon; only an old one can contradict its echo.
         echoed = self._echoed(beacon)
         sent_s = own_sent_s.get(echoed, -inf) if echoed is not None else -inf
-        if age_s > self._slack_s and beacon.stamp_s + self._slack_s < sent_s:
+        if age_s > self._slack_s and version.stamp_s + self._slack_s < sent_s:
             raise RejectedError("offset", "the stamp is older than a beacon that it echoes")
         latency_s = age_s if age_s > 0.0 else 0.0
         if known is not None:
             gap = known.update(beacon, version, latency_s, self._beacon_hz)
         else:
-            gap, known = 1.0, Neighbour(beacon, latency_s)
+            gap, known = 1.0, Neighbour(beacon, version, latency_s)
             self._known[sender] = known
             self._put_in_order()
         self._quality.note(gap, latency_s)
         if echoed is not None:
-            known.echoed_s = beacon.stamp_s
+            known.echoed_s = version.stamp_s
+        return version
 
     def link(self, here: Vector) -> Link:
         """Return the radio's quality as measured. here: own position [m; world frame]."""
         for known in self._in_order:
-            self._quality.note_distance(known.beacon.id, dist(here, known.beacon.position))
+            self._quality.note_distance(known.id, dist(here, known.beacon.position))
         return self._quality.link()
 
     def _echoed(self, beacon: Beacon) -> int | None:
@@ -224,7 +228,7 @@ class Neighbours:
         gone = {
             sender: stamp_s + HEARD_BY_OTHERS * known.silence_s(self._beacon_hz)
             for sender, known in self._known.items()
-            if now_s - (stamp_s := known.beacon.stamp_s) > LEAST_SILENCE_S
+            if now_s - (stamp_s := known.version.stamp_s) > LEAST_SILENCE_S
             and now_s - stamp_s > known.silence_s(self._beacon_hz)
         }
         for sender in gone:
@@ -245,22 +249,22 @@ class Neighbours:
         heard = []
         for known in self._in_order:
             beacon = known.beacon
-            since_s = now_s - beacon.stamp_s
+            since_s = now_s - known.version.stamp_s
             age_s = since_s if since_s > 0.0 else 0.0
             along = age_s if age_s < MAX_EXTRAPOLATION_S else MAX_EXTRAPOLATION_S
             x, y, z = beacon.position
             u, v, w = velocity = beacon.velocity
             position = (x + along * u, y + along * v, z + along * w)
-            place = known.place if beacon.mission == mission else None
+            flown = beacon.mission
             heard.append(
                 Heard(
-                    id=beacon.id,
+                    id=known.id,
                     age_s=age_s,
                     position=position,
                     velocity=velocity,
                     target=beacon.target,
-                    place=place,
-                    mission=beacon.mission,
+                    place=known.place if flown == mission else None,
+                    mission=flown,
                     cost_m=beacon.cost_mm / 1000.0,
                     standing=beacon.standing,
                     hears_me=now_s - known.echoed_s <= ECHO_LASTS_S,
@@ -278,7 +282,7 @@ class Neighbours:
 
     def echoes(self) -> tuple[tuple[int, int], ...]:
         """Return (id, last sequence heard) of each neighbour, sorted by id."""
-        return tuple([(each.beacon.id, each.beacon.sequence) for each in self._in_order])
+        return tuple([(each.id, each.version.sequence) for each in self._in_order])
 
     def _put_in_order(self) -> None:
         self.sorted_ids = tuple(sorted(self._known))

@@ -11,28 +11,16 @@ keeps the pole at U = 0 and the zero slope at U_tg, and has no second equilibriu
 U_tg the exponent is never positive, so nothing overflows (E5).
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from math import dist, exp
-from typing import Protocol
 
+from agent.controller import Heard
 from agent.messages import Vector
 
 LEAST_GAP_M = 1e-3
 """E2: g is at least this, also inside d_ob."""
 TARGET_FLOOR_M = 0.25
 """E1: targets nearer than d_ob plus this are no equilibrium of the potential."""
-
-
-class Other(Protocol):
-    """A neighbour as the potential needs it."""
-
-    @property
-    def position(self) -> Vector:
-        """Position q_j [m; world frame]."""
-
-    @property
-    def target(self) -> Vector:
-        """Immediate target q_tg,j [m; world frame]."""
 
 
 class Potential:
@@ -81,15 +69,17 @@ class Potential:
         steepness = 1.0 / (u_tg * u_tg) - 1.0 / (u * u)
         return sigma * steepness - 3.0 * self.a_t * d * d * sigma * (1.0 - sigma) * excess
 
-    def omega(self, q: Vector, q_tg: Vector, others: Iterable[Other]) -> Vector:
+    def omega(self, q: Vector, q_tg: Vector, others: Sequence[Heard]) -> Vector:
         """Return Omega_i of (27) with the chain rule corrected (E2) [m; world frame].
 
         q, q_tg: own position and immediate target [m; world frame]; others: the neighbours.
         """
         x, y, z = q[0] - q_tg[0], q[1] - q_tg[1], q[2] - q_tg[2]
+        here: Sequence[float] = q
+        target: Sequence[float] = q_tg
         for other in others:
             there = other.position
-            push = self._push(dist(q, there), dist(q_tg, other.target))
+            push = self._push(dist(here, there), dist(target, other.target))
             if push != 0.0:
                 x += push * (q[0] - there[0])
                 y += push * (q[1] - there[1])

@@ -43,6 +43,9 @@ class QStructure:
         self._held = HeldPoint()
         self._avoidance = avoidance_of(control.avoidance, control.safety_m)
         self._escape = DeadlockEscape(setup.id)
+        self._heard_m = -1.0
+        self._zone: CastZone | None = None
+        """The cast-zone where others were heard from as far as ``_heard_m``."""
 
     def decide(self, senses: Senses) -> Intent:
         """Return the intent; an agent without a place stays where it is and gives way."""
@@ -88,8 +91,11 @@ class QStructure:
 
     def _zone_within(self, heard_m: float) -> CastZone:
         """Return the cast-zone where others were heard from so far at most [m] (E20)."""
-        reach = cast_reach(self._control, heard_m, self._max_speed / GAIN)
-        return cast_zone(self._cone, reach, self._max_speed, self._max_yaw_rate)
+        if self._zone is None or heard_m != self._heard_m:
+            reach = cast_reach(self._control, heard_m, self._max_speed / GAIN)
+            self._heard_m = heard_m
+            self._zone = cast_zone(self._cone, reach, self._max_speed, self._max_yaw_rate)
+        return self._zone
 
     def _obstacle_term(self, senses: Senses) -> Vector:
         """Return the term that near surfaces add to Omega [m; world axes]."""

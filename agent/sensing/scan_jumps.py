@@ -8,7 +8,7 @@ from array import array
 from collections.abc import Sequence
 from math import dist, hypot
 
-from agent.messages import NO_ECHO_MM, PROXIMITY_RANGE_M, Scan, Vector
+from agent.messages import NO_ECHO_MM, PROXIMITY_RANGE_M, Scan
 
 JUMP_MM = 1000
 MIN_ECHOES = 8
@@ -42,10 +42,10 @@ class VehicleJumps(_Jumps):
         super().__init__()
         self._closing_mps = 2.0 * max_speed
         self._slack_m = SLACK_M + 2.0**0.5 * 6.0 * noise_m
-        self._before: Sequence[Vector] = ()
+        self._before: Sequence[Sequence[float]] = ()
         self._read_s = 0.0
 
-    def add(self, now_s: float, vehicles: Sequence[Vector]) -> None:
+    def add(self, now_s: float, vehicles: Sequence[Sequence[float]]) -> None:
         """Take the next reading, relative to the own centre [m; world axes].
 
         A vehicle near the edge of the sensor's range may have come in from outside.
@@ -58,7 +58,7 @@ class VehicleJumps(_Jumps):
         self._before, self._read_s = vehicles, now_s
 
 
-def _is_new(vehicle: Vector, before: Sequence[Vector], step_m: float) -> bool:
+def _is_new(vehicle: Sequence[float], before: Sequence[Sequence[float]], step_m: float) -> bool:
     for old in before:  # noqa: SIM110  # several times as fast as all()
         if dist(vehicle, old) <= step_m:
             return False

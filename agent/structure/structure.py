@@ -184,11 +184,7 @@ class Structure:
             self._decide_as_member(view)
         else:
             self._leader_place.choose(view, self.claim)
-        self._followed = any(
-            branch is not None and branch.parent == self._own_id
-            for h in view.heard
-            for branch in (h.standing.branches if h.standing is not None else ())
-        )
+        self._followed = any(_follows(h, self._own_id) for h in view.heard)
         self._report(view)
 
     def _relocate(self, view: View, place: Place) -> None:
@@ -330,3 +326,11 @@ def _branch(heard: Heard, vertex: int) -> Branch | None:
     if standing is None or vertex >= len(standing.branches):
         return None
     return standing.branches[vertex]
+
+
+def _follows(heard: Heard, agent: int) -> bool:
+    """Whether an agent heard has another one as its parent, in some tree."""
+    if heard.standing is None:
+        return False
+    branches = heard.standing.branches
+    return any(branch is not None and branch.parent == agent for branch in branches)

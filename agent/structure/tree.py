@@ -12,7 +12,7 @@ of a lower tier, and what goes to it is sent to the parent.
 
 from collections.abc import Collection
 from math import dist, inf
-from typing import NamedTuple, final
+from typing import final
 
 from agent.controller import Heard
 from agent.messages import Branch, RootKey, Vector
@@ -38,13 +38,9 @@ VOID_KEPT = 32
 class Follower:
     """An agent heard, with its branch in this tree."""
 
-    def __init__(
-        self,
-        heard: Heard,
-        branch: Branch,
-    ) -> None:
+    def __init__(self, heard: Heard, branch: Branch) -> None:
         self.heard = heard
-        self.branch = branch
+        self.root, self.version, self.tier, self.parent = branch
 
 
 def version_at(time_s: float) -> int:
@@ -97,17 +93,17 @@ class Tree:
             self.root = None
         latest = latest_version(now_s)
         for each in followers:
-            self._compare(each.branch, now_s, latest)
+            self._compare(each, now_s, latest)
         return self.root != leading
 
-    def _compare(self, branch: Branch, now_s: float, latest: int) -> None:
-        key = branch.root
-        if key.id == self._own_id or branch.version > latest:
+    def _compare(self, other: Follower, now_s: float, latest: int) -> None:
+        key, version = other.root, other.version
+        if version > latest or key.id == self._own_id:
             return
-        known = self.version if key == self.root else self._void.get(key, -1)
-        wins = self.root is None or key <= self.root
-        if wins and branch.version > known:
-            self.root, self.version, self.advanced_s = key, branch.version, now_s
+        same = key == self.root
+        known = self.version if same else self._void.get(key, -1)
+        if version > known and (same or self.root is None or key <= self.root):
+            self.root, self.version, self.advanced_s = key, version, now_s
 
     def _make_void(self, key: RootKey) -> None:
         self._void.pop(key, None)
@@ -141,18 +137,18 @@ class Tree:
             self.parent, self.tier = -1, (-1 if root is None else 0)
             return
         link = _OwnLink(here, velocity, reach_m, self.parent, KEPT * parent_s)
-        position_of = {each.heard.id: each.heard.position for each in followers}
+        heard_of = {each.heard.id: each.heard for each in followers}
         best: tuple[_Order, int] | None = None
         for each in followers:
-            branch, current = each.branch, each.heard.id == self.parent
+            current = each.heard.id == self.parent
             if (
-                branch.root == root
+                0 <= each.tier < MAX_TIER
                 and (current or each.heard.age_s < parent_s)
-                and 0 <= branch.tier < MAX_TIER
-                and branch.parent != own_id
+                and each.parent != own_id
                 and (best is None or _least_tier(each) <= best[0][0])
+                and each.root == root
             ):
-                found = link.order(each, position_of.get(branch.parent)), branch.tier
+                found = link.order(each, heard_of.get(each.parent)), each.tier
                 best = found if best is None else min(best, found)
         self.parent = best[0][3] if best is not None else -1
         self.tier = best[1] + 1 if best is not None else -1
@@ -162,30 +158,39 @@ _Order = tuple[int, bool, float, int]
 """Of two agents the one with the lesser order is the better parent."""
 
 
-class _OwnLink(NamedTuple):
+@final
+class _OwnLink:
     """What decides how good a parent an agent is, on the own side."""
 
-    here: Vector  # [m; world frame]
-    velocity: Vector  # [m/s; world frame]
-    reach_m: float
-    parent: int  # the present one
-    kept_s: float  # silence after which the present parent counts as leaving [s]
+    def __init__(
+        self,
+        here: Vector,  # [m; world frame]
+        velocity: Vector,  # [m/s; world frame]
+        reach_m: float,
+        parent: int,  # the present one
+        kept_s: float,  # silence after which the present parent counts as leaving [s]
+    ) -> None:
+        self.here = here
+        self.velocity = velocity
+        self.reach_m = reach_m
+        self.parent = parent
+        self.kept_s = kept_s
 
-    def order(self, other: Follower, above: Vector | None) -> _Order:
-        """Return where an agent stands among the parents there may be. above: its parent [m]."""
+    def order(self, other: Follower, above: Heard | None) -> _Order:
+        """Return where an agent stands among the parents there may be. above: its parent."""
         heard = other.heard
         current = heard.id == self.parent
         horizon_s = PARENT_STAYS_S if current else NEW_PARENT_STAYS_S
         silent = heard.age_s >= self.kept_s  # of the present parent alone
         leaves = silent or _leaves(self.here, self.velocity, heard, horizon_s, self.reach_m)
-        to_its_parent = dist(heard.position, above) if above is not None else 0.0
+        to_its_parent = dist(heard.position, above.position) if above is not None else 0.0
         tier = _least_tier(other) + (LEAVING if leaves else 0)
         return tier, not current, to_its_parent, heard.id
 
 
 def _least_tier(each: Follower) -> int:
     """Return the tier that an agent counts as if it stays in range."""
-    return each.branch.tier + (0 if each.heard.hears_me else 1)
+    return each.tier + (0 if each.heard.hears_me else 1)
 
 
 def _leaves(here: Vector, velocity: Vector, other: Heard, horizon_s: float, reach_m: float) -> bool:

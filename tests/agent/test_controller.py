@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from agent.checked_controller import CheckedController, FaultyControllerError, plain
+from agent.checked_controller import CheckedController, plain
 from agent.comms.mission import Missions
 from agent.config import AgentSetup
-from agent.controller import ControllerError, Heard, Intent, Senses, load
+from agent.controller import ControllerError, FaultyControllerError, Heard, Intent, Senses, load
 from agent.guidance.flocking import Flocking
 from agent.guidance.q_structure import QStructure
 from netem.compiled import UnloadableError

@@ -13,7 +13,8 @@ import traceback
 from contextlib import suppress
 from typing import Any
 
-from agent.checked_controller import FaultyControllerError, described
+from agent.checked_controller import described
+from agent.controller import FaultyControllerError
 from netem.wire.shutdown import StopRequest
 from worldsim.campaign.pulse import ClosedFilesError, Guard, Pulse, blame
 from worldsim.engine.virtual import Flight, fly

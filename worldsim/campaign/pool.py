@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
-from agent.checked_controller import FaultyControllerError
+from agent.controller import FaultyControllerError
 from netem.wire.shutdown import StopRequest
 from worldsim.campaign.flight import finished
 from worldsim.campaign.watched_flight import Job, WatchedFlight

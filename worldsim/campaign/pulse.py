@@ -9,7 +9,7 @@ import os
 from contextlib import suppress
 from typing import NamedTuple
 
-from agent.checked_controller import FaultyControllerError
+from agent.controller import FaultyControllerError
 from worldsim.scenario.tables import Scenario
 
 TEXT_B = 32 * 1024
