@@ -4,6 +4,7 @@ import signal
 import traceback
 from collections.abc import Iterable
 from math import isfinite
+from typing import Final
 
 from msgspec.structs import replace
 
@@ -12,12 +13,12 @@ from agent.controller import Controller, FaultyControllerError, Intent, Senses, 
 from agent.messages import MAX_ANGLE_RAD, MAX_FORCE, MAX_M, MAX_SPEED_MPS, Vector
 from netem.compiled import UnloadableError
 
-NUMBERS = 13
+NUMBERS: Final = 13
 """Numbers in an intent besides its target: three vectors, two tilt angles, yaw and force."""
 SMALL = min(MAX_SPEED_MPS, MAX_ANGLE_RAD)
 """Numbers whose absolute values add up to no more than this are within every bound."""
 
-MAX_ERROR_TEXT = 2000
+MAX_ERROR_TEXT: Final = 2000
 """Characters of an error's text that are kept."""
 
 

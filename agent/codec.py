@@ -4,7 +4,7 @@ Decoding is a pure function of the bytes, so a process that feeds several agents
 """
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 from zlib import crc32
 
 import msgpack
@@ -16,9 +16,9 @@ from agent.qstructure.formation import FormationSpec
 from agent.rejection import RejectedError
 from netem.wire.channels import MAX_PAYLOAD_B
 
-CHECKSUM_B = 4
-MAX_MESSAGE_B = 4096
-MAX_OBSERVATION_B = 65536
+CHECKSUM_B: Final = 4
+MAX_MESSAGE_B: Final = 4096
+MAX_OBSERVATION_B: Final = 65536
 """Sensed vehicles, scans, and with them a mission: its formation and its frame's path."""
 
 _WITH_SUMMARY = Gossip, Summary

@@ -7,7 +7,7 @@ Zenoh, or virtual time) only carry bytes.
 from collections import Counter, deque
 from collections.abc import Callable
 from math import dist, hypot, inf
-from typing import NamedTuple, assert_never, final
+from typing import Final, NamedTuple, assert_never, final
 
 import msgspec
 
@@ -47,11 +47,11 @@ from agent.rejection import RejectedError
 from agent.sensing.obstacle_perception import ObstaclePerception
 from netem.wire.channels import LOCAL, MULTIHOP, Channel
 
-MAX_SUMMARIES = 8
+MAX_SUMMARIES: Final = 8
 """Most summaries of one sender taken in one step: its latest."""
-HOUSEKEEPING_S = 0.2
+HOUSEKEEPING_S: Final = 0.2
 """Period of what need not be done every tick [s]."""
-IMPLAUSIBLE_SPEEDS = 4.0
+IMPLAUSIBLE_SPEEDS: Final = 4.0
 """A reported speed of more than so many times the fleet's limit is rejected. Reported speeds may
 exceed the limit: a controller may ask for more than its vehicle then flies."""
 

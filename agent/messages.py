@@ -5,7 +5,7 @@ up). Yaw is counted from +x towards +y. Decoding checks every number: it is fini
 bounds given here.
 """
 
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Final, Literal, NamedTuple
 
 import msgspec
 from msgspec import Meta
@@ -17,21 +17,21 @@ Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 
 MAX_M, MAX_SPEED_MPS, MAX_ANGLE_RAD, MAX_FORCE = 1e6, 100.0, 100.0, 1e9
-FRAME_M = 930e3
+FRAME_M: Final = 930e3
 """The frame's origin lies within this distance of the world's, along each axis [m]."""
-REACH_M = 50e3
+REACH_M: Final = 50e3
 """A slot lies within this distance of the frame's origin [m]."""
-FLIGHT_M = 985e3
+FLIGHT_M: Final = 985e3
 """The world's edge, along each axis [m]: vehicles start within it and cannot fly past it. It leaves
 room up to MAX_M for targets ahead of a vehicle."""
-LEAST_SPEED_MPS = 1e-3
+LEAST_SPEED_MPS: Final = 1e-3
 MAX_COST_MM = 2**31 - 1
-MAX_HEARD = 256
+MAX_HEARD: Final = 256
 """Most neighbours in one telemetry, and most vehicles in one observation."""
 AGENT_IDS = 2**16
 """Number of agent ids: 0 to AGENT_IDS - 1."""
 
-MAX_TEAM = 1024
+MAX_TEAM: Final = 1024
 """Most agents of a team."""
 
 Metres = Annotated[float, Meta(ge=-MAX_M, le=MAX_M)]
@@ -44,7 +44,7 @@ Count = Annotated[int, Meta(ge=0, lt=2**53)]
 AgentId = Annotated[int, Meta(ge=0, lt=AGENT_IDS)]
 ParentId = Annotated[int, Meta(ge=-1, lt=AGENT_IDS)]
 """An agent id, or -1 for no parent."""
-NO_MISSION = -1
+NO_MISSION: Final = -1
 MissionKey = Annotated[int, Meta(ge=NO_MISSION, lt=2**53)]
 """Key of the mission that an agent flies: 0 for the one it was briefed with at the start, more for
 later ones, NO_MISSION for none. Keys are ordered, so a team's first mission is newer than none."""
@@ -58,13 +58,13 @@ FlightPosition = tuple[FlightMetres, FlightMetres, FlightMetres]
 """Where a vehicle may be."""
 Velocity = tuple[Speed, Speed, Speed]
 Cost = Annotated[int, Meta(ge=0, le=MAX_COST_MM)]
-MAX_VERTICES = 16
+MAX_VERTICES: Final = 16
 """Most vertices of a formation whose places leaders allocate."""
-MAX_LABELS_B = 512
+MAX_LABELS_B: Final = 512
 """Longest run of labels in one frame [B]."""
 Label = Annotated[int, Meta(ge=0, lt=2**16)]
 """Age and queue of a member; see agent.structure.census."""
-MAX_PLACES = 12
+MAX_PLACES: Final = 12
 """Most occupied places in one report: with more, a whole table would not fit a transmission."""
 Places = Annotated[tuple[tuple[Index, Index], ...], Meta(max_length=MAX_PLACES)]
 """Some places, each (queue, rank)."""
@@ -137,11 +137,11 @@ class FramePath(Message, frozen=True):
 AT_HOME = FramePath(waypoints=(ZERO,))
 """The frame rests at the world's origin."""
 
-MAX_ORDER_B = 3000
+MAX_ORDER_B: Final = 3000
 """Longest formation in an operator's order, as msgpack [B]."""
-PIECE_B = 900
+PIECE_B: Final = 900
 """Longest part of a mission in one frame [B]; the last part may be shorter."""
-MAX_PIECES = 16
+MAX_PIECES: Final = 16
 
 
 class Mission(Message, frozen=True):
@@ -155,9 +155,9 @@ class Mission(Message, frozen=True):
 
 NO_ECHO_MM = 0xFFFF
 """The range of a ray that meets nothing within the sensor's range."""
-MAX_OBSTACLE_POINTS = 32
+MAX_OBSTACLE_POINTS: Final = 32
 """Most nearest points of obstacles in one observation."""
-PROXIMITY_RANGE_M = 2.0
+PROXIMITY_RANGE_M: Final = 2.0
 """Reach of the proximity sensor [m]."""
 
 
@@ -273,9 +273,9 @@ class Candidate(NamedTuple):
     to: Index
 
 
-MAX_CANDIDATES = 16
+MAX_CANDIDATES: Final = 16
 """Most candidates of a queue in one report."""
-MAX_ORDERS = 16
+MAX_ORDERS: Final = 16
 """Most orders of a leader at one time."""
 Orders = Annotated[tuple[Order, ...], Meta(max_length=MAX_ORDERS)]
 Histogram = Annotated[bytes, Meta(min_length=0, max_length=16)]
@@ -326,7 +326,7 @@ Centimetres = Annotated[int, Meta(ge=-(2**31), lt=2**31)]
 MAX_CENTISECONDS = 2**32 - 1
 Centiseconds = Annotated[int, Meta(ge=0, le=MAX_CENTISECONDS)]
 """A time, or a leader's version [10 ms]."""
-MAX_LINES = 64
+MAX_LINES: Final = 64
 """Most lines, and most parts of them, in one frame."""
 
 

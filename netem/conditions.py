@@ -7,7 +7,7 @@ began, and a link is cut where any fault cuts it. Faults end by their number, in
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple, TypeVar, assert_never
+from typing import Final, NamedTuple, TypeVar, assert_never
 
 import msgspec
 
@@ -18,7 +18,7 @@ from netem.wire.channels import CHANNELS
 
 _Keys = TypeVar("_Keys", bound=LinkKeys)
 NO_KEYS = LinkKeys()
-UNNAMED = -1
+UNNAMED: Final = -1
 """The group of all agents that a partition does not name."""
 
 

@@ -9,15 +9,16 @@ reach and a margin when it was made, and it holds until some radio has moved hal
 
 from collections.abc import Sequence
 from math import nan, sqrt
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from netem.faults import Position
 
-ARRAYS_FROM = 40
+ARRAYS_FROM: Final = 40
 """Number of receivers from which arrays are faster."""
-MARGIN_M = 0.5
+MARGIN_M: Final = 0.5
 """Receivers so far beyond the reach are kept among those that are near [m]."""
 MOST_MOVED_M = 0.499 * MARGIN_M
 """Less than half of the margin by more than any rounding [m]."""

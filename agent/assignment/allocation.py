@@ -8,17 +8,18 @@ leader. Agents with less knowledge find nearly the same, and the claims they hea
 from collections.abc import Container, Sequence
 from heapq import heapify, heappop, heapreplace
 from math import sqrt
+from typing import Final
 
 from agent.controller import Peer
 from agent.messages import Place, Vector
 
-HYSTERESIS_M2 = 0.5
-CONFLICT_M = 0.05
+HYSTERESIS_M2: Final = 0.5
+CONFLICT_M: Final = 0.05
 """Of two agents that claim one place, the nearer by more than this keeps it, else the lower id."""
-GAIN_M2 = 1e-9
-UNPLACED_M2 = 0.0
+GAIN_M2: Final = 1e-9
+UNPLACED_M2: Final = 0.0
 """Cost of having no place: the same for every agent, so that the nearest get the places."""
-ROUNDING = 1e-12
+ROUNDING: Final = 1e-12
 """Least saving of an exchange, as a share of its cost before. Far from the origin, sums of squares
 round by more than GAIN_M2, and two exchanges that seem to save could undo each other for ever."""
 

@@ -7,6 +7,7 @@ so a place is kept until the knowledge has settled.
 
 from collections.abc import Sequence
 from math import dist
+from typing import Final
 
 from agent.assignment.target_on_queue import TargetOnQueue
 from agent.config import AgentSetup
@@ -16,17 +17,17 @@ from agent.places.occupied_slots import OccupiedSlots
 from agent.places.place_points import OwnTarget, PlacePoints
 from agent.qstructure.formation import NO_PLACES
 
-CHOICE_HZ = 5.0
-CALM_S = 4.0
+CHOICE_HZ: Final = 5.0
+CALM_S: Final = 4.0
 """An agent that keeps its place for this long starts counting its changes anew."""
-LONGEST_S = 3.0
+LONGEST_S: Final = 3.0
 """Longest time for which repeated changes hold an agent to a place."""
-SETTLED_S = 0.4
+SETTLED_S: Final = 0.4
 """Knowledge of the team settles when it has not changed for this long."""
-ALONE_S = 1.5
+ALONE_S: Final = 1.5
 """The same for an agent that has heard no other yet: beacons may be delayed by more than
 ``SETTLED_S``."""
-PATIENCE_S = 1.0
+PATIENCE_S: Final = 1.0
 """Longest wait of an agent with a place: over a bad radio the knowledge never settles."""
 
 

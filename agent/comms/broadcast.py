@@ -6,7 +6,7 @@ passed on.
 
 from collections.abc import Sequence
 from math import inf
-from typing import final
+from typing import Final, final
 
 from agent.codec import add_checksum, encode
 from agent.comms.gossip import RecordTable
@@ -25,12 +25,12 @@ from agent.messages import (
 )
 from netem.wire.channels import LOCAL, MULTIHOP, Channel
 
-REMEMBERED_BEACONS = 200
+REMEMBERED_BEACONS: Final = 200
 """How many own sending times are kept, for echoes that may come."""
 NEWS_SHARE, PIECES_SOON = 0.25, 8
 """A mission that a neighbour lacks goes out after this share of a round, so many times; then once a
 round, as a Trickle timer does (RFC 6206): the neighbour may not hear this agent."""
-MAX_ECHOES = 8
+MAX_ECHOES: Final = 8
 """Most echoes of one beacon; of more neighbours others have their turn in the next."""
 
 

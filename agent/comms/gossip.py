@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from math import inf
 from operator import attrgetter
 from types import MappingProxyType
-from typing import assert_never
+from typing import Final, assert_never
 
 from agent.codec import CHECKSUM_B, add_checksum, encode
 from agent.comms.neighbours import NEVER_HEARD, Version
@@ -21,14 +21,14 @@ from agent.controller import Peer
 from agent.messages import AGENT_IDS, MAX_TEAM, NO_MISSION, Beacon, Gossip, Piece, Place, Record
 from netem.wire.channels import MAX_PAYLOAD_B
 
-RELAYED_SILENCE_ROUNDS = 12
+RELAYED_SILENCE_ROUNDS: Final = 12
 """The part of T_d = (2 D + 10) / (1 - loss) rounds that is the same at any distance. The rest, for
 D hops at that loss, is twice the measured age at which a subject's records arrive."""
-LAG_SMOOTHING = 0.25
-LEAST_RELAYED_SILENCE_S = 2.5
+LAG_SMOOTHING: Final = 0.25
+LEAST_RELAYED_SILENCE_S: Final = 2.5
 NONE_LOST: Mapping[int, float] = MappingProxyType({})
 MAX_FRAME_B = MAX_PAYLOAD_B - CHECKSUM_B
-FRAME_HEAD_B = 18
+FRAME_HEAD_B: Final = 18
 """Longest encoding of a Gossip without records [B]."""
 
 

@@ -22,7 +22,7 @@ can spoil it.
 
 from __future__ import annotations
 
-from typing import NamedTuple, assert_never
+from typing import Final, NamedTuple, assert_never
 
 from agent.codec import decode, decode_formation, encode, encode_formation
 from agent.comms.reported_frame import FrameFromTiers, ReportedFrame, check_stamp
@@ -51,14 +51,14 @@ from agent.rejection import RejectedError
 
 KEYS_PER_VERSION = AGENT_IDS
 MAX_MISSION_B = 4 * PIECE_B
-FIRST_VERSIONS = 1000
-VERSIONS_PER_S = 10.0
+FIRST_VERSIONS: Final = 1000
+VERSIONS_PER_S: Final = 10.0
 """Most versions that a team can have had by a time: so many at once, and so many in a second."""
-FRAME_VERSIONS_AHEAD = 16
+FRAME_VERSIONS_AHEAD: Final = 16
 """A frame whose mission has not arrived is at most so many missions ahead. An invented one spreads
 as a true one does, so few versions must be enough to supersede it."""
-DEAF_S = 0.5
-DEAF_AFTER_REJECTION_S = 10.0
+DEAF_S: Final = 0.5
+DEAF_AFTER_REJECTION_S: Final = 10.0
 """How long the pieces of a sender are ignored after a mission of it was taken, or rejected: it may
 not occupy a receiver with one mission after the other."""
 

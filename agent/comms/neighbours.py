@@ -6,31 +6,31 @@ never read.
 
 from collections.abc import Collection
 from math import dist, inf, log
-from typing import final
+from typing import Final, final
 
 from agent.controller import UNHEARD, Heard, Link
 from agent.messages import NO_MISSION, Beacon, Place, Vector
 from agent.rejection import RejectedError
 
-MAX_AGE_S = 5.0
+MAX_AGE_S: Final = 5.0
 """An older beacon is rejected."""
-INCARNATION_LASTS_S = 5.0
+INCARNATION_LASTS_S: Final = 5.0
 """An older incarnation is heard again when the newer one has been silent for this long."""
-MAX_EXTRAPOLATION_S = 1.0
+MAX_EXTRAPOLATION_S: Final = 1.0
 """A position is extrapolated along its velocity for this long at most."""
-LEAST_SILENCE_S = 1.5
+LEAST_SILENCE_S: Final = 1.5
 LOG_FALSE_ALARM = log(1e-6)
 """Logarithm of the probability that chance alone makes a silence of T_lost (E17)."""
-HEARD_BY_OTHERS = 0.25
+HEARD_BY_OTHERS: Final = 0.25
 """Share of T_lost by which others may hear a departing agent's last beacon later."""
-POOLED = 0.005
+POOLED: Final = 0.005
 """Weight of one beacon in the radio's quality: it follows from the last 200 beacons or so."""
-WITNESSES = 2
+WITNESSES: Final = 2
 """So many neighbours must have been heard from a distance until it counts as within reach."""
-ECHO_LASTS_S = 3.0
+ECHO_LASTS_S: Final = 3.0
 """A neighbour that echoed a beacon hears this agent for so long."""
-SMOOTHING = 0.05
-MARGIN = 1.2
+SMOOTHING: Final = 0.05
+MARGIN: Final = 1.2
 """The loss is estimated from the last 39 gaps or so: n (1e6^(1/n) - 1) / ln 1e6 at n = 39."""
 
 

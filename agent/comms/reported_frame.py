@@ -4,14 +4,14 @@ A member of an older mission flies by such a frame until the newer mission arriv
 a mission keeps pace with one that comes down the tiers.
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from agent.controller import HeardFrame
 from agent.messages import NO_MISSION, Beacon, Drift, Pose
 from agent.qstructure.target_frame import Frame
 from agent.rejection import RejectedError
 
-MAX_EXTRAPOLATION_S = 5.0
+MAX_EXTRAPOLATION_S: Final = 5.0
 """A reported frame is extrapolated for this long; then it counts as at rest where it is."""
 
 

@@ -19,26 +19,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import dist, inf
-from typing import NamedTuple, final
+from typing import Final, NamedTuple, final
 
 from agent.messages import PROXIMITY_RANGE_M, Beacon, Vector
 
-SAME_VEHICLE_M = 0.2
+SAME_VEHICLE_M: Final = 0.2
 """Two sightings nearer than this are the same vehicle, which then is stationary."""
-SAME_MEMBER_M = 0.4
+SAME_MEMBER_M: Final = 0.4
 """A vehicle sensed nearer than this to where a member is reported is that member."""
-UNIDENTIFIED_AFTER_S = 1.5
-RECENT_S = 10.0
+UNIDENTIFIED_AFTER_S: Final = 1.5
+RECENT_S: Final = 10.0
 """How long the last report or sight of a vehicle tells what a vehicle sensed near by may be."""
-MAX_REMEMBERED = 64
+MAX_REMEMBERED: Final = 64
 """Most vehicles remembered out of the sensor's range; those seen last are kept."""
 SURE_RANGE_M = PROXIMITY_RANGE_M - SAME_VEHICLE_M
 """A vehicle nearer than this would be sensed if it were still there."""
 UNMOVED_RANGE_M = PROXIMITY_RANGE_M - 0.05
 """A vehicle last sensed nearer than this would be sensed if it had not moved since."""
-REMEMBERED_S = 60.0
+REMEMBERED_S: Final = 60.0
 """How long a vehicle that nobody would sense is remembered at first."""
-MISSED_S = 1.5
+MISSED_S: Final = 1.5
 """How long one is that the agent or a neighbour would sense; a neighbour needs as long to report a
 vehicle that it comes to sense."""
 

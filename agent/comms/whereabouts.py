@@ -7,11 +7,11 @@ each member, however old, and knows which members of the team never reported.
 
 from collections.abc import Iterable
 from math import inf
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from agent.messages import Beacon, Record, Vector
 
-PROMISE_S = 3.0
+PROMISE_S: Final = 3.0
 """For how long a beacon's promise of a speed holds [s]."""
 
 

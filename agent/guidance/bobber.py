@@ -5,24 +5,27 @@ weight of the zone's walls has a closed form (E7), which is used here: straight 
 lies in the cone, else to a point on the cone's edge on the target's side.
 """
 
+from dataclasses import dataclass
 from math import cos, hypot, sin, sqrt
-from typing import NamedTuple
+from typing import Final, final
 
 from agent.config import DEFAULT_CAST_FAR_M, Control
 from agent.guidance.cone import Cone, azimuth_error
 from agent.messages import Vector
 
-STRAIGHT_AHEAD_M = 0.1
+STRAIGHT_AHEAD_M: Final = 0.1
 """A target nearer than this horizontally counts as straight ahead (E7)."""
-INSIDE_EDGE = 0.95
+INSIDE_EDGE: Final = 0.95
 """A bobber on the cone's edge stands at this share of the half angle, so that a neighbour's push
 does not ask for a turn."""
 
-MIN_CAST_RATIO = 2.0
+MIN_CAST_RATIO: Final = 2.0
 """The least ratio of d_c2 to d_c1."""
 
 
-class CastZone(NamedTuple):
+@final
+@dataclass
+class CastZone:
     """The zone in which a bobber may be cast."""
 
     cone: Cone

@@ -4,11 +4,11 @@ It is a cone in azimuth only, for vehicles climb and descend freely (E10).
 """
 
 from math import atan2, radians, remainder, tau
-from typing import NamedTuple, assert_never
+from typing import Final, NamedTuple, assert_never
 
 from agent.config import Vehicle
 
-SLACK_RAD = 1e-9
+SLACK_RAD: Final = 1e-9
 """Tolerance for rounding at the cone's edge [rad]."""
 
 

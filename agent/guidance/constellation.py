@@ -14,22 +14,22 @@ surface.
 
 from collections.abc import Sequence
 from math import cos, inf, pi, sin, sqrt
-from typing import Protocol, assert_never
+from typing import Final, Protocol, assert_never
 
 from agent.config import AvoidanceKind
 from agent.messages import ZERO, Vector
 
-LINES = 8
-AGENTS = 4
-BEHIND_M = 0.3
+LINES: Final = 8
+AGENTS: Final = 4
+BEHIND_M: Final = 0.3
 FIRST_M, FIRST_RAD = 0.3, 69.0 * pi / 180.0
-STEP_M = 0.2
+STEP_M: Final = 0.2
 """d_cs [m]."""
 ROLL = 0.1 * pi / 180.0
 """Rolls all lines, which breaks the symmetry of an obstacle dead ahead [rad]."""
-LEAST_M = 0.1
+LEAST_M: Final = 0.1
 """An agent that is drawn in stays at least this far from the vehicle."""
-REACH_M = 0.9
+REACH_M: Final = 0.9
 """Every agent stands within this distance of the vehicle."""
 DISPLACEMENT_GAIN, TANGENT_GAIN, MAX_OMEGA_M = 0.15, 0.075, 2.0
 

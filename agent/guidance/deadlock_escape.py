@@ -13,30 +13,31 @@ next one, a quarter turn on.
 
 from collections.abc import Sequence
 from math import cos, dist, hypot, sin
+from typing import Final
 
 from agent.comms.unidentified_vehicles import SAME_MEMBER_M
 from agent.controller import Heard, Senses
 from agent.messages import ZERO, Vector
 
-ARRIVED_M = 0.12
-PROGRESS_M = 0.05
-PATIENCE_S = 1.0
-VEHICLE_NEAR_M = 0.9
-AHEAD = 0.5
+ARRIVED_M: Final = 0.12
+PROGRESS_M: Final = 0.05
+PATIENCE_S: Final = 1.0
+VEHICLE_NEAR_M: Final = 0.9
+AHEAD: Final = 0.5
 """Cosine of the angle within which a vehicle or a surface is in the way."""
-NEW_TARGET_M = 0.2
+NEW_TARGET_M: Final = 0.2
 """A target that moves farther than this between two steps is another target."""
-STEEP = 0.7
+STEEP: Final = 0.7
 """Sine of the elevation from which a vehicle counts as directly above or below."""
-LEVEL = 0.02
+LEVEL: Final = 0.02
 """Sine of the elevation up to which a vehicle counts as on the own level."""
-SURFACE_NEAR_M = 1.1
+SURFACE_NEAR_M: Final = 1.1
 """A point of a surface nearer than this can hold an agent: d_s plus the reach of the lines."""
-MIN_LAG_M = 1.5
+MIN_LAG_M: Final = 1.5
 """An agent nearer to its slot than this passes an obstacle on its way; it is not held by it."""
-LEANS = 0.02
+LEANS: Final = 0.02
 """Sine of the angle between the way and the line to a point from which the way leans to a side."""
-SIDE_S = 5.0
+SIDE_S: Final = 5.0
 """How long one side of an obstacle is tried."""
 
 

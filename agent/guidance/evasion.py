@@ -9,16 +9,17 @@ Such a way may leave the cone, which is a rule of guidance and not a limit of th
 
 from collections.abc import Sequence
 from math import hypot, sqrt
+from typing import Final
 
 from agent.guidance.movement import saturated
 from agent.guidance.safety_filter import Bound, approach_of, slid
 from agent.messages import ZERO, Vector
 
-UPRIGHT = 0.999
+UPRIGHT: Final = 0.999
 """Sine of the elevation from which an approach leaves no way over or under."""
-STRAIGHT = 0.1
+STRAIGHT: Final = 0.1
 """Sine of the angle up to which a surface comes straight at the vehicle."""
-NEGLIGIBLE_MPS = 1e-6
+NEGLIGIBLE_MPS: Final = 1e-6
 
 
 def evasive_velocity(

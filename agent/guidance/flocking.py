@@ -8,6 +8,7 @@ its messages.
 """
 
 from math import dist, hypot
+from typing import Final
 
 from agent.config import AgentSetup
 from agent.controller import Heard, Intent, Senses
@@ -15,11 +16,11 @@ from agent.guidance.cone import cone_of
 from agent.guidance.movement import saturated, steer
 from agent.messages import ZERO, Vector
 
-SEPARATION_HZ = 4.0
+SEPARATION_HZ: Final = 4.0
 """Speed away for each metre that a neighbour is nearer than ``spacing_m`` [1/s]."""
-COHESION_HZ = 0.05
+COHESION_HZ: Final = 0.05
 """Speed towards a neighbour for each metre that it is farther than ``spacing_m`` [1/s]."""
-ALIGNMENT = 0.5
+ALIGNMENT: Final = 0.5
 """Share of a neighbour's velocity that is added."""
 
 

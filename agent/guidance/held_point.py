@@ -6,6 +6,7 @@ insists on no point: where another agent needs the room, it holds the point to w
 """
 
 from math import dist
+from typing import Final
 
 from agent.controller import Senses
 from agent.messages import Vector
@@ -13,7 +14,7 @@ from agent.qstructure.mission_check import can_hold
 from agent.qstructure.target_frame import Frame
 
 AT_REST = Frame()
-JUMP_M = 1.0
+JUMP_M: Final = 1.0
 """A point that jumps by more within one step, in the frame of the same mission, shows that two
 senders contradict each other. Then the agent holds the point where it is."""
 

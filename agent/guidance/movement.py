@@ -1,11 +1,12 @@
 """Movement: Algorithm 4, lines 5-8. Move if the direction lies in the cone, else turn first."""
 
 from math import atan2, hypot
+from typing import Final
 
 from agent.guidance.cone import Cone, azimuth_error
 from agent.messages import Vector
 
-DEAD_BAND_MPS = 0.02
+DEAD_BAND_MPS: Final = 0.02
 """Up to this horizontal speed a motion has no azimuth: the vehicle hovers or climbs (E10)."""
 
 

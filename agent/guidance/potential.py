@@ -13,13 +13,14 @@ U_tg the exponent is never positive, so nothing overflows (E5).
 
 from collections.abc import Sequence
 from math import dist, exp
+from typing import Final
 
 from agent.controller import Heard
 from agent.messages import Vector
 
-LEAST_GAP_M = 1e-3
+LEAST_GAP_M: Final = 1e-3
 """E2: g is at least this, also inside d_ob."""
-TARGET_FLOOR_M = 0.25
+TARGET_FLOOR_M: Final = 0.25
 """E1: targets nearer than d_ob plus this are no equilibrium of the potential."""
 
 

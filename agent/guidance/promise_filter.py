@@ -10,16 +10,17 @@ vehicle's ball by the same rule, is the one that keeps clear.
 from collections import deque
 from collections.abc import Sequence
 from math import hypot, inf
+from typing import Final
 
 from agent.comms.whereabouts import PROMISE_S, VehicleReport
 from agent.guidance.safety_filter import Bound
 from agent.guidance.sight import Braking
 from agent.messages import Vector
 
-LEAST_CAP_MPS = 0.05
+LEAST_CAP_MPS: Final = 0.05
 """The least speed to promise [m/s]; a vehicle too near to others still moves apart at it."""
-ROUNDING_S = 1e-9
-CLOSING_S = 1.3
+ROUNDING_S: Final = 1e-9
+CLOSING_S: Final = 1.3
 """A vehicle promises a speed that closes its smallest gap in this time [s]."""
 
 

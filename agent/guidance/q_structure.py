@@ -5,6 +5,7 @@ potentials (18)-(28), then move or turn. All numbers are plain floats.
 """
 
 from math import dist, pi, radians, sqrt
+from typing import Final
 
 from agent.config import AgentSetup
 from agent.controller import Intent, Senses
@@ -21,9 +22,9 @@ from agent.messages import ZERO, Vector
 from agent.places.place_points import OwnTarget
 from agent.qstructure.target_frame import Frame
 
-GAIN = 2.0
+GAIN: Final = 2.0
 """c of (28) [1/s]."""
-GIVES_WAY_M = 0.01
+GIVES_WAY_M: Final = 0.01
 """An agent without a mission holds no point from which others push it by more than this."""
 
 

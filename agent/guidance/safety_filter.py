@@ -13,20 +13,20 @@ H is the longest time from a measurement to the expiry of the command made from 
 
 from collections.abc import Sequence
 from math import hypot, inf, sqrt
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from agent.guidance.cone import Cone, azimuth_error
 from agent.guidance.movement import DEAD_BAND_MPS
 from agent.messages import ZERO, Vector
 
-SHARE = 0.18
+SHARE: Final = 0.18
 """Share of the gap that one vehicle of a pair may close within H: 2 * SHARE <= 1/e."""
-PASSES = 3
-LEAST_EVADING_S = 1e-9
-INNER_SHARE = 0.7
+PASSES: Final = 3
+LEAST_EVADING_S: Final = 1e-9
+INNER_SHARE: Final = 0.7
 """Share of the margin for noise within which a vehicle only flies away: noise turns the measured
 line to the other vehicle, and a speed across that line is then a speed towards it."""
-ROUNDING_MPS = 1e-12
+ROUNDING_MPS: Final = 1e-12
 """Tolerance: a velocity that slides along a limit of zero exceeds it by rounding."""
 
 

@@ -7,7 +7,7 @@ that approaches by itself only if it senses nearest points; scanned points count
 
 from collections.abc import Iterable
 from math import hypot, radians
-from typing import assert_never
+from typing import Final, assert_never
 
 from agent.comms.whereabouts import Whereabouts
 from agent.config import AgentSetup, Vehicle, VehicleKind
@@ -37,9 +37,9 @@ from agent.guidance.sight import (
 from agent.messages import ZERO, Beacon, Record, Vector
 from agent.sensing.surface_motion import LEAST_MPS, SurfaceMotion
 
-CLIMBS = 1.5
+CLIMBS: Final = 1.5
 """How far a vehicle climbs out of the way of a surface, in clearances."""
-CREEP = 0.3
+CREEP: Final = 0.3
 """Share of its speed at which a vehicle may always fly along a surface that noise may displace."""
 
 

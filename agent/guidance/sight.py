@@ -5,18 +5,18 @@ vehicle still comes to rest before what it sees at the edge of that reach.
 """
 
 from math import inf, sqrt
-from typing import NamedTuple, assert_never
+from typing import Final, NamedTuple, assert_never
 
 from agent.config import SCANNERS, Control, ScannerKind, Sensors, Vehicle
 from agent.messages import PROXIMITY_RANGE_M
 
-NOISE_SIGMAS = 5.0
+NOISE_SIGMAS: Final = 5.0
 """Standard deviations of a sensor's noise that its margin covers."""
-SCAN_MARGIN_M = 0.05
+SCAN_MARGIN_M: Final = 0.05
 """Least margin of scanned points, for a coarse pattern [m]."""
-SCANS_MISSED = 3
+SCANS_MISSED: Final = 3
 """Scans that may show a surface too late: it falls between rays, or an echo drops out."""
-BRAKING_SHARE = 0.25
+BRAKING_SHARE: Final = 0.25
 """Share of the gap that one vehicle of bounded acceleration may close until it stands."""
 
 

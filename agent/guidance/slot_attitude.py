@@ -5,7 +5,7 @@ yaw, it keeps the heading of its flight; ``check`` warns of such a queue.
 """
 
 from math import dist, hypot
-from typing import NamedTuple
+from typing import Final, final
 
 from agent.config import Vehicle
 from agent.guidance.cone import azimuth_error, flight_cone_of
@@ -14,22 +14,29 @@ from agent.messages import Vector
 from agent.qstructure.formation import Slot
 from agent.qstructure.target_frame import Frame
 
-AT_SLOT_M = 0.05
+AT_SLOT_M: Final = 0.05
 """Within this distance of its slot an agent takes up the queue's orientation."""
-FORWARD_AT_SLOT_M = 0.02
+FORWARD_AT_SLOT_M: Final = 0.02
 """The same for a vehicle that flies only where it points: it must turn to come nearer."""
 CREEP_MPS = 0.99 * DEAD_BAND_MPS
 """Horizontal speed at which a vehicle flies in any direction without turning first (E10)."""
-MOST_CORRECTION_MPS = 0.1
+MOST_CORRECTION_MPS: Final = 0.1
 """Up to this speed a wanted motion corrects a position; beyond it, it gives way."""
 
 
-class SlotAttitude(NamedTuple):
+@final
+class SlotAttitude:
     """The attitude to take up; an angle that is None is free."""
 
-    yaw: float | None = None  # [rad; world frame]
-    tilt: tuple[float, float] = (0.0, 0.0)  # pitch and roll [rad]
-    at_rest: bool = False  # whether the slot rests
+    def __init__(
+        self,
+        yaw: float | None = None,  # [rad; world frame]
+        tilt: tuple[float, float] = (0.0, 0.0),  # pitch and roll [rad]
+        at_rest: bool = False,  # whether the slot rests
+    ) -> None:
+        self.yaw = yaw
+        self.tilt = tilt
+        self.at_rest = at_rest
 
 
 AWAY = SlotAttitude()

@@ -11,6 +11,7 @@ which they hover are found anew, before anybody reports them.
 
 from collections.abc import Sequence
 from math import dist
+from typing import Final
 
 from agent.comms.unidentified_vehicles import SAME_MEMBER_M
 from agent.controller import Flown, Senses
@@ -18,11 +19,11 @@ from agent.messages import MAX_PLACES, Place, Vector
 from agent.places.place_points import PlacePoints
 from agent.qstructure.formation import NO_PLACES
 
-HELD_M = 0.2
+HELD_M: Final = 0.2
 """An agent nearer than this to the place that it claims stands in it."""
-FREED_S = 1.0
+FREED_S: Final = 1.0
 """How long a place that a vehicle has left stays unavailable."""
-GROWN_S = 1.0
+GROWN_S: Final = 1.0
 """How long blocked places are not remembered after the team has grown."""
 
 Holder = tuple[Place | None, Vector]

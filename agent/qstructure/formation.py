@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from itertools import product
 from math import dist, inf
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import msgspec
 
@@ -41,8 +41,8 @@ __all__ = [
 NO_PLACES: frozenset[Place] = frozenset()
 MAX_RANK = 2 * MAX_TEAM
 """A place of a higher rank is none: no team reaches it, and to measure its queue takes long."""
-LAYOUTS_KEPT = 128
-FORMATIONS_KEPT = 32
+LAYOUTS_KEPT: Final = 128
+FORMATIONS_KEPT: Final = 32
 
 
 class Slot(NamedTuple):

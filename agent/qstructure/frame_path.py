@@ -8,12 +8,12 @@ own rate, before it goes on; so no slot has to move faster than a vehicle can.
 from bisect import bisect_right
 from itertools import pairwise
 from math import atan2, dist, hypot, inf, remainder, tau
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from agent.messages import ZERO, FramePath, Vector
 from agent.qstructure.target_frame import Frame
 
-LEVEL_M = 1e-6
+LEVEL_M: Final = 1e-6
 """A leg shorter than this horizontally has no azimuth: the frame keeps its yaw."""
 
 

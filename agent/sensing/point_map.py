@@ -7,19 +7,20 @@ some seconds, and a point that a later ray passes through: vehicles move on and 
 from array import array
 from collections.abc import Iterable, Sequence
 from math import atan2, cos, hypot, pi, sin
+from typing import Final
 
 from agent.messages import NO_ECHO_MM, PROXIMITY_RANGE_M, Scan, Vector
 from agent.sensing.ray_pattern import Grid, Pattern
 
-KEPT_S = 6.0
-CUBE_M = 0.15
-MAX_NEAR_POINTS = 24
-MAX_POINTS = 2000
-PASSED_M = 0.3
+KEPT_S: Final = 6.0
+CUBE_M: Final = 0.15
+MAX_NEAR_POINTS: Final = 24
+MAX_POINTS: Final = 2000
+PASSED_M: Final = 0.3
 """An echo from this much farther than a point shows that the point is gone."""
-MISSES = 2
+MISSES: Final = 2
 """So many rays without an echo show it too; a single one may be a dropout."""
-NEIGHBOUR_RADIUS_M = 0.3
+NEIGHBOUR_RADIUS_M: Final = 0.3
 """A point nearer than this to a neighbour's reported position belongs to that neighbour."""
 
 Cube = tuple[int, int, int]

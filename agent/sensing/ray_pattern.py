@@ -4,14 +4,14 @@ The body frame has x ahead, y to the left and z up.
 """
 
 from math import cos, pi, radians, sin
-from typing import NamedTuple, assert_never
+from typing import Final, NamedTuple, assert_never
 
 from agent.config import SCANNERS, Laser, ScannerKind, Sensors, Sonar
 from agent.messages import Vector
 
-IN_BEAM = 6
+IN_BEAM: Final = 6
 """Rays on each of a beam's two rings about its axis."""
-SAME_RAY_RAD = 0.03
+SAME_RAY_RAD: Final = 0.03
 """A ray within this angle of a point looks at the point, not past it."""
 
 

@@ -7,15 +7,16 @@ jumps several times in a row measures nothing real.
 from array import array
 from collections.abc import Sequence
 from math import dist, hypot
+from typing import Final
 
 from agent.messages import NO_ECHO_MM, PROXIMITY_RANGE_M, Scan
 
-JUMP_MM = 1000
-MIN_ECHOES = 8
+JUMP_MM: Final = 1000
+MIN_ECHOES: Final = 8
 """Scans with fewer rays that have an echo in both are not compared."""
-READINGS = 3
+READINGS: Final = 3
 """So many jumps in a row make a sensor wrong; so many quiet readings make it right again."""
-SLACK_M = 0.05
+SLACK_M: Final = 0.05
 
 
 class _Jumps:

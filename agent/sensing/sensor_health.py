@@ -7,21 +7,22 @@ scan, or most sensed vehicles, jump several times in a row.
 
 from collections.abc import Sequence
 from math import dist, hypot
+from typing import Final
 
 from agent.messages import Beacon, Observation, Vector
 from agent.sensing.ray_pattern import Pattern
 from agent.sensing.scan_jumps import ScanJumps, VehicleJumps
 
-MOVED_M = 0.03
+MOVED_M: Final = 0.03
 """Once a vehicle has moved this far, its reading must have changed."""
-LOST_SCANS = 3
-PROXIMITY = -1
+LOST_SCANS: Final = 3
+PROXIMITY: Final = -1
 """The proximity sensor's number beside the indices of SCANNERS."""
 NO_ECHO_BYTE = b"\xff"
-NEAR_M = 1.2
-FRESH_S = 0.5
-SLACK_M = 0.3
-LOOKS = 3
+NEAR_M: Final = 1.2
+FRESH_S: Final = 0.5
+SLACK_M: Final = 0.3
+LOOKS: Final = 3
 """So many looks in a row that miss a neighbour make the sensors distrusted; so many that find one
 make them trusted again. Neighbours that have flown away prove nothing."""
 NO_READING: tuple[object, ...] = ((), (), ())

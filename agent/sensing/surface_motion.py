@@ -8,18 +8,18 @@ along the line to the vehicle. As that line turns, the readings together give th
 
 from collections.abc import Sequence
 from math import dist, sqrt
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from agent.messages import ZERO, Vector
 
-SAME_SURFACE_M = 0.3
+SAME_SURFACE_M: Final = 0.3
 """A point nearer than this to a point of the last reading is on the same surface."""
-LOST_S = 0.3
+LOST_S: Final = 0.3
 """After a longer pause without a reading, nothing is known of how points move."""
-LEAST_MPS = 0.006
+LEAST_MPS: Final = 0.006
 """A surface slower than this counts as at rest [m/s]: the edges of one at rest seem to move so."""
-SMOOTHING_S = 0.5
-SURE = 3.0
+SMOOTHING_S: Final = 0.5
+SURE: Final = 3.0
 """A surface slower than so many standard deviations of the noise's speed counts as at rest."""
 
 

@@ -18,26 +18,26 @@ from collections import Counter
 from collections.abc import Container
 from math import inf
 from operator import add
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from agent.messages import MAX_LABELS_B, MAX_TEAM, Summary
 from agent.structure.label_code import FIRST_VERTEX, queue_of_code
 from agent.structure.label_news import OWN, LabelNews
 
-QUANTUM_S = 0.25
+QUANTUM_S: Final = 0.25
 """Resolution of a label's time [s]."""
-CODES = 256
+CODES: Final = 256
 """Number of codes: see :mod:`agent.structure.label_code`."""
 UNKNOWN = 0xFFFF
 """The label on the radio of a member of which nothing is known."""
-MAX_QUANTA = 254
-WORTH_QUANTA = 2
+MAX_QUANTA: Final = 254
+WORTH_QUANTA: Final = 2
 """A repeated label is taken if it is so much later: to take each would cost time for nothing."""
-LAG_SMOOTHING = 0.25
-SLOWER_THAN_NEWS = 6.0
+LAG_SMOOTHING: Final = 0.25
+SLOWER_THAN_NEWS: Final = 6.0
 """How many times as long as news a repeated label takes: each agent on its way keeps it for a
 round."""
-LAGS = 2.0
+LAGS: Final = 2.0
 """A label is late after so many of its usual lags, and T_lost."""
 MAX_LAG_S = MAX_QUANTA * QUANTUM_S / LAGS
 """Greatest lag that is noted [s]: no label is sent that is older than LAGS times as much."""
@@ -48,7 +48,7 @@ LABEL_S = QUANTUM_S / CODES
 ASK_S, FORGOTTEN_S = 0.5, 10.0
 """A member whose label is late is asked for every ASK_S, until FORGOTTEN_S later."""
 SHARED_LABELS = MAX_LABELS_B // 2
-NEWS = 48
+NEWS: Final = 48
 """Most news in one frame."""
 
 

@@ -1,10 +1,13 @@
 """What one agent claims in the formation: a queue, a number in it, or a vertex that it leads."""
 
 from math import inf
+from typing import Final
 
 from agent.messages import MAX_COST_MM, Swap
 
-NO_QUEUE, NO_NUMBER, NO_VERTEX = -1, 0, -1
+NO_QUEUE: Final = -1
+NO_NUMBER: Final = 0
+NO_VERTEX: Final = -1
 MOST_COST_M = MAX_COST_MM / 1000.0
 
 

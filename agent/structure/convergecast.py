@@ -1,7 +1,7 @@
 """What goes up a tree: each agent adds its own part to its followers' and tells its parent."""
 
 from collections.abc import Sequence
-from typing import Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 from agent.messages import (
     MAX_CANDIDATES,
@@ -14,7 +14,7 @@ from agent.messages import (
 from agent.structure import histogram
 from agent.structure.leader import CANDIDATES
 
-ROUNDS = 4.0
+ROUNDS: Final = 4.0
 """A follower's report holds for so many rounds at no loss."""
 
 Part = TypeVar("Part")

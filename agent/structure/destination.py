@@ -1,14 +1,16 @@
 """Where one agent flies now: to its place, or to where it waits until it has one."""
 
+from typing import Final
+
 from agent.places.place_points import OwnTarget
 from agent.structure.claim import NO_QUEUE, Claim
 from agent.structure.direct_rule import DirectRule
 from agent.structure.likely_slot import nearest_slot, slot_by_order, standing_slot
 from agent.structure.view import View
 
-PATIENCE_S = 0.3
+PATIENCE_S: Final = 0.3
 """So long an agent without a number stays where it is: most have one by then, and need not turn."""
-FAR_M = 2.5
+FAR_M: Final = 2.5
 """Within this distance of its place an agent flies there even if it lies beyond the tail."""
 
 

@@ -8,6 +8,7 @@ vertex has no leader the rule does not apply, for the others may have to order s
 from collections import Counter
 from math import dist, inf
 from operator import attrgetter
+from typing import Final
 
 from agent.assignment.allocation import own_place
 from agent.controller import Peer
@@ -17,13 +18,13 @@ from agent.structure.claim import Claim
 from agent.structure.link_timing import Timing
 from agent.structure.view import View
 
-ENTER_S = 0.4
+ENTER_S: Final = 0.4
 """How long the members heard must have been all, and the same."""
-LEAVE_S = 1.0
+LEAVE_S: Final = 1.0
 GUESS_AFTER_S, MOST_GUESSED = 0.05, 24
 """A guess is made once nobody new was heard for so long, among so many members at most."""
-LEAST_HEARD_S = 0.5
-CHOICE_HZ = 5.0
+LEAST_HEARD_S: Final = 0.5
+CHOICE_HZ: Final = 5.0
 
 
 class DirectRule:

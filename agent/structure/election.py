@@ -8,6 +8,7 @@ stands in the vertex, the leader leads from its own place in the queue (E18).
 """
 
 from math import inf
+from typing import Final
 
 from agent.controller import Heard
 from agent.messages import LeaderSummary, Place, RootKey
@@ -16,7 +17,7 @@ from agent.structure.direct_rule import DirectRule
 from agent.structure.tree import Tree
 from agent.structure.view import View, leads, queue_of
 
-ALONE_S = 1.5
+ALONE_S: Final = 1.5
 """Who hears no other agent listens so long before it leads: beacons may be on their way."""
 NEAREST, ASSIGNED = 2.0, 3.0
 """Where there are several vertices the nearest leads only after so many times as long, and the

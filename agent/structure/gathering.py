@@ -12,6 +12,7 @@ straight to its slot, and so does the leader of a vertex.
 
 from collections.abc import Sequence
 from math import dist, hypot, inf
+from typing import Final
 
 import msgspec
 
@@ -43,23 +44,23 @@ from agent.structure.queue_map import QueueMap
 from agent.structure.tree import VERSIONS_PER_S, Tree, latest_version, version_at
 from agent.structure.view import View
 
-GATHERED_M = 0.3
+GATHERED_M: Final = 0.3
 """A member nearer than this to its place of the line has gathered."""
-LEAST = 2.0
+LEAST: Final = 2.0
 """A queue that would be displaced by less than so many times the spacing does not gather."""
-GATHER_S = 5.0
+GATHER_S: Final = 5.0
 """A line waits for its members for so long, and for the time of its straight flight, at most."""
 SPEED_SHARE, LEAST_SPEED_SHARE = 0.9, 0.2
 """The line is slower than its members, so that late ones catch up."""
 LONGEST_S, LONGEST_WAYS = 12.0, 6.0
 """No member gathers for longer than this time and so many straight flights to its slot."""
-MOST_S = 600.0
+MOST_S: Final = 600.0
 """No line arrives so long after its version, so one that was invented ends, too."""
 COLLECT_S, COLLECT_LATENCIES = 1.0, 4.0
 """How long a leader waits for its members' reports; then half of them are enough."""
-CLOSED = 4.0
+CLOSED: Final = 4.0
 """After so many times as long a queue without a line gets none."""
-CLEAR = 0.75
+CLEAR: Final = 0.75
 """Members of two lines keep apart by so many times the spacing."""
 MOST_B, HEAD_B = 300, 8
 """Most bytes in one frame, and those of the arrays around lines and parts."""

@@ -1,12 +1,14 @@
 """One agent's part in counting the team: its own label, and what all labels say."""
 
+from typing import Final
+
 from agent.structure.census import Census, Population
 from agent.structure.claim import NO_QUEUE, Claim
 from agent.structure.label_code import UNPLACED, LabelCodes, codes_of, of_vertex, queue_of_code
 from agent.structure.queue_map import QueueMap
 from agent.structure.view import View
 
-ORDER_S = 0.5
+ORDER_S: Final = 0.5
 """The order along a queue is found anew after this time, or when a member is new there."""
 
 

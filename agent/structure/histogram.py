@@ -2,8 +2,9 @@
 
 from bisect import bisect_left
 from collections.abc import Iterable
+from typing import Final
 
-BINS = 16
+BINS: Final = 16
 EDGES_M = tuple(0.75 * 1.31**k for k in range(BINS - 1))
 """Upper edge of each bin but the last [m]."""
 EMPTY = bytes(BINS)

@@ -7,11 +7,12 @@ is the same for each of its places.
 """
 
 from functools import lru_cache
+from typing import Final
 
 from agent.messages import Vector
 from agent.structure.queue_map import QueueMap
 
-UNPLACED = 1
+UNPLACED: Final = 1
 """Code of a member without a queue."""
 FIRST_QUEUE, FIRST_VERTEX = 2, 128
 """Codes from the first one on are of queues, from the second one on of vertices."""

@@ -8,7 +8,9 @@ line as often as its next neighbour needs. A question is asked again by itself, 
 
 from __future__ import annotations
 
-OWN = -1
+from typing import Final
+
+OWN: Final = -1
 """Source of news that came from no summary."""
 
 

@@ -9,7 +9,7 @@ the counts have followed or the time for it is over.
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from agent.messages import (
     MAX_ORDERS,
@@ -26,7 +26,7 @@ from agent.structure.transfers import transfers
 from agent.structure.tree import version_at
 from agent.structure.view import View
 
-CANDIDATES = 4
+CANDIDATES: Final = 4
 """Most candidates of a queue for another one that are passed on."""
 FOLLOWED_S, FOLLOWED_LATENCIES = 2.5, 6.0
 """How long a leader waits for its orders to show in the counts."""
@@ -36,9 +36,9 @@ those heard, four times and so on."""
 COLLECTED_S, COLLECTED_LATENCIES = 1.0, 4.0
 """How long it waits for candidates to come up the tiers, if there are too few; and for even queues
 before it says go."""
-EXPECTED_S = 4.0
+EXPECTED_S: Final = 4.0
 """How long a leader waits until all that had places in the mission before are counted."""
-MOST_WAITS = 2.0
+MOST_WAITS: Final = 2.0
 """Each order begins the wait before go anew, within so many times its length."""
 
 

@@ -1,12 +1,13 @@
 """Where an agent without a number flies meanwhile: to the slot that it is likely to get."""
 
 from math import dist
+from typing import Final
 
 from agent.qstructure.formation import Slot
 from agent.structure.queue_choice import likely_length
 from agent.structure.view import View
 
-WAITS_M = 0.5
+WAITS_M: Final = 0.5
 """Who is nearer than this to a slot waits in it for a number. If it went on to where it stands in
 the order of those known so far, a line of few links would break before all are known."""
 

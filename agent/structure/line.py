@@ -6,16 +6,17 @@ shrinks to zero, so that the line moves as a whole: it speeds up, flies evenly, 
 
 from collections.abc import Sequence
 from math import dist, inf
+from typing import Final
 
 from agent.messages import Line, Vector
 from agent.structure.tree import VERSIONS_PER_S
 
-RAMP_S = 2.0
+RAMP_S: Final = 2.0
 """How long a line takes to speed up, and to slow down: meanwhile its members turn [s]."""
 SHARES = (0.25, 0.5, 0.75, 1.0)
 """How far a line is moved towards another's displacement, to keep clear of it. With the whole of it
 the two are as far apart as their queues."""
-CM = 100.0
+CM: Final = 100.0
 
 
 def displacement_of(line: Line, now_s: float) -> Vector:

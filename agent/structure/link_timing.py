@@ -1,24 +1,27 @@
 """Time limits of the Q-structure, derived from the radio as an agent measures it."""
 
+from dataclasses import dataclass
 from functools import lru_cache
 from math import log
-from typing import NamedTuple
+from typing import Final, final
 
 from agent.controller import Link
 
-LEAST_SILENCE_S = 1.5
-LEAST_PARENT_S = 0.25
+LEAST_SILENCE_S: Final = 1.5
+LEAST_PARENT_S: Final = 0.25
 LOG_LOST, LOG_PARENT = log(1e-6), log(1e-3)
 """Logarithms of the probability that chance alone makes such a silence."""
-LEAST_LOSS = 1e-3
-ANSWER_S = 0.15
+LEAST_LOSS: Final = 1e-3
+ANSWER_S: Final = 0.15
 """An answer waits so long for the next summary [s]."""
-MOST_LOSS = 0.95
-LINKS_KEPT = 512
+MOST_LOSS: Final = 0.95
+LINKS_KEPT: Final = 512
 """An agent measures its link now and then, and needs the limits in each step."""
 
 
-class Timing(NamedTuple):
+@final
+@dataclass
+class Timing:
     """Time limits [s]."""
 
     latency_s: float

@@ -8,19 +8,20 @@ each other at a distance and stay in touch: all fly straight and equally fast.
 from collections.abc import Sequence
 from itertools import combinations
 from math import dist
+from typing import Final
 
 from agent.messages import Vector
 
 MOST_MEMBERS, MOST_TRIES = 20, 250
 """A larger team, or more exchanges, take too long to look at: an agent plans within a few ticks."""
-EQUAL_M2 = 1e-6
-POWER = 8
+EQUAL_M2: Final = 1e-6
+POWER: Final = 8
 """Ways count by this power, so that the longest ones count most."""
 APART, IN_TOUCH = 0.5, 1.8
 """Members stay so many times the spacing apart, and linked by ways of at most so many."""
-LOOKS = 8
+LOOKS: Final = 8
 """How often in the flight the links are looked at."""
-SAVED = 1e-3
+SAVED: Final = 1e-3
 """Least saving of an exchange, as a share of the longest way's cost."""
 
 

@@ -9,6 +9,7 @@ inwards.
 """
 
 from math import inf
+from typing import Final
 
 from agent.controller import Heard
 from agent.messages import MAX_TEAM, Swap
@@ -16,7 +17,7 @@ from agent.structure import histogram
 from agent.structure.claim import Claim
 from agent.structure.view import View, leads
 
-CONFLICT_M = 0.05
+CONFLICT_M: Final = 0.05
 """Of two claims the nearer by more than this keeps the number, else the lower id (E17)."""
 LATE_S, LATE_LATENCIES = 6.0, 20.0
 """Who has no number so long after it took off comes late: it takes the nearest and pushes."""
@@ -24,8 +25,8 @@ GREW_WITHIN_S, GREW_BY = 12.0, 1.3
 """A number taken when fewer members were known is taken anew, if so many more turn up so soon."""
 COMPLETE_GAP_S, GAP_S, FAR_GAP_S = 0.25, 0.5, 1.0
 """How long a number has not been heard until it counts as a gap."""
-NEAR_M = 1.0
-STANDS_M = 0.2
+NEAR_M: Final = 1.0
+STANDS_M: Final = 0.2
 """Who is nearer than this to a place when the numbers are taken stands in it."""
 
 

@@ -7,12 +7,13 @@ tiers: a candidate, with the extra way that it would have.
 
 from collections.abc import Sequence
 from math import inf
+from typing import Final
 
 from agent.messages import MAX_TEAM, Candidate, Order
 from agent.structure.claim import NO_QUEUE, Claim
 from agent.structure.view import View, leads
 
-OFFER_S = 0.5
+OFFER_S: Final = 0.5
 """Offers are computed anew after this time, or when the counts change."""
 
 

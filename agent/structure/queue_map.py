@@ -8,15 +8,15 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from itertools import permutations
 from math import dist, inf
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from agent.messages import MAX_TEAM, ZERO, Place, Vector
 from agent.qstructure.formation import NO_PLACES, Formation, Slot
 
-MAPS_KEPT = 16
-SPARSE = 8
+MAPS_KEPT: Final = 16
+SPARSE: Final = 8
 """The nearest slot is looked for among each so many first."""
-LEAST_STEP_M = 1e-6
+LEAST_STEP_M: Final = 1e-6
 
 
 class Nearest(NamedTuple):
@@ -85,6 +85,8 @@ class QueueMap:
             for place in self.vertex_places
         ]
         self._open_rows = [Row() for _ in numbers]
+        self._places: list[list[Place]] = [[] for _ in numbers]
+        """The places of each queue by rank, as far as they were asked for."""
         self.members = lru_cache(maxsize=64)(self._members)
         self.blocked_numbers = lru_cache(maxsize=64)(self._blocked_numbers)
         self._closed_row = lru_cache(maxsize=64)(self._measured_row)
@@ -109,7 +111,13 @@ class QueueMap:
 
     def place(self, queue: int, number: int) -> Place:
         """Return the place of a queue's member."""
-        return Place(queue, self._first_rank[queue] - 1 + number)
+        rank = self._first_rank[queue] - 1 + number
+        if not 0 <= rank < MAX_TEAM or queue < 0:
+            return Place(queue, rank)
+        places = self._places[queue]
+        while len(places) <= rank:
+            places.append(Place(queue, len(places)))
+        return places[rank]
 
     def number(self, place: tuple[int, int]) -> int:
         """Return a member's number in its queue, counted from 1; less than 1 for a vertex."""

@@ -9,7 +9,7 @@ to where a vehicle hovers in a place of old.
 
 from functools import lru_cache
 from math import dist, remainder, tau
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from agent.assignment.allocation import allocate
 from agent.controller import Flown, Peer
@@ -19,7 +19,7 @@ from agent.qstructure.formation import Formation
 from agent.qstructure.target_frame import Frame
 from agent.structure.longest_way import shortened
 
-PLANS_KEPT = 16
+PLANS_KEPT: Final = 16
 SAME_M, SAME_RAD = 0.05, 0.02
 """Two frames nearer to each other than this are one, known at different times."""
 

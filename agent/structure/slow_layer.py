@@ -1,6 +1,7 @@
 """The slow layer of Fig. 3: what an agent hears and sends of the structure on the multihop channel.
 
 Labels of the census go any way. Leaders' summaries come down the trees: an agent takes one only
+from typing import Final
 from a lower tier. Its followers' reports go up, with its own part, to its parent. A summary goes
 out each round; with news sooner, as a Trickle timer does (RFC 6206).
 """
@@ -8,6 +9,7 @@ out each round; with news sooner, as a Trickle timer does (RFC 6206).
 from collections.abc import Collection, Sequence
 from math import ceil, inf, log
 from operator import gt
+from typing import Final
 
 import msgspec
 
@@ -28,15 +30,15 @@ from agent.structure.summary_frame import (
 )
 from agent.structure.tree import Tree, latest_version
 
-NEWS_SHARE = 0.15
+NEWS_SHARE: Final = 0.15
 """With news the next summary comes after this share of a round."""
 NEWS_LOST, LEAST_LOSS = 0.2, 0.05
 """News is repeated until a neighbour has missed it with less than this probability, if beacons are
 lost at all."""
-LABELS_EVERY = 2
+LABELS_EVERY: Final = 2
 """Labels go out in each such round; in every round if beacons are lost."""
-LONGEST_ROUND_S = 10.0
-VERTICES_A_ROUND = 8
+LONGEST_ROUND_S: Final = 10.0
+VERTICES_A_ROUND: Final = 8
 """Reports on more vertices than this may take longer than a round, and hold for longer."""
 
 

@@ -8,6 +8,7 @@ sooner while there is news.
 
 from collections.abc import Sequence
 from math import inf
+from typing import Final
 
 from agent.config import AgentSetup
 from agent.controller import Flown, Heard, Senses
@@ -44,8 +45,8 @@ from agent.structure.swaps import Swaps
 from agent.structure.tree import Follower, Tree
 from agent.structure.view import View
 
-DECISION_HZ = 10.0
-SETTLED_S = 1.0
+DECISION_HZ: Final = 10.0
+SETTLED_S: Final = 1.0
 """So long an agent without a number looks each tick, for much is new to it."""
 
 
@@ -94,6 +95,8 @@ class Structure:
         self._blocked: frozenset[Place] = frozenset()
         self._view: View | None = None
         self._own: OwnTarget | None = None
+        self._standing: Standing | None = None
+        """What the beacon says, until the next look at the neighbours."""
         self._place_given = before.place if before is not None else None
         self._expected = before.members if before is not None else 0
         """Size of the team that takes its places over, until a leader's count of it is steady."""
@@ -107,6 +110,7 @@ class Structure:
         settled = self.claim.ranked or senses.now_s - self._started_s > SETTLED_S
         if not decides and settled and self._own is not None:
             return self._flown(senses.now_s)
+        self._standing = None
         view = self._view = self._look(senses, mission)
         view.summaries, view.order = self._slow.summaries, self._order
         view.expected = self._expected
@@ -308,17 +312,19 @@ class Structure:
 
     def standing(self, now_s: float) -> Standing:
         """Return what the beacon says of the structure."""
-        claim = self.claim
-        return Standing(
-            branches=tuple(tree.branch for tree in self.trees),
-            leads=claim.vertex,
-            queue=claim.queue,
-            heard=self._direct.heard,
-            pushes=claim.pushes(now_s),
-            proposal=claim.proposal,
-            reservation=claim.reservation,
-            code=self._head_count.code,
-        )
+        claim, pushes, standing = self.claim, self.claim.pushes(now_s), self._standing
+        if standing is None or standing.pushes != pushes:
+            standing = self._standing = Standing(
+                branches=tuple([tree.branch for tree in self.trees]),
+                leads=claim.vertex,
+                queue=claim.queue,
+                heard=self._direct.heard,
+                pushes=pushes,
+                proposal=claim.proposal,
+                reservation=claim.reservation,
+                code=self._head_count.code,
+            )
+        return standing
 
 
 def _branch(heard: Heard, vertex: int) -> Branch | None:

@@ -5,6 +5,7 @@ comes first there. Each of the three has a share that the others leave it, so th
 """
 
 from collections.abc import Sequence
+from typing import Final
 
 import msgspec
 
@@ -12,7 +13,7 @@ from agent.codec import encode
 from agent.comms.gossip import FRAME_HEAD_B, MAX_FRAME_B
 from agent.messages import MAX_CANDIDATES, MAX_VERTICES, Subtree, TreeReport
 
-SUMMARY_HEAD_B = 22
+SUMMARY_HEAD_B: Final = 22
 """Longest encoding of a Summary without reports, news and labels [B]."""
 ROOM_B = MAX_FRAME_B - FRAME_HEAD_B - SUMMARY_HEAD_B
 """Room for these in one frame [B]."""

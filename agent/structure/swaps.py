@@ -5,18 +5,20 @@ The proposer names both places. The partner takes the proposer's place and keeps
 else with its place.
 """
 
+from typing import Final
+
 from agent.controller import Heard
 from agent.messages import Swap, Vector
 from agent.structure.claim import Claim
 from agent.structure.view import View, leads
 
-GAIN_M2 = 0.5
+GAIN_M2: Final = 0.5
 """Least gain of a swap, in the sum of squared distances [m^2]."""
-ACCEPTED_SHARE = 0.5
+ACCEPTED_SHARE: Final = 0.5
 """The partner accepts from this share of the gain: the two see each other at different times."""
-FRESH_S = 0.4
+FRESH_S: Final = 0.4
 PAUSE_S, PAUSE_STEP_S = 0.1, 0.1
-EXTRAPOLATED_S = 0.5
+EXTRAPOLATED_S: Final = 0.5
 
 
 class Swaps:

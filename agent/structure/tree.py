@@ -12,26 +12,27 @@ of a lower tier, and what goes to it is sent to the parent.
 
 from collections.abc import Collection
 from math import dist, inf
-from typing import final
+from typing import Final, final
 
 from agent.controller import Heard
 from agent.messages import Branch, RootKey, Vector
 
-VERSIONS_PER_S = 100.0
-REVIVAL_S = 1.0
-NEW_PARENT_STAYS_S, PARENT_STAYS_S = 2.5, 1.0
+VERSIONS_PER_S: Final = 100.0
+REVIVAL_S: Final = 1.0
+NEW_PARENT_STAYS_S: Final = 2.5
+PARENT_STAYS_S: Final = 1.0
 """A parent that leaves the range within this time counts as LEAVING tiers worse: so an agent looks
 for another before its parent is lost, and keeps the present one longer than it takes a new one."""
-LEAVING = 2
-APART_MPS = 0.05
+LEAVING: Final = 2
+APART_MPS: Final = 0.05
 """Two agents that part more slowly than this stay where they are."""
-KEPT = 3.0
+KEPT: Final = 3.0
 """The present parent counts as LEAVING after so many times the silence of a new one: links that go
 down for a moment make no agent change its parent to and fro."""
-STILL = 0.8
+STILL: Final = 0.8
 """The version stands still when it has not gone on for this part of a parent's silence."""
-MAX_TIER = 1000
-VOID_KEPT = 32
+MAX_TIER: Final = 1000
+VOID_KEPT: Final = 32
 
 
 @final

@@ -5,6 +5,7 @@ the vehicles apart under the run's clock.
 """
 
 from pathlib import Path
+from typing import Final
 
 from agent.checked_controller import described
 from agent.controller import ControllerError
@@ -19,9 +20,9 @@ from worldsim.scenario.toml import ScenarioError
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.start_positions import StartError, clearance_of, start_poses, start_poses_of
 
-VIRTUAL_COMMAND_TICKS = 1
+VIRTUAL_COMMAND_TICKS: Final = 1
 """Lifetime of a command in virtual time and in lockstep, where none is late [ticks]."""
-PROCESS_COMMAND_TICKS = 2
+PROCESS_COMMAND_TICKS: Final = 2
 """Lifetime of a command of free-running processes [ticks]; H of docs/method.md."""
 
 

@@ -6,6 +6,7 @@ teams of their own until they meet, and each sends somebody to a vertex that is 
 """
 
 from collections.abc import Iterator
+from typing import Final
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from worldsim.truth.start_positions import start_poses_of
 from worldsim.truth.vehicle import Floats
 
 KEY = "fleet.start"
-SHOWN_SIZES = 8
+SHOWN_SIZES: Final = 8
 
 
 def start_warnings(scenario: Scenario) -> list[Problem]:

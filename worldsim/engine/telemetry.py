@@ -1,6 +1,7 @@
 """The newest telemetry of each agent, and the tick that truth and telemetry make together."""
 
 from math import atan2, degrees, hypot, nan, pi
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from agent.messages import NO_MISSION, Telemetry, Vector
 from worldsim.judge.tick import HierarchyRows, Packets, Tick
 from worldsim.truth.world import World
 
-MOVING_MPS = 0.02
+MOVING_MPS: Final = 0.02
 """A slower step has no azimuth [m/s]."""
 NO_TARGET = (nan, nan, nan)
 NO_PLACE = (-1, -1)
@@ -76,9 +77,9 @@ class FleetTelemetry:
 
     def _rows(self, running: NDArray[np.bool_]) -> tuple[list[Telemetry], list[float]]:
         """Return the telemetry and the turn [deg] of each agent that is running."""
-        if running.all():
-            return self._newest, self._turn_deg
         up = running.tolist()
+        if False not in up:
+            return self._newest, self._turn_deg
         return (
             [row if runs else NO_TELEMETRY for row, runs in zip(self._newest, up, strict=True)],
             [turn if runs else nan for turn, runs in zip(self._turn_deg, up, strict=True)],

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from time import perf_counter, process_time
-from typing import Protocol, TypeVar, assert_never
+from typing import Final, Protocol, TypeVar, assert_never
 
 from agent.codec import decode_beacon, decode_command, decode_gossip, decode_observation, encode
 from agent.core import Agent, Decoders
@@ -44,9 +44,9 @@ from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
 from worldsim.judge.run_events import RunEvent
 from worldsim.scenario.tables import Scenario
 
-PROGRESS_EVERY_S = 0.5
+PROGRESS_EVERY_S: Final = 0.5
 """[s; wall time]"""
-CHECKED_EVERY = 61
+CHECKED_EVERY: Final = 61
 """A prime, so that each agent's turn comes: agents step in every fourth slot."""
 _Message = TypeVar("_Message")
 

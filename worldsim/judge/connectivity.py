@@ -6,7 +6,7 @@ is one period of the multihop channel, on which agents pass on what they hear.
 
 from functools import cache
 from math import comb, inf
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +22,14 @@ from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
 from worldsim.truth.vehicle import Floats
 
-LEAST_NEWS_S = 0.5
+LEAST_NEWS_S: Final = 0.5
 """However fast the radio, agents take this long to act on news: they choose at 5 Hz, and wait for
 their knowledge to settle."""
 LEAST_DETECTION_S = LEAST_RELAYED_SILENCE_S + ALONE_S
 """The same for a loss, or for nobody to be heard at the start."""
-MAX_QUEUED_S = 0.5
+MAX_QUEUED_S: Final = 0.5
 """A frame that waits longer in its sender's queue makes news late, however slow the rate."""
-MAX_ROUNDS = 2000
+MAX_ROUNDS: Final = 2000
 """More rounds count as infinitely many."""
 
 

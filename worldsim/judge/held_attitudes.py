@@ -4,6 +4,8 @@ An agent's attitude counts from the formation's convergence on, once the agent h
 for 2 s and for the time that half a turn takes its vehicle. At the end every agent's counts.
 """
 
+from typing import Final
+
 import numpy as np
 
 from worldsim.judge.phase import Phase
@@ -11,7 +13,7 @@ from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import CONVERGED_M, CONVERGED_S, Scenario
 from worldsim.truth.vehicle import Floats
 
-HALF_TURN_DEG = 180.0
+HALF_TURN_DEG: Final = 180.0
 
 
 class HeldAttitudes:

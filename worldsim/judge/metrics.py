@@ -1,14 +1,16 @@
 """Distances and packet conservation from rows of truth, as docs/scenario.md defines them."""
 
+from typing import Final
+
 import numpy as np
 
 from worldsim.judge.tick import Packets
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
 
-MIN_SQUARE_M2 = 1e-300
+MIN_SQUARE_M2: Final = 1e-300
 """The divisor used for the square of a path without length [m^2]."""
-ROUNDING_M = 1e-9
+ROUNDING_M: Final = 1e-9
 """A distance this much below its bound keeps it [m]: at 1e6 m, positions are rounded to 1e-10 m."""
 FATES = ("delivered", "dropped_", "in_flight")
 """Prefixes of the counters that together hold every addressed packet."""

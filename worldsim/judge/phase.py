@@ -6,7 +6,7 @@ the mission that it flies are used; the position of that place is computed here.
 
 from collections import Counter
 from math import degrees, isfinite, remainder, tau
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from worldsim.scenario.tables import CONVERGED_M, CONVERGED_S
 from worldsim.truth.vehicle import Floats
 
 NO_CLAIM = (-1, -1)
-TIME_SLACK_S = 1e-9
+TIME_SLACK_S: Final = 1e-9
 
 SlotsByRow = dict[int, Slot]
 

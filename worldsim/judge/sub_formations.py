@@ -7,7 +7,7 @@ their line while the distances among them are those among their slots.
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple, TypedDict
+from typing import Final, NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from worldsim.judge.phase import Phase, SlotsByRow
 from worldsim.judge.tick import Tick
 from worldsim.truth.vehicle import Floats
 
-SHAPE_M = 0.3
+SHAPE_M: Final = 0.3
 """Largest error of a distance between two members that stand in their line [m]."""
 
 

@@ -6,6 +6,7 @@ numbers of the first one.
 """
 
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from worldsim.truth.vehicle import Floats
 Float32s = NDArray[np.float32]
 Packets = dict[str, int]
 """Counters of the medium by name, as in summary.json."""
-NO_ROLE = -1
+NO_ROLE: Final = -1
 """The role of an agent that is not running (dead, paused or booting)."""
 
 

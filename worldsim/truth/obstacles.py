@@ -7,7 +7,7 @@ Only + - * / sqrt and comparisons act across rows here.
 from collections.abc import Sequence
 from itertools import pairwise
 from math import atan2, cos, dist, hypot, radians, sin
-from typing import Literal, NamedTuple, assert_never
+from typing import Final, Literal, NamedTuple, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,10 @@ from agent.messages import Vector
 from worldsim.scenario.obstacle_tables import Box, Cylinder, Movable, Obstacle, Sphere, Wall
 from worldsim.truth.vehicle import Floats
 
-BISECTIONS = 48
+BISECTIONS: Final = 48
 """Halvings of a line of some centimetres; the result is finer than a float can tell."""
 
-LEAST_LENGTH_M = 1e-150
+LEAST_LENGTH_M: Final = 1e-150
 """The square of a shorter vector is no longer exact."""
 
 

@@ -1,6 +1,6 @@
 """The proximity sensor: relative positions of near vehicles and of near obstacles' surfaces."""
 
-from typing import final
+from typing import Final, final
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from agent.messages import MAX_OBSTACLE_POINTS, PROXIMITY_RANGE_M, Vector
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
 
-ARRAYS_FROM = 40
+ARRAYS_FROM: Final = 40
 """Number of vehicles from which arrays are faster."""
 
 

@@ -4,13 +4,15 @@ Only + - * / sqrt and comparisons act across rows here. A ray that starts inside
 distance 0.
 """
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
 
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
 
-PARALLEL = 1e-12
+PARALLEL: Final = 1e-12
 """A ray whose component across a face is smaller than this counts as parallel to the face."""
 
 
