@@ -7,7 +7,7 @@ import pytest
 
 from agent.comms.unidentified_vehicles import REMEMBERED_S, UNMOVED_RANGE_M
 from tests.recording.flights import straight_flight, wedge
-from worldsim.judge.invariants import InvariantTally
+from worldsim.judge.finding import InvariantTally
 from worldsim.judge.radio_events import Partitioned
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge

@@ -8,8 +8,8 @@ import pytest
 from agent.comms.unidentified_vehicles import UNIDENTIFIED_AFTER_S
 from agent.messages import Place
 from tests.recording.flights import straight_flight, wedge
+from worldsim.judge.finding import InvariantTally
 from worldsim.judge.hovering_vehicles import HoveringVehicles
-from worldsim.judge.invariants import InvariantTally
 from worldsim.judge.run_events import Killed, Restarted
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge

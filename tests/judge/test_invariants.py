@@ -10,7 +10,7 @@ from agent.config import Comms
 from netem.link_parameters import Conditions
 from tests.recording.flights import straight_flight, wedge
 from worldsim.judge.connectivity import Connectivity, rounds_to_all
-from worldsim.judge.invariants import InvariantTally
+from worldsim.judge.finding import InvariantTally
 from worldsim.judge.radio_events import ConditionsChanged, Healed, Partitioned
 from worldsim.judge.run_events import FormationGiven, RoleChanged, RunEvent
 from worldsim.judge.tick import Tick

@@ -6,8 +6,9 @@ import numpy as np
 
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
+from worldsim.judge.finding import Expectation
 from worldsim.judge.tick import Tick
-from worldsim.judge.verdict import Expectation, Figures, Judge
+from worldsim.judge.verdict import Figures, Judge
 from worldsim.recording.recorder import RunRecorder
 from worldsim.scenario.tables import Expectations, Fleet, Scenario
 

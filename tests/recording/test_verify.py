@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from tests.recording.flights import record, straight_flight, wedge
-from worldsim.judge.invariants import InvariantTally
+from worldsim.judge.finding import InvariantTally
 from worldsim.judge.verdict import Judge
 from worldsim.recording.recorder import RunRecorder
 from worldsim.recording.verify import (

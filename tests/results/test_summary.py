@@ -13,8 +13,9 @@ from tests.small_scenario import SMALL
 from worldsim.campaign.pool import finished
 from worldsim.engine.step import SlotLoop, world_of
 from worldsim.engine.virtual import fly
+from worldsim.judge.finding import InvariantTally
 from worldsim.judge.hovering_vehicles import HoveringVehicles
-from worldsim.judge.invariants import Invariants, InvariantTally
+from worldsim.judge.invariants import Invariants
 from worldsim.results.exit_status import EXIT_STATUS
 from worldsim.results.provenance import provenance
 from worldsim.results.summary import FATES, INVARIANT_WORDS, FinishedRun, Summary, summarise

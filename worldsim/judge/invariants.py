@@ -20,7 +20,6 @@ from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple, assert_never
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,6 +27,7 @@ from agent.messages import Place
 from agent.qstructure.formation import NO_PLACES
 from worldsim.judge.blocked_places import BlockedPlaces
 from worldsim.judge.connectivity import Components, Connectivity
+from worldsim.judge.finding import InvariantTally
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.phase import Phase
 from worldsim.judge.radio_events import RadioRunEvent
@@ -55,20 +55,6 @@ from worldsim.scenario.tables import CONVERGED_S, Scenario
 COMPONENTS_EVERY_S = 1.0
 """Interval at which connectivity is computed anew [s]."""
 MAX_ROLE_CHANGES = 3
-
-
-class InvariantTally(msgspec.Struct):
-    """How often an invariant was evaluated and violated."""
-
-    ticks: int = 0
-    """Ticks at which it was evaluated."""
-    violations: int = 0
-    """Ticks at which it was violated."""
-
-    def count(self, breaches: int) -> None:
-        """Count a tick with this number of breaches."""
-        self.ticks += 1
-        self.violations += breaches > 0
 
 
 class Breaches(NamedTuple):

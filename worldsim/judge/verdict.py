@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple, assert_never
 
-import msgspec
 import numpy as np
 
 from agent.guidance.cone import cone_of
 from agent.qstructure.formation import formation_of
+from worldsim.judge.finding import Expectation, InvariantTally
 from worldsim.judge.held_attitudes import HeldAttitudes
 from worldsim.judge.hovering_vehicles import HoveringVehicles
-from worldsim.judge.invariants import Invariants, InvariantTally
+from worldsim.judge.invariants import Invariants
 from worldsim.judge.metrics import Separation, conserved, keeps
 from worldsim.judge.obstacle_clearance import ObstacleClearance
 from worldsim.judge.phase import Phase
@@ -63,19 +63,6 @@ class Figures:
     """(N,): least distance since the last tick, centre to surface [m]; None without obstacles."""
     queue_residual: Floats | None = None
     """(Q,): largest slot error in each queue [m]."""
-
-
-class Expectation(msgspec.Struct, frozen=True, kw_only=True):
-    """A requirement on a run, and its measured value."""
-
-    name: str
-    """Its unit is in the name; a convergence is in seconds."""
-    wanted: float | None
-    """The limit; None: the value need only exist."""
-    got: float | None
-    """The measured value; None where there is none."""
-    held: bool
-    """Whether the requirement is met."""
 
 
 class Shortcomings(NamedTuple):
@@ -277,7 +264,10 @@ class Judge:
             self._conservation.count(not conserved(packets))
 
     def _count_turns(self, tick: Tick) -> None:
-        self._turns += int(np.count_nonzero(~np.isnan(tick.turn_deg)))
+        turns = int(np.count_nonzero(~np.isnan(tick.turn_deg)))
+        if not turns:
+            return
+        self._turns += turns
         self._turns_over += int(np.count_nonzero(tick.turn_deg > self._turn_left_deg))
         self._turns_over += int(np.count_nonzero(tick.turn_deg < -self._turn_right_deg))
 

@@ -16,11 +16,11 @@ from typing import Any
 import msgspec
 
 from worldsim.judge.event import PlannedEvent
-from worldsim.judge.invariants import InvariantTally
+from worldsim.judge.finding import Expectation, InvariantTally
 from worldsim.judge.recovery import Recovery
 from worldsim.judge.run_events import RunEvent
 from worldsim.judge.tick import Tick
-from worldsim.judge.verdict import Expectation, Judge
+from worldsim.judge.verdict import Judge
 from worldsim.recording.isolated_reader import read_run_apart
 from worldsim.recording.layout import RECORDING_FILE, SUMMARY_FILE
 from worldsim.recording.readback import DamagedError, Readback, RecordingError

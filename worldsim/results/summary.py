@@ -13,8 +13,9 @@ import msgspec
 from netem.messages import MediumCounters
 from worldsim.engine.counters import Links
 from worldsim.engine.step import SlotLoop
+from worldsim.judge.finding import Expectation
 from worldsim.judge.sub_formations import SubFormationsRow
-from worldsim.judge.verdict import Expectation, Judge
+from worldsim.judge.verdict import Judge
 from worldsim.results.expectation_text import (
     Circumstances,
     EncounterRow,
