@@ -70,7 +70,7 @@ class OccupiedSlots:
         return self._with_recent(senses.now_s, occupied)
 
     def _carry_over(self, mission: Flown, agents: int) -> None:
-        """Find the places of a new mission or frame at those that were taken until now."""
+        """Find the places of a new mission or frame at those that were taken, as long ago."""
         last = self._mission
         if (
             last is None
@@ -78,10 +78,16 @@ class OccupiedSlots:
             or not self._recent
         ):
             return
-        points = [self._points.point(last, self._agents, place) for place in self._recent]
-        there = [point for point in points if point is not None]
-        taken = self._points.taken_by(mission, agents, there)
-        self._recent = dict.fromkeys(sorted(taken), max(self._recent.values()))
+        there = [
+            (at_s, point)
+            for place, at_s in self._recent.items()
+            if (point := self._points.point(last, self._agents, place)) is not None
+        ]
+        taken = sorted(self._points.taken_by(mission, agents, [point for _, point in there]))
+        self._recent = {}
+        for at_s, point in sorted(there):  # the latest time holds
+            near = self._points.near_vehicles(mission, agents, taken, [point])
+            self._recent.update(dict.fromkeys(near, at_s))
 
     def _occupied(
         self,

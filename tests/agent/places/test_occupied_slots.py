@@ -100,6 +100,17 @@ def test_in_a_new_mission_the_places_at_the_same_points_are_taken(occupied):
     assert update(occupied, senses(START_S + 0.2, at=far_off), team, mission=elsewhere) == set()
 
 
+def test_new_missions_do_not_hold_a_place_that_a_vehicle_has_left(occupied):
+    """The vehicle in the vertex stays; each mission comes before the other place is free."""
+    team = ((None, (9.0, 0.0, 0.0)), FAR)
+    hovering, leaving = (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
+    both = senses(START_S, [hovering, leaving], at=(9.0, 0.0, 0.0))
+    assert update(occupied, both, team) == {ME[0], SECOND}
+    for step, found in ((1, {ME[0], SECOND}), (2, {ME[0]})):
+        near = senses(START_S + 0.6 * step * FREED_S, [hovering], at=(9.0, 0.0, 0.0))
+        assert update(occupied, near, team, mission=Flown(step, LINE, Frame())) == found
+
+
 def test_a_place_is_not_free_while_an_unknown_vehicle_is_near(occupied):
     update(occupied, senses(START_S, unidentified=[(-1.0, 0.0, 0.0)]))
     for step in range(1, 5):
