@@ -53,7 +53,9 @@ class LabelNews:
     def take(self, most: int) -> list[int]:
         """Return the members of one frame: first those never told, then those told least."""
         first = sorted(self._untold)[:most]
-        again = sorted(self._tellings.keys() - self._untold, key=self._tellings.__getitem__)
+        again = sorted(
+            self._tellings.keys() - self._untold, key=lambda each: (self._tellings[each], each)
+        )
         self._untold.difference_update(first)
         told = first + again[: most - len(first)]
         for member in told:

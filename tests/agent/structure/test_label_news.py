@@ -67,6 +67,13 @@ def test_where_room_is_short_what_is_new_goes_first():
     assert len(known) == 3
 
 
+def test_of_what_was_told_as_often_the_lowest_ids_go_first():
+    known = news(64, 9, 8, 1)
+    known.take(4)
+    assert known.take(2) == [1, 8]
+    assert known.take(2) == [9, 64]
+
+
 def test_an_older_code_of_a_member_is_no_telling_of_its_event():
     known = Census(0, 10)
     known.hear(3, 10.25, FIRST_QUEUE + 1)
