@@ -183,10 +183,15 @@ def test_a_limit_is_an_error_where_nothing_can_be_compared(quick, capsys, tmp_pa
 
 
 @pytest.mark.parametrize("save", [True, False])
-def test_an_interrupted_benchmark_saves_the_rows_that_it_has(monkeypatch, capsys, tmp_path, save):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_an_interrupted_benchmark_saves_the_rows_that_it_has(
+    monkeypatch, capsys, tmp_path, save, number
+):
     def interrupt():
-        raise KeyboardInterrupt
+        signal.raise_signal(number)
+        return 2.0
 
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # where the command sets no handler
     rows = [("first", lambda: 1.0), ("second", interrupt), ("third", lambda: 3.0)]
     measures = tuple(Measure(name, "us", None, False, measure) for name, measure in rows)
     monkeypatch.setattr(table, "MEASURES", measures)

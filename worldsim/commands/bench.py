@@ -100,8 +100,7 @@ def bench(
     before = saved(against) if against is not None else None
     if against is not None and before is not None and fail_over is not None:
         _check_comparable(measures, before, against)
-    if processes or save is not None:
-        interrupt_on_signals()  # the fleet of the moment ends, and what was measured is saved
+    interrupt_on_signals()  # the fleet of the moment ends, and what was measured is saved
     measured_with = circumstances()
     print(f"code: {measured_with['code']}", flush=True)
     if before is not None:
