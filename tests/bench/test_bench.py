@@ -3,6 +3,7 @@
 import json
 import signal
 import sys
+from io import StringIO
 
 import pytest
 
@@ -15,6 +16,7 @@ from worldsim.bench.table import MEASURES
 from worldsim.bench.team_growth import agent_cost
 from worldsim.bench.ticking import ticking
 from worldsim.commands.app import command
+from worldsim.results import progress_line
 
 
 @pytest.fixture(autouse=True)
@@ -204,6 +206,26 @@ def test_an_interrupted_benchmark_saves_the_rows_that_it_has(
     else:
         assert line == "qswarm: interrupted"
         assert not file.exists()
+
+
+def test_an_interrupted_benchmark_removes_its_progress_line(monkeypatch):
+    class Terminal(StringIO):
+        def isatty(self):
+            return True
+
+    def interrupt():
+        while not terminal.getvalue():
+            signal.raise_signal(signal.SIGALRM)
+        raise KeyboardInterrupt
+
+    terminal = Terminal()
+    monkeypatch.setattr(progress_line, "QUIET_S", 0.0)
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setattr(table, "MEASURES", (Measure("first", "us", None, False, interrupt),))
+    assert command(["bench"]) == 130
+    shown, end = terminal.getvalue().rsplit("\r\x1b[K", 1)
+    assert "1 of 1: first, 0 s" in shown
+    assert end == "qswarm: interrupted\n"
 
 
 def test_a_bad_file_is_named_before_anything_is_measured(capsys, tmp_path):

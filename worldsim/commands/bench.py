@@ -197,7 +197,9 @@ def _measured(measures: "list[Measure]", repeats: int) -> "Iterator[tuple[Measur
     for number, measure in enumerate(measures, 1):
         progress, began_s = ProgressLine(sys.stderr), monotonic()
         name = f"{number} of {len(measures)}: {measure.name}"
-        with ticking(lambda: progress.update(f"{name}, {monotonic() - began_s:.0f} s")):  # noqa: B023 - called within this turn
-            row = measured_row(measure, repeats)
-        progress.clear()
+        try:
+            with ticking(lambda: progress.update(f"{name}, {monotonic() - began_s:.0f} s")):  # noqa: B023 - called within this turn
+                row = measured_row(measure, repeats)
+        finally:
+            progress.clear()
         yield measure, row
