@@ -1,6 +1,7 @@
 """Where an agent without a number flies meanwhile: to the slot that it is likely to get."""
 
-from math import dist
+from math import dist, inf
+from operator import itemgetter
 from typing import Final
 
 from agent.qstructure.formation import Slot
@@ -8,20 +9,21 @@ from agent.structure.queue_choice import likely_length
 from agent.structure.view import View
 
 WAITS_M: Final = 0.5
-"""Who is nearer than this to a slot waits in it for a number. If it went on to where it stands in
+"""An agent nearer than this to a slot waits in it for a number. If it went on to where it stands in
 the order of those known so far, a line of few links would break before all are known."""
 
 
 def standing_slot(view: View, queue: int, members: int) -> Slot | None:
-    """Return the slot of a queue in which the agent stands by chance, None for none.
+    """Return the nearest slot of a queue if the agent stands in it by chance, else None.
 
     members: so many are looked at.
     """
     number = view.number_near(queue, members, WAITS_M)
     slots = [view.map.slot(queue, number, view.extent(queue, number))] if number else []
     slots += [view.map.vertex_slot(v) for v in view.map.vertices_of[queue]]
-    near = [each for each in slots if each and dist(each.point, view.origin) < WAITS_M]
-    return near[0] if near else None
+    near = [(dist(each.point, view.origin), each) for each in slots if each is not None]
+    distance_m, slot = min(near, key=itemgetter(0), default=(inf, None))
+    return slot if distance_m < WAITS_M else None
 
 
 def slot_by_order(view: View, queue: int, own_id: int) -> Slot | None:
