@@ -193,6 +193,7 @@ def test_an_interrupted_benchmark_saves_the_rows_that_it_has(
         signal.raise_signal(number)
         return 2.0
 
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a background shell ignores it
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # where the command sets no handler
     rows = [("first", lambda: 1.0), ("second", interrupt), ("third", lambda: 3.0)]
     measures = tuple(Measure(name, "us", None, False, measure) for name, measure in rows)
