@@ -116,13 +116,13 @@ class Census:
     def merge(self, summary: Summary, stamp_s: float, now_s: float, sender: int) -> None:
         """Take the labels of another agent, as they were at its stamp [s]."""
         greatest = int(stamp_s / QUANTUM_S) * CODES + CODES - 1
-        known = len(self._labels)
+        known, told_again = len(self._labels), self._news.tellings
         for member, wire in summary.news:
             label = greatest - wire
             # Most news is known already: that has to cost little.
             told = member < known and 0 <= self._labels[member] - label < WORTH_QUANTA * CODES
             if told:
-                if label % CODES == self._codes[member]:
+                if member in told_again and label % CODES == self._codes[member]:
                     self._news.hear(member, sender)
             elif member < self._ids and wire != UNKNOWN:
                 self._compare(member, label, now_s, sender)

@@ -17,14 +17,14 @@ OWN: Final = -1
 class LabelNews:
     """The news that one agent has for its neighbours, by member.
 
-    enough: how many tellings of an event are enough.
+    enough: how many tellings of an event are enough; tellings: how many there were of each event
+    that others are still to be told of, by member.
     """
 
     def __init__(self) -> None:
         self.enough = 1
         self._untold: set[int] = set()
-        self._tellings: dict[int, int] = {}
-        """How often events were told, by member."""
+        self.tellings: dict[int, int] = {}
         self._source: dict[int, int] = {}
 
     @property
@@ -33,12 +33,12 @@ class LabelNews:
         return bool(self._untold)
 
     def __len__(self) -> int:
-        return len(self._untold | self._tellings.keys())
+        return len(self._untold | self.tellings.keys())
 
     def add_event(self, member: int, source: int) -> None:
         """Note that a member's code changed. source: who told it."""
         self._untold.add(member)
-        self._tellings[member] = 0
+        self.tellings[member] = 0
         self._source[member] = source
 
     def add(self, member: int) -> None:
@@ -47,14 +47,14 @@ class LabelNews:
 
     def hear(self, member: int, sender: int) -> None:
         """Note that a neighbour tells what the own agent knows as well."""
-        if member in self._tellings and self._source[member] != sender:
+        if member in self.tellings and self._source[member] != sender:
             self._count(member)
 
     def take(self, most: int) -> list[int]:
         """Return the members of one frame: first those never told, then those told least."""
         first = sorted(self._untold)[:most]
         again = sorted(
-            self._tellings.keys() - self._untold, key=lambda each: (self._tellings[each], each)
+            self.tellings.keys() - self._untold, key=lambda each: (self.tellings[each], each)
         )
         self._untold.difference_update(first)
         told = first + again[: most - len(first)]
@@ -64,7 +64,7 @@ class LabelNews:
 
     def _count(self, member: int) -> None:
         """Count a telling of an event."""
-        if member in self._tellings:
-            self._tellings[member] += 1
-            if self._tellings[member] >= self.enough and member not in self._untold:
-                del self._tellings[member], self._source[member]
+        if member in self.tellings:
+            self.tellings[member] += 1
+            if self.tellings[member] >= self.enough and member not in self._untold:
+                del self.tellings[member], self._source[member]
