@@ -1,7 +1,6 @@
 """The slow layer of Fig. 3: what an agent hears and sends of the structure on the multihop channel.
 
 Labels of the census go any way. Leaders' summaries come down the trees: an agent takes one only
-from typing import Final
 from a lower tier. Its followers' reports go up, with its own part, to its parent. A summary goes
 out each round; with news sooner, as a Trickle timer does (RFC 6206).
 """
