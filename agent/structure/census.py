@@ -34,9 +34,9 @@ MAX_QUANTA: Final = 254
 WORTH_QUANTA: Final = 2
 """A repeated label is taken if it is so much later: to take each would cost time for nothing."""
 LAG_SMOOTHING: Final = 0.25
-SLOWER_THAN_NEWS: Final = 6.0
-"""How many times as long as news a repeated label takes: each agent on its way keeps it for a
-round."""
+SLOWER_THAN_NEWS: Final = 12.0
+"""How many times as long as news a repeated label takes: each agent on its way keeps it for up to
+two rounds."""
 LAGS: Final = 2.0
 """A label is late after so many of its usual lags, and T_lost."""
 MAX_LAG_S = MAX_QUANTA * QUANTUM_S / LAGS

@@ -182,6 +182,7 @@ class Structure:
             self._relocate(view, self._place_given)
         if self.claim.queue == NO_QUEUE and not self.claim.leads:
             self._queue_choice.choose(view, self.claim)
+            self._head_count.note_own(view, self.claim)  # the first beacon tells the queue
         waits = self.claim.number < 1 and not self.claim.leads
         view.order = self._order = self._head_count.order(view, self.claim.queue) if waits else ()
         if not self.claim.leads:

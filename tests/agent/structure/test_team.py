@@ -10,6 +10,7 @@ import pytest
 from agent.assignment.allocation import allocate
 from agent.controller import Peer
 from agent.messages import Place
+from agent.structure.label_code import queue_of_code
 from tests.agent.structure.builders import LIBRARY, LINE, TWO, library, lines, rays
 from tests.agent.structure.team import Team
 
@@ -46,6 +47,17 @@ def test_a_team_forms_and_keeps_still(name, radio):
     flown = team(MAPS[name], 10, **radio)
     assert flown.until_formed(30.0)
     check_stays(flown)
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_the_first_beacon_tells_the_queue(name):
+    """Else the news of it would go through the team twice: as a member, then with its queue."""
+    flown = team(MAPS[name], 6)
+    flown.step()
+    for member in flown.members.values():
+        said = member.words.standing
+        assert said.queue >= 0
+        assert queue_of_code(said.code, flown.map.queues) == said.queue or said.leads >= 0
 
 
 @pytest.mark.parametrize("radio", [{}, RADIOS["half lost, short"]], ids=["clean", "half lost"])
