@@ -1,6 +1,8 @@
 """Nine agents form the pyramidal wedge in virtual time (Figs. 8(a), 9 and 10)."""
 
+from functools import cache
 from pathlib import Path
+from statistics import mean
 
 import pytest
 
@@ -17,19 +19,23 @@ LOSSY = {
 }
 
 
+@cache
+def clean(seed):
+    return flown(seed, duration_s="16")
+
+
 def flown(seed, **overrides):
     return fly(load(WEDGE, {"seed": str(seed), **overrides}))
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_nine_agents_form_the_wedge_over_a_clean_radio(seed):
-    flight = flown(seed, duration_s="16")
+    flight = clean(seed)
     judge = flight.loop.judge
     assert [each.name for each in judge.expectations() if not each.held] == []
     assert judge.min_separation_m >= 0.40
     assert judge.phases[0].residual_m < 0.01
     assert max(command.telemetry.force for command in flight.loop.world.latest) < 1e-3
-    assert judge.turns_over_limit_fraction <= 0.05
     checked = judge.invariants()["I1"]
     assert checked.ticks == 321
     assert checked.violations == 0
@@ -37,6 +43,12 @@ def test_nine_agents_form_the_wedge_over_a_clean_radio(seed):
     assert (
         medium_counters.addressed == sum(medium_counters.fates.values()) + medium_counters.in_flight
     )
+
+
+def test_vehicles_seldom_want_to_turn_by_more_than_they_may():
+    """How a vehicle heads at the start is chance, so the share of one flight says little."""
+    fractions = [clean(seed).loop.judge.turns_over_limit_fraction for seed in range(8)]
+    assert mean(fractions) <= 0.03, fractions
 
 
 @pytest.mark.parametrize("seed", range(8))
