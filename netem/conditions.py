@@ -12,7 +12,7 @@ from typing import Final, NamedTuple, TypeVar, assert_never
 import msgspec
 
 from netem.faults import FaultOrder, Flap, Heal, Jam, LastingFault, Partition, Position
-from netem.link import LinkModel
+from netem.link_model import LinkModel
 from netem.link_parameters import RATE_KEYS, Conditions, LinkKeys
 from netem.wire.channels import CHANNELS
 

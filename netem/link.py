@@ -5,14 +5,13 @@ distance, the numbers drawn for this frame, and the link's state. The same frame
 same verdict.
 """
 
+from dataclasses import dataclass
 from enum import IntEnum
 from math import inf, log10
-from typing import Never
+from typing import Final, final
 
-import msgspec
-from msgspec.structs import force_setattr
-
-from netem.link_parameters import DEFAULTS, GilbertElliott, LinkParameters, PathLoss
+from netem.link_model import LinkModel
+from netem.link_parameters import GilbertElliott, PathLoss
 from netem.random_draws import (
     GROUP_SIZE,
     SHAPES,
@@ -29,9 +28,6 @@ from netem.range_index import InRange
 from netem.rate_queue import RateQueue
 from netem.wire.frame import Frame
 
-EDGE_SIGMAS = 6.0
-"""A frame whose loss is this many shadowing_db over the budget is never received (1 in 10^9)."""
-
 
 class Cause(IntEnum):
     """What became of a frame on a link; the names are those of summary.json."""
@@ -44,14 +40,21 @@ class Cause(IntEnum):
     DROPPED_QUEUE = 5
 
 
-class Verdict(msgspec.Struct, frozen=True, gc=False):
+@final
+@dataclass(init=False)
+class Verdict:
     """What a link decides about one frame."""
 
     cause: Cause
-    delay_s: float = 0.0
+    delay_s: float
     """Delay of a frame that is delivered, with its wait in the sender's queue [s]."""
-    flipped_at: float = -1.0
+    flipped_at: float
     """Place of the flipped bit, as a share of the payload's bits in [0, 1); -1 for none."""
+
+    def __init__(self, cause: Cause, delay_s: float = 0.0, flipped_at: float = -1.0) -> None:
+        self.cause = cause
+        self.delay_s = delay_s
+        self.flipped_at = flipped_at
 
 
 class LinkState:
@@ -66,40 +69,6 @@ class LinkState:
         """Normal score of the last frame's jitter; None before the first frame."""
         self.queue = RateQueue()
         """Frames that wait, where the link has a rate of its own."""
-
-
-class LinkModel(LinkParameters[Never], frozen=True):
-    """A link with a value for every parameter, and what follows from the values."""
-
-    own_rate: bool = False
-    """Whether the link has a queue of its own instead of the sender's."""
-
-    draws: bool = False
-    """Whether a verdict needs random numbers."""
-    plain: bool = False
-    """Whether the link has no more than loss and uniform jitter, and no state."""
-    remembers: bool = False
-    """Whether the link needs a LinkState."""
-    reach_m: float = inf
-    """Distance beyond which no frame is received [m]."""
-    clean: Verdict = Verdict(Cause.DELIVERED)
-    """The verdict within range where no numbers are needed."""
-
-    def __post_init__(self) -> None:
-        for key, default in DEFAULTS.items():
-            if getattr(self, key) is None:
-                force_setattr(self, key, default)
-        rare = self.duplicate_percent + self.corrupt_percent + self.reorder_percent > 0.0
-        shaped = self.delay_correlation_percent > 0.0 or self.distribution != "uniform"
-        jittery = self.jitter_ms > 0.0
-        bursts, soft = self.gemodel is not None, self.path_loss is not None
-        plain = not (rare or bursts or soft or self.own_rate or (jittery and shaped))
-        force_setattr(self, "plain", plain)
-        force_setattr(self, "draws", jittery or self.loss_percent > 0.0 or not plain)
-        correlated = jittery and self.delay_correlation_percent > 0.0
-        force_setattr(self, "remembers", bursts or self.own_rate or correlated)
-        force_setattr(self, "reach_m", min(self.range_m, path_loss_reach_m(self.path_loss)))
-        force_setattr(self, "clean", Verdict(Cause.DELIVERED, self.delay_ms / 1000.0))
 
 
 def mean_loss(link: LinkModel) -> float:
@@ -138,12 +107,12 @@ def burst_variance_factor(link: LinkModel) -> float:
     return (1.0 + rho) / (1.0 - rho) if rho < 1.0 else inf
 
 
-NO_STATE = LinkState()
+NO_STATE: Final = LinkState()
 """For links that keep no state; never written to."""
-LOST_TO_RANGE = Verdict(Cause.DROPPED_RANGE)
-LOST = Verdict(Cause.DROPPED_LOSS)
-LOST_TO_PARTITION = Verdict(Cause.DROPPED_PARTITION)
-LOST_TO_QUEUE = Verdict(Cause.DROPPED_QUEUE)
+LOST_TO_RANGE: Final = Verdict(Cause.DROPPED_RANGE)
+LOST: Final = Verdict(Cause.DROPPED_LOSS)
+LOST_TO_PARTITION: Final = Verdict(Cause.DROPPED_PARTITION)
+LOST_TO_QUEUE: Final = Verdict(Cause.DROPPED_QUEUE)
 
 
 def plain_verdict(link: LinkModel, distance_m: float, draws: PlainDraws | None) -> Verdict:
@@ -151,7 +120,7 @@ def plain_verdict(link: LinkModel, distance_m: float, draws: PlainDraws | None) 
     if not distance_m <= link.range_m:
         return LOST_TO_RANGE
     if draws is None:
-        return link.clean
+        return Verdict(Cause.DELIVERED, link.clean_delay_s)
     if draws.loss * 100.0 < link.loss_percent:
         return LOST
     delay_ms = link.delay_ms + link.jitter_ms * (2.0 * draws.delay - 1.0)
@@ -209,25 +178,21 @@ def reception_probability(edge: PathLoss, distance_m: float) -> float:
     return normal_cdf((edge.budget_db - loss_db) / edge.shadowing_db)
 
 
-def path_loss_reach_m(edge: PathLoss | None) -> float:
-    """Return the distance [m] beyond which a soft edge lets no frame through."""
-    if edge is None:
-        return inf
-    room_db = edge.budget_db + EDGE_SIGMAS * edge.shadowing_db - edge.reference_loss_db
-    decades = min(12.0, room_db / (10.0 * edge.exponent))
-    return edge.reference_distance_m * 10.0**decades if room_db > 0.0 else 0.0
+@final
+class Sending:
+    """A frame that its sender has sent.
 
+    key: the frame's source, incarnation, channel and count. sent_s: simulated time at which it was
+    sent [s]. waited_s: time in its sender's queue and on the air [s].
+    """
 
-class Sending(msgspec.Struct, frozen=True, gc=False):
-    """A frame that its sender has sent."""
-
-    frame: Frame
-    key: tuple[int, int, int, int]
-    """The frame's source, incarnation, channel and count."""
-    sent_s: float
-    """Simulated time at which it was sent [s]."""
-    waited_s: float
-    """Time in its sender's queue and on the air [s]."""
+    def __init__(
+        self, frame: Frame, key: tuple[int, int, int, int], sent_s: float, waited_s: float
+    ) -> None:
+        self.frame = frame
+        self.key = key
+        self.sent_s = sent_s
+        self.waited_s = waited_s
 
 
 class Links:

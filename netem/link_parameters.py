@@ -1,7 +1,7 @@
 """The parameters of a link, declared once: key, unit, bounds and default.
 
-A scenario's tables (``LinkKeys``) and the medium's models (``netem.link.LinkModel``) both have the
-fields of ``LinkParameters``. Names and units are those of tc-netem and ns-3.
+A scenario's tables (``LinkKeys``) and the medium's models (``netem.link_model.LinkModel``) both
+have the fields of ``LinkParameters``. Names and units are those of tc-netem and ns-3.
 """
 
 from math import inf

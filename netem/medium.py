@@ -16,15 +16,8 @@ import msgspec
 from netem.conditions import NetworkConditions
 from netem.delivery_log import FATE, HEAD, DeliveryLog
 from netem.faults import FaultOrder, Position
-from netem.link import (
-    LOST_TO_PARTITION,
-    LOST_TO_QUEUE,
-    Cause,
-    LinkModel,
-    Links,
-    Sending,
-    Verdict,
-)
+from netem.link import LOST_TO_PARTITION, LOST_TO_QUEUE, Cause, Links, Sending, Verdict
+from netem.link_model import LinkModel
 from netem.messages import MediumCounters, MediumSetup
 from netem.range_index import InRange, RangeIndex
 from netem.rate_queue import RateQueue
@@ -178,7 +171,7 @@ class Medium:
         elif common.draws:
             self._decide_plain(sending, near, common)
         else:
-            self._deliver_all(sending, near, sending.waited_s + common.clean.delay_s)
+            self._deliver_all(sending, near, sending.waited_s + common.clean_delay_s)
 
     def _enter_rate_queue(self, sending: Sending, model: LinkModel) -> float | None:
         """Return the delay in the queue of the sender's channel [s].

@@ -9,30 +9,30 @@ netem's own default, from -1 to 1.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import IntEnum
 from hashlib import blake2b, shake_128
 from math import erfc, pow, sqrt
 from statistics import NormalDist
 from struct import Struct as Layout
-
-import msgspec
+from typing import Final, final
 
 from netem.wire.frame import Frame
 
-MAX_QUANTILE = 32767.0 / 8192.0
+MAX_QUANTILE: Final = 32767.0 / 8192.0
 """Where netem's tables end, in standard deviations."""
-GROUP_SIZE = 32
+GROUP_SIZE: Final = 32
 """Number of destinations that share one hash where each link needs only ``PlainDraws``."""
 
-_KEY = Layout("<6q").pack
-_EIGHT = Layout("<8Q").unpack
-_PAIR = Layout("<2Q").unpack_from
-_PAIR_B = 16
-_UNIT = 1.0 / 2**53
-_MIN_SHARE = 2.0**-54
-_MAX_SHARE = 1.0 - 2.0**-53
-_ROOT_2 = sqrt(2.0)
-_normal = NormalDist()
+_KEY: Final = Layout("<6q").pack
+_EIGHT: Final = Layout("<8Q").unpack
+_PAIR: Final = Layout("<2Q").unpack_from
+_PAIR_B: Final = 16
+_UNIT: Final = 1.0 / 2**53
+_MIN_SHARE: Final = 2.0**-54
+_MAX_SHARE: Final = 1.0 - 2.0**-53
+_ROOT_2: Final = sqrt(2.0)
+_normal: Final = NormalDist()
 
 
 class Purpose(IntEnum):
@@ -47,16 +47,26 @@ class Purpose(IntEnum):
     COPY = 2
 
 
-class PlainDraws(msgspec.Struct, frozen=True, gc=False):
+@final
+@dataclass(init=False)
+class PlainDraws:
     """The numbers in [0, 1) of a frame on a link that has only loss and uniform jitter."""
 
     loss: float
     delay: float
 
+    def __init__(self, loss: float, delay: float) -> None:
+        self.loss = loss
+        self.delay = delay
 
-class FrameDraws(PlainDraws, frozen=True, gc=False):
+
+@final
+@dataclass
+class FrameDraws:
     """The numbers in [0, 1) of a frame, or of its copy, on any link."""
 
+    loss: float
+    delay: float
     path_loss: float
     reorder: float
     state_step: float

@@ -6,7 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from netem.link import LinkModel, mean_loss
+from netem.link import mean_loss
+from netem.link_model import LinkModel
 from netem.link_parameters import GilbertElliott, PathLoss
 from worldsim.link_check.checks import Finding, findings
 from worldsim.link_check.intervals import kolmogorov_smirnov, loss_bound

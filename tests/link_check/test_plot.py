@@ -3,7 +3,8 @@
 import pytest
 from matplotlib.axes import Axes
 
-from netem.link import LinkModel, reception_probability
+from netem.link import reception_probability
+from netem.link_model import LinkModel
 from netem.link_parameters import GilbertElliott, PathLoss
 from worldsim.link_check.intervals import share_bound
 from worldsim.link_check.parameter_sets import ParameterSet

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from netem.conditions import LinkModels, NetworkConditions, overlaid
 from netem.faults import Flap, Heal, Jam, Partition
-from netem.link import LinkModel
+from netem.link_model import LinkModel
 from netem.link_parameters import Conditions, DirectedLink, GilbertElliott, LinkKeys, PathLoss
 from netem.medium import Medium
 from netem.messages import MediumSetup

@@ -1,14 +1,15 @@
 """A link as statistics: losses, delays, and which numbers are independent."""
 
 import struct
+from dataclasses import astuple, fields
 from hashlib import blake2b
 from itertools import pairwise
 from math import inf, nan, sqrt
 
 import pytest
-from msgspec.structs import astuple
 
-from netem.link import Cause, LinkModel, Verdict, plain_verdict
+from netem.link import Cause, Verdict, plain_verdict
+from netem.link_model import LinkModel
 from netem.random_draws import (
     GROUP_SIZE,
     FrameDraws,
@@ -132,8 +133,10 @@ def test_successive_frames_are_lost_independently(frames):
 
 def test_a_draw_depends_on_every_part_of_its_key():
     assert full() == full()
-    others = [full(**{key: 9}) for key in FULL_KEY]
-    assert len({full(), full(seed=bytes(32)), *others}) == 2 + len(FULL_KEY)
+    changes = {**dict.fromkeys(FULL_KEY, 9), "purpose": Purpose.COPY}
+    others = [full(**{key: value}) for key, value in changes.items()]
+    distinct = set(map(astuple, [full(), full(seed=bytes(32)), *others]))
+    assert len(distinct) == 2 + len(FULL_KEY)
     assert all(0.0 <= number < 1.0 for each in draws(1000) for number in astuple(each))
 
 
@@ -144,7 +147,7 @@ def test_the_named_numbers_are_the_eight_words_of_the_hash():
     assert full(source=3, incarnation=1, destination=7, count=42, purpose=Purpose.COPY) == (
         FrameDraws(*[(word >> 11) / 2**53 for word in words])
     )
-    assert FrameDraws.__struct_fields__ == (
+    assert tuple(field.name for field in fields(FrameDraws)) == (
         "loss",
         "delay",
         "path_loss",

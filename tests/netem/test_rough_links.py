@@ -1,25 +1,17 @@
 """Links with rates, duplicates, flipped bits, reordering, bursts and soft edges."""
 
+from dataclasses import replace
 from math import inf, sqrt
 from random import Random
 
-import msgspec
 import pytest
 
-from netem.link import (
-    Cause,
-    LinkModel,
-    LinkState,
-    Verdict,
-    full_verdict,
-    path_loss_reach_m,
-    plain_verdict,
-    reception_probability,
-)
+from netem.link import Cause, LinkState, Verdict, full_verdict, plain_verdict, reception_probability
+from netem.link_model import LinkModel, path_loss_reach_m
 from netem.link_parameters import Conditions, DirectedLink, GilbertElliott, PathLoss
 from netem.medium import Medium
 from netem.messages import MediumSetup
-from netem.random_draws import MAX_QUANTILE, SHAPES, FrameDraws, correlated_share
+from netem.random_draws import MAX_QUANTILE, SHAPES, FrameDraws, PlainDraws, correlated_share
 from netem.range_index import ARRAYS_FROM, RangeIndex
 from netem.rate_queue import RateQueue
 from netem.wire.channels import LOCAL, MULTIHOP
@@ -142,7 +134,7 @@ def test_a_reordered_frame_skips_the_delay():
 
 def lost(model, steps):
     state, link = LinkState(), LinkModel(gemodel=model)
-    draws = [msgspec.structs.replace(NOTHING_RARE, state_step=step) for step in steps]
+    draws = [replace(NOTHING_RARE, state_step=step) for step in steps]
     return [full_verdict(link, 0.0, each, state).cause is Cause.DROPPED_LOSS for each in draws]
 
 
@@ -166,7 +158,7 @@ def test_a_soft_edge_is_half_at_the_budget_and_nothing_beyond_its_reach():
 
 
 def test_a_frame_lost_to_the_soft_edge_counts_as_out_of_range():
-    link, draws = LinkModel(path_loss=EDGE), msgspec.structs.replace(NOTHING_RARE, path_loss=0.5001)
+    link, draws = LinkModel(path_loss=EDGE), replace(NOTHING_RARE, path_loss=0.5001)
     assert full_verdict(link, 10.0, draws) == Verdict(Cause.DROPPED_RANGE)
     assert full_verdict(link, 9.9, draws).cause is Cause.DELIVERED
 
@@ -179,8 +171,8 @@ SHARES = [0.0, 0.01, 0.3, 0.5, 0.7, 0.99]
 @pytest.mark.parametrize("distance_m", [1.0, 7.0])
 def test_both_laws_agree_on_a_plain_link(loss, delay, distance_m):
     link = LinkModel(loss_percent=30.0, delay_ms=10.0, jitter_ms=15.0, range_m=6.0)
-    draws = msgspec.structs.replace(NOTHING_RARE, loss=loss, delay=delay)
-    assert full_verdict(link, distance_m, draws) == plain_verdict(link, distance_m, draws)
+    plain, full = PlainDraws(loss, delay), replace(NOTHING_RARE, loss=loss, delay=delay)
+    assert full_verdict(link, distance_m, full) == plain_verdict(link, distance_m, plain)
 
 
 @pytest.mark.parametrize("shape", SHAPES)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from agent.assignment.slot_selection import ALONE_S
 from agent.comms.gossip import LEAST_RELAYED_SILENCE_S
 from netem.conditions import NetworkConditions
-from netem.link import LinkModel, burst_variance_factor, unusable_share
+from netem.link import burst_variance_factor, unusable_share
+from netem.link_model import LinkModel
 from netem.random_draws import MAX_QUANTILE
 from netem.wire.channels import CHANNELS, LOCAL, MAX_PAYLOAD_B, MULTIHOP
 from worldsim.judge.radio_events import RadioRunEvent, order_of

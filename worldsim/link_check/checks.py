@@ -7,7 +7,8 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from netem.link import Cause, LinkModel, mean_loss, reception_probability
+from netem.link import Cause, mean_loss, reception_probability
+from netem.link_model import LinkModel
 from netem.random_draws import SHAPES
 from netem.wire.channels import LOCAL, Channel
 from worldsim.link_check.intervals import (

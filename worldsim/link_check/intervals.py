@@ -6,7 +6,8 @@ from math import asin, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from netem.link import LinkModel, mean_loss
+from netem.link import mean_loss
+from netem.link_model import LinkModel
 
 Z = 3.2905
 """Half width of the 99.9 % interval of a normal number, in standard deviations."""

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from netem.delivery_log import entries
-from netem.link import Cause, LinkModel
+from netem.link import Cause
+from netem.link_model import LinkModel
 from netem.link_parameters import Conditions, LinkKeys
 from netem.medium import Medium
 from netem.messages import MediumSetup

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from netem.conditions import NetworkConditions
 from netem.faults import FaultOrder, RadioEvent
-from netem.link import LinkModel
+from netem.link_model import LinkModel
 from netem.wire.channels import CHANNELS, NUMBERS, Channel
 from worldsim.scenario.tables import Scenario
 

@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from netem.link import Cause, LinkModel, reception_probability
+from netem.link import Cause, reception_probability
+from netem.link_model import LinkModel
 from netem.random_draws import SHAPES
 from worldsim.link_check.intervals import delay_quantiles_s
 from worldsim.link_check.packets import Flight, without_range_and_rate
