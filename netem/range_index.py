@@ -53,25 +53,30 @@ class RangeIndex:
         found = self._found.get((source, reach_m))
         if found is None:
             here = self.positions[source]
-            if here is None:
-                found = []
-            elif len(self._receivers) < ARRAYS_FROM:
-                found = self._by_loop(source, here, reach_m, self._receivers)
-            else:
-                found = self._among_near(source, here, reach_m)
+            found = [] if here is None else self._among_near(source, here, reach_m)
             self._found[source, reach_m] = found
         return found
 
-    def _among_near(self, source: int, here: Position, reach_m: float) -> InRange:
-        positions = self._placed()
+    def near(self, source: int, reach_m: float) -> Sequence[int]:
+        """Return receivers, all within a distance [m] of the source among them, ascending."""
+        if len(self._receivers) < ARRAYS_FROM:
+            return self._receivers
+        here = self.positions[source]
+        if here is None:
+            return ()
+        self._placed()
         near = self._near.get((source, reach_m))
         if near is None or not _is_within(here, near[0], MOST_MOVED_M):
             pairs = self._by_array(self._array_before, source, here, reach_m + MARGIN_M)
             near = here, [receiver for receiver, _ in pairs]
             self._near[source, reach_m] = near
-        if len(near[1]) < ARRAYS_FROM:
-            return self._by_loop(source, here, reach_m, near[1])
-        return self._by_array(positions, source, here, reach_m)
+        return near[1]
+
+    def _among_near(self, source: int, here: Position, reach_m: float) -> InRange:
+        near = self.near(source, reach_m)
+        if len(near) < ARRAYS_FROM:
+            return self._by_loop(source, here, reach_m, near)
+        return self._by_array(self._placed(), source, here, reach_m)
 
     def _placed(self) -> Floats:
         """Return the receivers' positions (3, R) [m]; begin ``_near`` anew if any moved too far."""

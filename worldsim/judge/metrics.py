@@ -1,9 +1,12 @@
 """Distances and packet conservation from rows of truth, as docs/scenario.md defines them."""
 
-from typing import Final
+from math import inf, isnan, nan, sqrt
+from typing import Final, final
 
 import numpy as np
 
+from agent.messages import Vector
+from netem.range_index import RangeIndex
 from worldsim.judge.tick import Packets
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
@@ -12,15 +15,23 @@ MIN_SQUARE_M2: Final = 1e-300
 """The divisor used for the square of a path without length [m^2]."""
 ROUNDING_M: Final = 1e-9
 """A distance this much below its bound keeps it [m]: at 1e6 m, positions are rounded to 1e-10 m."""
+FIRST_WITHIN_M: Final = 2.0
+"""[m]"""
+FEW: Final = 8
+"""At most one vehicle in so many is searched for its nearest among all others."""
 FATES = ("delivered", "dropped_", "in_flight")
 """Prefixes of the counters that together hold every addressed packet."""
 
 
+@final
 class Separation:
     """Each vehicle's least distance to any other while both move from tick to tick."""
 
     def __init__(self) -> None:
-        self._relative_before: Floats | None = None
+        self._index = RangeIndex(0, ())
+        self._before: list[Vector] | None = None
+        self._within_m = FIRST_WITHIN_M
+        """Within this distance, a vehicle of a large fleet is searched for its nearest first."""
 
     def swept(self, position: Floats) -> Floats:
         """Return the distances (N,) [m] since the previous tick; at the first tick, those now.
@@ -28,17 +39,81 @@ class Separation:
         position: (N, 3) [m; world frame]. Motion between ticks is taken as straight. NaN rows, and
         a vehicle that is alone, give NaN.
         """
-        ends = _relative_positions(position)
-        starts = self._relative_before if self._relative_before is not None else ends
-        self._relative_before = ends
-        back = starts - ends
-        along = np.maximum(_dot(back, back), MIN_SQUARE_M2)
-        when = np.minimum(np.maximum(_dot(starts, back) / along, 0.0), 1.0)
-        nearest = starts - when * back
-        square = _dot(nearest, nearest)
-        square.flat[:: len(position) + 1] = np.nan
-        least: Floats = np.fmin.reduce(square, axis=1, initial=np.nan)
-        return np.sqrt(least)
+        after: list[Vector] = [(x, y, z) for x, y, z in position.tolist()]
+        sweep = _Sweep(self._before if self._before is not None else after, after)
+        self._before = after
+        self._place(after)
+        searched = 0
+        for row in range(len(after)):
+            near = self._index.near(row, self._within_m)
+            sweep.take(row, [other for other in near if other > row])
+            searched += len(near)
+        if searched < len(after) ** 2:
+            far = sweep.beyond(self._within_m)
+            for row in far:
+                sweep.take(row, [other for other in range(len(after)) if other != row])
+            if len(far) > len(after) // FEW:
+                self._within_m *= 2.0
+        return np.array([sqrt(square) if square < inf else nan for square in sweep.square])
+
+    def _place(self, position: list[Vector]) -> None:
+        if len(self._index.positions) != len(position):
+            self._index = RangeIndex(len(position), tuple(range(len(position))))
+        self._index.place(tuple([None if isnan(each[0]) else each for each in position]))
+
+
+@final
+class _Sweep:
+    """The motion of all vehicles from one tick to the next, and how near others come to each.
+
+    before, after: row i = vehicle i [m; world frame].
+    """
+
+    def __init__(self, before: list[Vector], after: list[Vector]) -> None:
+        self._before, self._after = before, after
+        self.square: list[float] = [inf] * len(after)
+        """Of the least distance so far [m^2]; infinite before any."""
+
+    def take(self, row: int, others: list[int]) -> None:
+        """Take how near a vehicle and others come to each other."""
+        (x, y, z), (to_x, to_y, to_z) = self._before[row], self._after[row]
+        square = self.square
+        least = square[row]
+        for other in others:
+            (a, b, c), (to_a, to_b, to_c) = self._before[other], self._after[other]
+            u, v, w = a - x, b - y, c - z
+            back_u, back_v, back_w = u - (to_a - to_x), v - (to_b - to_y), w - (to_c - to_z)
+            along = back_u * back_u + back_v * back_v + back_w * back_w
+            along = along if along > MIN_SQUARE_M2 else MIN_SQUARE_M2
+            when = (u * back_u + v * back_v + w * back_w) / along
+            when = 0.0 if when < 0.0 else 1.0 if when > 1.0 else when
+            u, v, w = u - when * back_u, v - when * back_v, w - when * back_w
+            found = u * u + v * v + w * w
+            least = min(least, found)
+            square[other] = min(square[other], found)
+        square[row] = least
+
+    def beyond(self, within_m: float) -> list[int]:
+        """Return the vehicles whose nearest may be none of those within a distance [m] now.
+
+        Two vehicles that are farther apart now were no nearer than both ways allow.
+        """
+        surely_m = within_m - 2.0 * self._longest_way_m() - ROUNDING_M
+        surely = surely_m * surely_m if surely_m > 0.0 else -1.0
+        return [
+            row
+            for row, square in enumerate(self.square)
+            if square > surely and not isnan(self._after[row][0])
+        ]
+
+    def _longest_way_m(self) -> float:
+        """Return how far a vehicle has moved at most [m]."""
+        longest = 0.0
+        for (x, y, z), (to_x, to_y, to_z) in zip(self._before, self._after, strict=True):
+            u, v, w = to_x - x, to_y - y, to_z - z
+            square = u * u + v * v + w * w
+            longest = max(longest, square)
+        return sqrt(longest)
 
 
 def swept_obstacle_distance(
@@ -69,17 +144,8 @@ def keeps(distance_m: float, bound_m: float) -> bool:
 
 def conserved(packets: Packets) -> bool:
     """Return whether every addressed packet was delivered or dropped, or is in flight (I8)."""
-    known = sum(count for name, count in packets.items() if name.startswith(FATES))
+    known = 0
+    for name, count in packets.items():
+        if name.startswith(FATES):
+            known += count
     return known == packets["addressed"]
-
-
-def _relative_positions(position: Floats) -> Floats:
-    """Return x, y, z of vehicle j relative to vehicle i, (3, N, N) [m; world axes]."""
-    axes = position.T
-    return axes[:, None, :] - axes[:, :, None]
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    product = a * b
-    total: Floats = product[0] + product[1] + product[2]
-    return total
