@@ -64,6 +64,8 @@ class HoveringVehicles:
 
         seen: which vehicles count (N,); None: all.
         """
+        if len(team) == len(tick.alive):
+            return NO_PLACES
         others = self.hovering(tick)
         others[team] = False
         if seen is not None:

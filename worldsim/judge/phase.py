@@ -5,18 +5,18 @@ the mission that it flies are used; the position of that place is computed here.
 """
 
 from collections import Counter
-from math import degrees, isfinite, remainder, tau
+from collections.abc import Sequence
+from math import degrees, inf, isfinite, isnan, nan, remainder, sqrt, tau
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from agent.messages import AT_HOME, FramePath, Place
+from agent.messages import AT_HOME, FramePath, Place, Vector
 from agent.qstructure.formation import NO_PLACES, Formation, Slot
 from agent.qstructure.frame_path import Track
 from agent.qstructure.target_frame import Frame
-from worldsim.judge.tick import Tick
+from worldsim.judge.tick import Tick, same_claims
 from worldsim.scenario.tables import CONVERGED_M, CONVERGED_S
-from worldsim.truth.vehicle import Floats
 
 NO_CLAIM = (-1, -1)
 TIME_SLACK_S: Final = 1e-9
@@ -48,7 +48,7 @@ class _SlotPositions(NamedTuple):
 
     slots: SlotsByRow
     frame: Frame | None
-    position: Floats  # (N, 3) [m; world frame], infinite without a slot
+    position: list[Vector | None]  # row i = agent i [m; world frame], None without a slot
 
 
 class Phase:
@@ -69,9 +69,10 @@ class Phase:
         self._timer = ConvergenceTimer()
         self._known_slots: dict[tuple[int, int, int], Slot | None] = {}
         self._own: SlotsByRow = {}
-        self._own_key: tuple[object, ...] | None = None
-        self._blocked = NO_PLACES
-        self._positions = _SlotPositions(slots={}, frame=None, position=np.empty(0))
+        self._own_of: Tick | None = None
+        """The tick that they were found in, with ``_own_blocked``."""
+        self._own_blocked = self._blocked = NO_PLACES
+        self._positions = _SlotPositions(slots={}, frame=None, position=[])
 
     @property
     def converge_s(self) -> float | None:
@@ -83,18 +84,18 @@ class Phase:
         """Return the target's frame at a time [s]."""
         return self._track.at(time_s)
 
-    def slot_error(self, tick: Tick, blocked: frozenset[Place] = NO_PLACES) -> Floats:
-        """Return the distances (N,) [m] of agents to the slots they claim; infinite if not valid.
+    def slot_error(self, tick: Tick, blocked: frozenset[Place] = NO_PLACES) -> list[float]:
+        """Return how far each agent is from the slot that it claims [m]; infinite if not valid.
 
         A slot that two agents claim is valid for neither: none of them counts as arrived. blocked:
         places in which other vehicles hover; a team that has to leave them out stands elsewhere on
         a closed queue.
         """
         self._blocked = blocked
-        away = tick.position - self._slot_positions(tick)
-        square = away * away
-        error: Floats = np.sqrt(square[:, 0] + square[:, 1] + square[:, 2])
-        return error
+        return [
+            _distance(here, slot)
+            for here, slot in zip(tick.position.tolist(), self._slot_positions(tick), strict=True)
+        ]
 
     def attitude_error_deg(self, tick: Tick) -> float | None:
         """Return the largest difference between an agent's attitude and its slot's [deg].
@@ -125,28 +126,28 @@ class Phase:
 
     def claims(self, tick: Tick) -> list[tuple[int, int]]:
         """Return each agent's claim in this phase, queue and rank; NO_CLAIM without one."""
-        flies_this = (tick.mission >= self.mission).tolist()
         return [
-            (queue, rank) if flies else NO_CLAIM
-            for (queue, rank), flies in zip(tick.place.tolist(), flies_this, strict=True)
+            (queue, rank) if mission >= self.mission else NO_CLAIM
+            for (queue, rank), mission in zip(
+                tick.place.tolist(), tick.mission.tolist(), strict=True
+            )
         ]
 
-    def see(self, time_s: float, error: Floats) -> bool:
-        """Take the living agents' slot errors [m] at a tick; return whether all are in place."""
-        worst = float(np.fmax.reduce(error, initial=-np.inf))
+    def see(self, time_s: float, error: Sequence[float]) -> bool:
+        """Take the running agents' slot errors [m] at a tick; return whether all are in place."""
+        worst = -inf
+        for error_m in error:
+            worst = max(worst, error_m)
         self.residual_m = worst if isfinite(worst) else None
         in_place = 0.0 <= worst <= CONVERGED_M
         self._timer.see(time_s, in_place)
         return in_place
 
-    def _slot_positions(self, tick: Tick) -> Floats:
-        """Return where each agent's slot is (N, 3) [m; world frame], infinite without one.
-
-        The result is kept while slots and frame stay the same.
-        """
+    def _slot_positions(self, tick: Tick) -> list[Vector | None]:
+        """Return where each agent's slot is; it is kept while slots and frame stay the same."""
         slots, frame = self.own_slots(tick), self.frame(tick.time_s)
         if slots is not self._positions.slots or frame is not self._positions.frame:
-            position = np.full(tick.position.shape, np.inf)
+            position: list[Vector | None] = [None] * len(tick.alive)
             for row, slot in slots.items():
                 position[row] = frame.to_world(slot.point)
             self._positions = _SlotPositions(slots=slots, frame=frame, position=position)
@@ -157,10 +158,10 @@ class Phase:
 
         The result is kept until a claim changes, or an agent goes.
         """
-        rows = (tick.place, tick.alive, tick.mission)
-        key = (*(each.tobytes() for each in rows), self._blocked)
-        if key != self._own_key:
-            self._own_key, self._own = key, self._find_slots(tick)
+        of = self._own_of
+        if of is None or self._blocked != self._own_blocked or not same_claims(of, tick):
+            self._own_of, self._own_blocked = tick, self._blocked
+            self._own = self._find_slots(tick)
         return self._own
 
     def _find_slots(self, tick: Tick) -> SlotsByRow:
@@ -180,3 +181,12 @@ class Phase:
         if key not in self._known_slots:
             self._known_slots[key] = self.formation.slot(Place(queue, rank), team)
         return self._known_slots[key]
+
+
+def _distance(here: Sequence[float], slot: Vector | None) -> float:
+    x, y, z = here
+    if slot is None:
+        return nan if isnan(x) else inf
+    a, b, c = slot
+    u, v, w = x - a, y - b, z - c
+    return sqrt(u * u + v * v + w * w)

@@ -4,14 +4,15 @@ A queue's residual is the largest slot error among the agents that hold its plac
 is a place of every queue that passes through it.
 """
 
+from collections.abc import Sequence
+from math import isnan, nan
+
 import numpy as np
-from numpy.typing import NDArray
 
 from agent.messages import Place
 from worldsim.judge.phase import ConvergenceTimer, Phase
-from worldsim.judge.tick import Tick
+from worldsim.judge.tick import Tick, same_claims
 from worldsim.scenario.tables import CONVERGED_M
-from worldsim.truth.vehicle import Floats
 
 
 class QueueConvergence:
@@ -25,8 +26,10 @@ class QueueConvergence:
         self.names = tuple(queue.name for queue in phase.formation.queues)
         self._phase = phase
         self._timers = [ConvergenceTimer() for _ in self.names]
-        self._members_key: tuple[bytes, ...] = ()
-        self._members: NDArray[np.bool_] = np.zeros((len(self.names), 0), dtype=np.bool_)
+        self._members: list[list[int]] = [[] for _ in self.names]
+        """The rows of each queue's agents."""
+        self._members_of: Tick | None = None
+        """The tick that they were found in."""
         self._all_placed = False
 
     @property
@@ -35,27 +38,37 @@ class QueueConvergence:
         converged = (timer.converged_s for timer in self._timers)
         return [None if at_s is None else at_s - self._phase.from_s for at_s in converged]
 
-    def see(self, tick: Tick, error: Floats) -> Floats:
-        """Take the slot errors (N,) [m] at a tick; return the residuals (Q,) [m].
+    def see(self, tick: Tick, error: Sequence[float]) -> list[float]:
+        """Take the slot errors [m] of all agents at a tick; return each queue's residual [m].
 
         A residual is infinite where an agent of the queue has no valid slot, and NaN where the
         queue has no agents.
         """
-        key = (tick.place.tobytes(), tick.alive.tobytes(), tick.mission.tobytes())
-        if key != self._members_key:
-            self._members_key = key
+        if self._members_of is None or not same_claims(self._members_of, tick):
+            self._members_of = tick
             self._find_members(tick)
-        worst: Floats = np.max(np.where(self._members, error, -np.inf), axis=1, initial=-np.inf)
-        for timer, residual_m in zip(self._timers, worst.tolist(), strict=True):
-            timer.see(tick.time_s, self._all_placed and 0.0 <= residual_m <= CONVERGED_M)
-        return np.where(worst >= 0.0, worst, np.nan)
+        residuals_m = [_largest([error[row] for row in rows]) for rows in self._members]
+        for timer, residual_m in zip(self._timers, residuals_m, strict=True):
+            timer.see(tick.time_s, self._all_placed and residual_m <= CONVERGED_M)
+        return residuals_m
 
     def _find_members(self, tick: Tick) -> None:
         claims = self._phase.claims(tick)
         living = np.flatnonzero(tick.alive).tolist()
         self._all_placed = bool(living) and all(claims[row][0] >= 0 for row in living)
-        self._members = np.zeros((len(self.names), len(claims)), dtype=np.bool_)
+        self._members = [[] for _ in self.names]
         for row in living:
             for queue in self._phase.formation.queues_of(Place(*claims[row])):
                 if 0 <= queue < len(self.names):
-                    self._members[queue, row] = True
+                    self._members[queue].append(row)
+
+
+def _largest(distances: Sequence[float]) -> float:
+    """Return the largest of some distances; NaN where there is none, or one is NaN."""
+    largest = -1.0
+    for each in distances:
+        if not each <= largest:
+            largest = each
+            if isnan(each):
+                break
+    return largest if largest >= 0.0 else nan

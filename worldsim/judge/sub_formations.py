@@ -6,16 +6,15 @@ their line while the distances among them are those among their slots.
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
-from typing import Final, NamedTuple, TypedDict
+from math import sqrt
+from typing import Final, TypedDict, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agent.messages import Vector
+from worldsim.judge.metrics import ROUNDING_M
 from worldsim.judge.phase import Phase, SlotsByRow
 from worldsim.judge.tick import Tick
-from worldsim.truth.vehicle import Floats
 
 SHAPE_M: Final = 0.3
 """Largest error of a distance between two members that stand in their line [m]."""
@@ -30,21 +29,64 @@ class SubFormationsRow(TypedDict):
     lead_s: float | None
 
 
-class _Placed(NamedTuple):
-    """A member."""
+@final
+class _Line:
+    """The members of a queue, and whether all stand as far from each other as their slots do.
 
-    row: int
-    queue: int
-    slot: Vector  # [m; target's frame]
+    rows: of its members in order; slots: of each [m; target's frame].
+    """
 
+    def __init__(self, rows: list[int], slots: list[Vector]) -> None:
+        self._rows = rows
+        self._slots = slots
+        self._broken: tuple[int, int] | None = None
+        """Two members that stood too near or too far at the last tick; None where all stood."""
+        self._stood: list[Vector] = []
+        """Where the members were when all pairs were last looked at, and stood [m]."""
+        self._slack_m = 0.0
+        """By how much the error of each pair was less than allowed then."""
 
-class _Pairs(NamedTuple):
-    """Some pairs of members, each of one queue."""
+    def stands(self, position: Sequence[Sequence[float]]) -> bool:
+        """Return whether the line stands. position: of all agents [m; world frame].
 
-    one: NDArray[np.intp]  # (P,) rows
-    other: NDArray[np.intp]  # (P,)
-    apart: Floats  # (P,) distance of their slots [m]
-    queue: NDArray[np.intp]  # (P,)
+        All pairs are looked at only where neither one that was broken still is, nor all members
+        have moved together but for less than half of the slack.
+        """
+        here: list[Vector] = [(x, y, z) for x, y, z in [position[row] for row in self._rows]]
+        if self._broken is not None and self._slack_of(here, *self._broken) < 0.0:
+            return False
+        return self._moved_as_one(here) or self._look_at_all(here)
+
+    def _moved_as_one(self, here: list[Vector]) -> bool:
+        if not self._stood:
+            return False
+        (x, y, z), (from_x, from_y, from_z) = here[0], self._stood[0]
+        x, y, z = x - from_x, y - from_y, z - from_z
+        most = 0.25 * self._slack_m * self._slack_m
+        for (a, b, c), (from_a, from_b, from_c) in zip(here, self._stood, strict=True):
+            u, v, w = a - from_a - x, b - from_b - y, c - from_c - z
+            if not u * u + v * v + w * w <= most:
+                return False
+        return True
+
+    def _look_at_all(self, here: list[Vector]) -> bool:
+        least_m = SHAPE_M
+        for ranks in range(1, len(here)):
+            for one in range(len(here) - ranks):
+                slack_m = self._slack_of(here, one, one + ranks)
+                if slack_m < 0.0:
+                    self._broken, self._stood = (one, one + ranks), []
+                    return False
+                least_m = min(least_m, slack_m)
+        self._broken, self._stood = None, here
+        self._slack_m = max(0.0, least_m - ROUNDING_M)
+        return True
+
+    def _slack_of(self, here: list[Vector], one: int, other: int) -> float:
+        """Return by how much the error of a pair's distance is less than allowed [m]."""
+        apart_m = _distance(here[one], here[other])
+        error_m = abs(apart_m - _distance(self._slots[one], self._slots[other]))
+        return SHAPE_M - error_m if error_m <= SHAPE_M else -1.0
 
 
 class SubFormations:
@@ -55,15 +97,11 @@ class SubFormations:
         self._phase = phase
         self._since_s: list[float | None] = [None for _ in self.names]
         self._slots: SlotsByRow | None = None
-        """The slots that the pairs were found for; another object once any changed."""
+        """The slots that the lines were found for; another object once any changed."""
         self._lines = 0
         """Number of queues with at least two members."""
-        self._placed: dict[int, list[_Placed]] = {}
-        """The members of each of them of which all have valid slots."""
-        self._neighbours = _pairs_of([])
-        """The neighbours along all these queues."""
-        self._others: dict[tuple[int, ...], _Pairs] = {}
-        """All other pairs of some queues; they are found only once their neighbours stand."""
+        self._placed: dict[int, _Line] = {}
+        """The queues that have two members or more, each with a slot."""
 
     @property
     def stands_s(self) -> list[float | None]:
@@ -99,37 +137,23 @@ class SubFormations:
         slots = self._phase.own_slots(tick)
         if slots is not self._slots:
             self._slots = slots
-            self._find_pairs(tick, slots)
-        broken = _broken(self._neighbours, tick.position)
-        standing = tuple([queue for queue in self._placed if queue not in broken])
-        broken |= _broken(self._others_of(standing), tick.position)
-        for queue in self._placed:
-            if queue in broken:
+            self._find_lines(tick, slots)
+        position = tick.position.tolist()
+        for queue, line in self._placed.items():
+            if not line.stands(position):
                 self._since_s[queue] = None
             elif self._since_s[queue] is None:
                 self._since_s[queue] = tick.time_s
 
-    def _find_pairs(self, tick: Tick, slots: SlotsByRow) -> None:
+    def _find_lines(self, tick: Tick, slots: SlotsByRow) -> None:
         found = self._members(tick)
-        self._lines = sum(len(rows) > 1 for rows in found)
-        self._placed, self._others = {}, {}
+        self._lines = sum([len(rows) > 1 for rows in found])
+        self._placed = {}
         for queue, rows in enumerate(found):
             if len(rows) > 1 and all(row in slots for row in rows):
-                self._placed[queue] = [_Placed(row, queue, slots[row].point) for row in rows]
+                self._placed[queue] = _Line(rows, [slots[row].point for row in rows])
             else:
                 self._since_s[queue] = None
-        near = [pair for members in self._placed.values() for pair in pairwise(members)]
-        self._neighbours = _pairs_of(near)
-
-    def _others_of(self, queues: tuple[int, ...]) -> _Pairs:
-        if queues not in self._others:
-            lines = [self._placed[queue] for queue in queues]
-            self._others = {
-                queues: _pairs_of(
-                    [(a, b) for line in lines for k, a in enumerate(line) for b in line[k + 2 :]]
-                )
-            }
-        return self._others[queues]
 
     def _members(self, tick: Tick) -> list[list[int]]:
         """Return the rows of each queue's members, in the order of their ranks."""
@@ -145,23 +169,7 @@ class SubFormations:
         return members
 
 
-def _pairs_of(pairs: Sequence[tuple[_Placed, _Placed]]) -> _Pairs:
-    rows = np.array([(a.row, b.row) for a, b in pairs], dtype=np.intp).reshape(-1, 2)
-    points = np.array([(a.slot, b.slot) for a, b in pairs]).reshape(-1, 2, 3)
-    queue = np.array([a.queue for a, _ in pairs], dtype=np.intp)
-    return _Pairs(rows[:, 0], rows[:, 1], _lengths(points[:, 0] - points[:, 1]), queue)
-
-
-def _broken(pairs: _Pairs, position: Floats) -> set[int]:
-    """Return the queues of those pairs whose distance is not that of their slots."""
-    if not len(pairs.one):
-        return set()
-    apart = _lengths(position[pairs.one] - position[pairs.other])
-    kept = np.abs(apart - pairs.apart) <= SHAPE_M
-    return set() if kept.all() else {*pairs.queue[~kept].tolist()}
-
-
-def _lengths(away: Floats) -> Floats:
-    square = away * away
-    found: Floats = np.sqrt(square[:, 0] + square[:, 1] + square[:, 2])
-    return found
+def _distance(one: Vector, other: Vector) -> float:
+    (x, y, z), (a, b, c) = one, other
+    u, v, w = x - a, y - b, z - c
+    return sqrt(u * u + v * v + w * w)

@@ -6,7 +6,7 @@ numbers of the first one.
 """
 
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,3 +55,19 @@ class Tick:
     """The newest counters; empty before the first come."""
     hierarchy: HierarchyRows | None = None
     """None where ticks are not recorded."""
+
+
+def same_claims(one: Tick, other: Tick) -> bool:
+    """Return whether the same agents run in two ticks, and claim the same places and missions.
+
+    Ticks of a run share these rows for as long as none changes.
+    """
+    return (
+        _same(one.alive, other.alive)
+        and _same(one.place, other.place)
+        and _same(one.mission, other.mission)
+    )
+
+
+def _same(one: NDArray[Any], other: NDArray[Any]) -> bool:
+    return one is other or one.tobytes() == other.tobytes()

@@ -4,9 +4,8 @@ It takes events and ticks in order, an event before the tick of its time. Given 
 of a recording, it reaches the same verdict.
 """
 
-from dataclasses import dataclass
-from math import inf
-from typing import NamedTuple, assert_never
+from math import inf, isnan
+from typing import NamedTuple, assert_never, final
 
 import numpy as np
 
@@ -49,20 +48,31 @@ from worldsim.truth.vehicle import Floats
 TURN_LIMIT_SLACK_DEG = 1e-6
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@final
 class Figures:
-    """The judge's measurements at one tick; row i = agent i, NaN where nothing can be measured."""
+    """The judge's measurements at one tick; row i = agent i, NaN where nothing can be measured.
 
-    separation: Floats
-    """(N,): least distance to any other vehicle since the last tick, centre to centre [m]."""
-    slot_error: Floats
-    """(N,): distance to the agent's own slot [m]; infinite without a valid one."""
-    converged: bool
-    """Whether every agent is within 0.12 m of its slot."""
-    obstacle_distance: Floats | None = None
-    """(N,): least distance since the last tick, centre to surface [m]; None without obstacles."""
-    queue_residual: Floats | None = None
-    """(Q,): largest slot error in each queue [m]."""
+    separation: (N,), least distance to any other vehicle since the last tick, centre to centre [m].
+    slot_error: (N,), distance to the agent's own slot [m]; infinite without a valid one. converged:
+    whether every agent is within 0.12 m of its slot. obstacle_distance: (N,), least distance since
+    the last tick, centre to surface [m]; None without obstacles. queue_residual: (Q,), largest slot
+    error in each queue [m].
+    """
+
+    def __init__(
+        self,
+        *,
+        separation: Floats,
+        slot_error: Floats,
+        converged: bool,
+        obstacle_distance: Floats | None = None,
+        queue_residual: Floats | None = None,
+    ) -> None:
+        self.separation = separation
+        self.slot_error = slot_error
+        self.converged = converged
+        self.obstacle_distance = obstacle_distance
+        self.queue_residual = queue_residual
 
 
 class Shortcomings(NamedTuple):
@@ -98,7 +108,9 @@ class Judge:
         self._safety = InvariantTally()
         self._conservation = InvariantTally()
         cones = np.degrees([cone_of(vehicle) for vehicle in scenario.vehicles])
-        self._turn_left_deg, self._turn_right_deg = cones.T + TURN_LIMIT_SLACK_DEG
+        self._turn_left_deg: list[float]
+        self._turn_right_deg: list[float]
+        self._turn_left_deg, self._turn_right_deg = (cones.T + TURN_LIMIT_SLACK_DEG).tolist()
         self._turns = 0
         self._turns_over = 0
         self._last: Tick | None = None
@@ -140,22 +152,22 @@ class Judge:
         self._safety.count(self._is_too_near(separation) or too_near)
         self._check_packets(tick.packets)
         self._count_turns(tick)
-        phase = self.phases[-1]
-        team = np.flatnonzero(tick.alive).tolist()
+        phase, team = self.phases[-1], np.flatnonzero(tick.alive).tolist()
         error = phase.slot_error(tick, self._hovering.occupied_places(tick, phase, team))
-        in_place = phase.see(tick.time_s, np.where(tick.alive, error, np.nan))
+        in_place = phase.see(tick.time_s, [error[row] for row in team])
+        slot_error = np.array(error)
         if self._attitudes is not None:
-            self._attitudes.see(tick, phase, error)
+            self._attitudes.see(tick, phase, slot_error)
         self.sub_formations[-1].see(tick)
         self._recoveries.see(tick, phase, in_place)
         if self._allocation is not None:
             self._allocation.see(tick, phase, in_place)
         return Figures(
             separation=separation,
-            slot_error=error,
+            slot_error=slot_error,
             converged=in_place,
             obstacle_distance=distance,
-            queue_residual=self.queues[-1].see(tick, error),
+            queue_residual=np.array(self.queues[-1].see(tick, error)),
         )
 
     @property
@@ -264,16 +276,17 @@ class Judge:
             self._conservation.count(not conserved(packets))
 
     def _count_turns(self, tick: Tick) -> None:
-        turns = int(np.count_nonzero(~np.isnan(tick.turn_deg)))
-        if not turns:
-            return
-        self._turns += turns
-        self._turns_over += int(np.count_nonzero(tick.turn_deg > self._turn_left_deg))
-        self._turns_over += int(np.count_nonzero(tick.turn_deg < -self._turn_right_deg))
+        left_deg, right_deg = self._turn_left_deg, self._turn_right_deg
+        for row, turn_deg in enumerate(tick.turn_deg.tolist()):
+            if not isnan(turn_deg):
+                self._turns += 1
+                self._turns_over += turn_deg > left_deg[row] or turn_deg < -right_deg[row]
 
     def _is_too_near(self, separation: Floats) -> bool:
         """Take the separations of a tick (N,) [m]; return whether any is below the limit."""
-        least = float(np.fmin.reduce(separation, initial=np.inf))
+        least = inf
+        for distance_m in separation.tolist():
+            least = min(least, distance_m)
         if least == inf:
             return False
         if self.min_separation_m is None or least < self.min_separation_m:
