@@ -153,16 +153,20 @@ class Departures:
         """(N,): which vehicles hovered at the last tick."""
         self._position = np.zeros((agents, 3))
         """(N, 3): where they were then [m; world frame]."""
+        self._clear = True
+        """Whether none hovered, and none has left."""
         self._left: list[_Departure] = []
 
     def clear(self) -> None:
         """Forget all departures: every agent is in one component."""
-        if self._left or self._hovered.any():
+        if not self._clear:
+            self._clear = True
             self._hovered, self._sensed = np.zeros_like(self._hovered), np.zeros_like(self._sensed)
             self._left = []
 
     def see(self, tick: Tick, hovering: NDArray[np.bool_], lasting_s: float) -> None:
         """Take which vehicles (N,) hover; ticks come in order. A departure counts lasting_s [s]."""
+        self._clear = False
         self._left = [each for each in self._left if tick.time_s - each.left_s < lasting_s]
         for row in np.flatnonzero(self._hovered & ~hovering).tolist():
             itself = np.arange(len(hovering)) == row

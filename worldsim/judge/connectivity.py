@@ -76,6 +76,9 @@ class Connectivity:
         self._round_s = 1.0 / scenario.comms.multihop_hz if scenario.comms.multihop_hz else inf
         self._rows = range(scenario.rows)
         self._network = NetworkConditions(scenario.netem)
+        self._found: Components | None = None
+        """The newest components, and below what they were computed from."""
+        self._found_of: tuple[bytes, ...] = ()
         self._refresh()
 
     def handle_event(self, event: RadioRunEvent) -> None:
@@ -84,26 +87,23 @@ class Connectivity:
         self._refresh()
 
     def components(self, tick: Tick) -> Components:
-        """Return the connected components at a tick."""
-        lost = self._lost(MULTIHOP, tick.position, tick.alive)
-        label = _components(lost < 1.0, tick.alive)
-        within = lost[(lost < 1.0) & (label[:, None] == label)]
-        loss = _weakest(lost, label, np.unique(within))
-        linked = (lost <= loss) & (label[:, None] == label)
-        rows = np.flatnonzero(tick.alive).tolist()
-        hops = max((int(_hops_from(row, linked).max()) for row in rows), default=0)
-        heard = self._lost(LOCAL, tick.position, tick.alive) < 1.0
-        foreign = (heard | (lost < 1.0)) & (label[:, None] != label)
-        open_ = np.unique(label[foreign.any(axis=0)])
-        closed = ~np.isin(np.arange(label.max(initial=-1) + 1), open_)
-        return Components(label, hops, loss, bool(within.any()), closed, heard.T)
+        """Return the connected components at a tick; the same object while no link changes."""
+        distance, usable = self._links(tick.position, tick.alive)
+        lost = np.where(usable, self._lost_over(MULTIHOP, distance), 1.0)
+        heard = usable & (self._lost_over(LOCAL, distance) < 1.0)
+        of = lost.tobytes(), heard.tobytes(), tick.alive.tobytes()
+        if self._found is None or of != self._found_of:
+            self._found, self._found_of = _found(lost, heard, tick.alive), of
+        return self._found
 
     def groups(self, position: Floats, alive: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return the group of agents (N,) in which beacons of each come to each; -1 for the others.
 
         position (N, 3) [m; world frame]; alive: the agents that take part.
         """
-        return _components(self._lost(LOCAL, position, alive) < 1.0, alive)
+        distance, usable = self._links(position, alive)
+        linked = usable & (self._lost_over(LOCAL, distance) < 1.0)
+        return _labels(_reached(_neighbours(linked)).rows, alive)
 
     def dissemination_s(self, agents: int, hops: int, loss: float | None = None) -> float:
         """Return B [s]: a record reaches every agent in this time, with probability 1 - 1e-6.
@@ -142,33 +142,37 @@ class Connectivity:
         cut = [[self._network.partitions(a, b) for b in rows] for a in rows]
         self._cut = np.array(cut, dtype=np.bool_)
 
-    def _lost(self, channel: int, position: Floats, alive: NDArray[np.bool_]) -> Floats:
-        """Return the share of a channel's frames that each link loses, from row to column (N, N).
+    def _links(
+        self, position: Floats, alive: NDArray[np.bool_]
+    ) -> tuple[Floats, NDArray[np.bool_]]:
+        """Return the distance (N, N) [m] of each link, and whether frames may get over it.
 
-        It is 1 where no frame gets through, and to the agent itself.
+        None gets from an agent to itself. position (N, 3) [m; world frame].
         """
         away = position[:, None] - position[None]
-        distance = np.sqrt(np.sum(away * away, axis=2))
-        lost = self._lost_over(channel, distance)
         usable = ~self._cut & alive[:, None] & alive
         if self._network.obstructed:
             free = [not self._network.jammed((x, y, z)) for x, y, z in position.tolist()]
             usable &= np.outer(free, free)
         np.fill_diagonal(usable, val=False)
-        return np.where(usable, lost, 1.0)
+        return np.sqrt(np.sum(away * away, axis=2)), usable
 
     def _lost_over(self, channel: int, distance: Floats) -> Floats:
-        """Return the share of a channel's frames that links lose over distances (N, N) [m]."""
+        """Return the share of a channel's frames that links lose over distances (N, N) [m].
+
+        It is 1 where no frame gets through.
+        """
         models, common = self._network.models, self._network.models.of_channel(channel)
-        if models.alike(channel) and common.path_loss is None:
-            return np.where(distance <= common.reach_m, unusable_share(common, 0.0), 1.0)
-        rows = distance.tolist()
-        return np.array(
-            [
-                [unusable_share(models.of_link(channel, a, b), rows[a][b]) for b in self._rows]
-                for a in self._rows
-            ]
-        )
+        within, share = distance <= common.reach_m, unusable_share(common, 0.0)
+        lost = np.where(within, share, 1.0)
+        if common.path_loss is not None:
+            lost[within] = [unusable_share(common, each) for each in distance[within].tolist()]
+        if not models.alike(channel):
+            for a in self._rows:
+                if models.common(channel, a) is None:
+                    own = [models.of_link(channel, a, b) for b in self._rows]
+                    lost[a] = list(map(unusable_share, own, distance[a].tolist()))
+        return lost
 
 
 @cache
@@ -197,20 +201,69 @@ def _longest_queued_s(model: LinkModel) -> float:
     return min(MAX_QUEUED_S, size_bit / (1000.0 * model.rate_kbit))
 
 
-def _components(linked: NDArray[np.bool_], alive: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the strongly connected component of each running agent (N,), -1 for the others.
+def _found(lost: Floats, heard: NDArray[np.bool_], alive: NDArray[np.bool_]) -> Components:
+    """Return the components where links lose these shares, and beacons are heard over some.
 
-    linked: whether frames get through, from row to column (N, N).
+    lost, heard: (N, N), from row to column. alive: (N,), the running agents.
     """
-    reaches = linked | np.eye(len(linked), dtype=np.bool_)
-    for _ in range(len(linked).bit_length()):
-        # Counts of paths: exact in single precision, and far faster than booleans.
-        paths = reaches.astype(np.float32)
-        reaches = paths @ paths > 0.0
-    mutual = reaches & reaches.T
-    first = np.where(alive, np.argmax(mutual, axis=1), -1)
-    label = np.searchsorted(np.unique(first[alive]), first)
-    return np.where(alive, label, -1)
+    reached = _reached(_neighbours(lost < 1.0))
+    label = _labels(reached.rows, alive)
+    inside = label[:, None] == label
+    within = lost[(lost < 1.0) & inside]
+    losses = np.unique(within)
+    loss = _weakest(lost, label, losses)
+    if len(losses) > 1 or not inside.all():
+        reached = _reached(_neighbours((lost <= loss) & inside))
+    foreign = (heard | (lost < 1.0)) & ~inside
+    open_ = np.unique(label[foreign.any(axis=0)])
+    closed = ~np.isin(np.arange(label.max(initial=-1) + 1), open_)
+    return Components(label, reached.hops, loss, bool(within.any()), closed, heard.T)
+
+
+class _Reached(NamedTuple):
+    """Which agents each agent reaches over any number of links."""
+
+    rows: list[int]
+    """Of each agent, itself included; bit j: agent j."""
+    hops: int
+    """The most hops from one agent to another that it reaches."""
+
+
+def _neighbours(linked: NDArray[np.bool_]) -> list[list[int]]:
+    """Return the agents to which frames of each get through. linked: (N, N), row to column."""
+    found: list[list[int]] = [[] for _ in range(len(linked))]
+    for row, column in np.argwhere(linked).tolist():
+        found[row].append(column)
+    return found
+
+
+def _reached(neighbours: list[list[int]]) -> _Reached:
+    """Return which agents each reaches: one hop farther in each round, for all at once."""
+    rows, hops = [1 << row for row in range(len(neighbours))], 0
+    while True:
+        farther = []
+        for row, found in enumerate(neighbours):
+            reached = rows[row]
+            for each in found:
+                reached |= rows[each]
+            farther.append(reached)
+        if farther == rows:
+            return _Reached(rows, hops)
+        rows, hops = farther, hops + 1
+
+
+def _labels(reached: list[int], alive: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the strongly connected component of each running agent (N,), -1 for the others."""
+    label, count = [-1] * len(reached), 0
+    running = np.flatnonzero(alive).tolist()
+    for row in running:
+        if label[row] >= 0:
+            continue
+        for other in running:
+            if reached[row] >> other & 1 and reached[other] >> row & 1:
+                label[other] = count
+        count += 1
+    return np.array(label, dtype=np.int64)
 
 
 def _weakest(lost: Floats, label: NDArray[np.int64], losses: Floats) -> float:
@@ -222,20 +275,9 @@ def _weakest(lost: Floats, label: NDArray[np.int64], losses: Floats) -> float:
     low, high = 0, len(losses) - 1
     while low < high:
         middle = (low + high) // 2
-        if np.array_equal(_components(lost <= losses[middle], label >= 0), label):
+        reached = _reached(_neighbours(lost <= losses[middle])).rows
+        if np.array_equal(_labels(reached, label >= 0), label):
             high = middle
         else:
             low = middle + 1
     return float(losses[high]) if len(losses) else 0.0
-
-
-def _hops_from(row: int, linked: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the number of hops from a row to each row (N,); -1 where there is no path."""
-    distance = np.full(len(linked), -1)
-    frontier = np.zeros(len(linked), dtype=np.bool_)
-    frontier[row], hops = True, 0
-    while frontier.any():
-        distance[frontier] = hops
-        frontier = linked[frontier].any(axis=0) & (distance < 0)
-        hops += 1
-    return distance

@@ -49,7 +49,7 @@ from worldsim.judge.run_events import (
     SlotChanged,
 )
 from worldsim.judge.shared_places import Claims, SharedPlaces
-from worldsim.judge.tick import Tick
+from worldsim.judge.tick import Tick, same_claims
 from worldsim.scenario.tables import CONVERGED_S, Scenario
 
 COMPONENTS_EVERY_S = 1.0
@@ -85,6 +85,9 @@ class Invariants:
         self._members: list[list[int]] = []
         """The rows of each component."""
         self._seen: tuple[object, ...] = ()
+        """What the breaches were found from."""
+        self._seen_in: tuple[Tick, Phase, Components | None] | None = None
+        """The same in short, where all agents are in one component; else None."""
         self._claims: Claims = []
         self._blocked_last: list[frozenset[Place] | None] = []
         """For each component, the places in which others hover."""
@@ -128,7 +131,7 @@ class Invariants:
         """Evaluate a tick; in_place: whether every running agent is in its place."""
         if tick.time_s >= self._components_due_s:
             self._find_components(tick)
-        parted = len(self._members) > 1 or not tick.alive.all()
+        parted = len(self._members) > 1 or False in tick.alive.tolist()
         self._places.see(tick, parted=parted, news_s=self._twice_s)
         last_claims = self._claims
         self._find_breaches(tick, phase)
@@ -196,7 +199,7 @@ class Invariants:
         found = self._connectivity.components(tick)
         self._places.hear(found.hears)
         last, self._components, self._members = self._components, found, found.members()
-        if last is not None and not last.same_as(found):
+        if last is not None and last is not found and not last.same_as(found):
             self._restart_premises(tick.time_s)
             self._before = last.hops, last.loss
         if self._shared.local and len(self._claims):
@@ -209,8 +212,12 @@ class Invariants:
 
     def _find_breaches(self, tick: Tick, phase: Phase) -> None:
         """Find the breaches of a tick; they hold until a claim or a blocked place changes."""
+        if self._is_as_before(tick, phase):
+            return
         members = self._members
         blocked = [self._blocked(tick, phase, rows) for rows in members]
+        whole = len(members) == 1 and len(members[0]) == len(tick.alive)
+        self._seen_in = (tick, phase, self._components) if whole else None
         seen = (
             *(rows.tobytes() for rows in (tick.place, tick.alive, tick.mission)),
             *self._members_key(),
@@ -228,6 +235,13 @@ class Invariants:
         self._breaches = self._judged(phase, blocked)
         hears = self._components.hears if self._components is not None else None
         self._shared.find(self._claims, members, hears)
+
+    def _is_as_before(self, tick: Tick, phase: Phase) -> bool:
+        """Return whether the breaches are those of the last tick, without looking further."""
+        if self._seen_in is None:
+            return False
+        last, of, components = self._seen_in
+        return phase is of and components is self._components and same_claims(last, tick)
 
     def _members_key(self) -> tuple[bytes, ...]:
         """Return what changes with the components."""

@@ -37,16 +37,17 @@ class HierarchyRows:
 class Tick:
     """One tick of truth and telemetry.
 
-    Row i is agent i. NaN means that the vehicle is not in the world.
+    Row i is agent i. NaN means that the vehicle is not in the world. Where ticks are not recorded,
+    what is not judged is NaN or empty.
     """
 
     index: int
     time_s: float  # simulated time [s]
     position: Floats  # (N, 3) [m; world frame]
     attitude: Float32s  # (N, 3) yaw, pitch, roll [rad]
-    target: Float32s  # (N, 3) target-on-queue [m; world frame], NaN for none
+    target: Float32s  # (N, 3) target-on-queue [m; world frame], NaN for none; not judged
     place: NDArray[np.int16]  # (N, 2) queue and rank claimed, -1 for none
-    force: Float32s  # (N,) |u_i| of (28)
+    force: Float32s  # (N,) |u_i| of (28); not judged
     turn_deg: Floats  # (N,) desired azimuth minus heading [deg], NaN for a step without motion
     alive: NDArray[np.bool_]  # (N,) whether the process takes part, and is not paused
     links: NDArray[np.int32]  # (L, 2) hearer and heard
