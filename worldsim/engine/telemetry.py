@@ -1,7 +1,7 @@
 """The newest telemetry of each agent, and the tick that truth and telemetry make together."""
 
 from math import atan2, degrees, hypot, nan, pi
-from typing import Final
+from typing import Final, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from agent.messages import NO_MISSION, Telemetry, Vector
 from worldsim.judge.tick import HierarchyRows, Packets, Tick
 from worldsim.truth.world import World
 
+_Row = TypeVar("_Row")
 MOVING_MPS: Final = 0.02
 """A slower step has no azimuth [m/s]."""
 NO_TARGET = (nan, nan, nan)
@@ -31,20 +32,45 @@ NO_TELEMETRY = Telemetry(
 """The row of an agent that has sent none."""
 
 
+@final
+class _Claims:
+    """What each agent claims in a tick; row i = agent i, NO_TELEMETRY for one not running."""
+
+    def __init__(self, newest: list[Telemetry], running: NDArray[np.bool_]) -> None:
+        self.alive = running.copy()
+        self.up: list[bool] = running.tolist()
+        rows = self.among(newest, NO_TELEMETRY)
+        self.place = np.array([row.place or NO_PLACE for row in rows], dtype=np.int16)
+        self.mission = np.array([row.mission for row in rows], dtype=np.int64)
+        for each in (self.alive, self.place, self.mission):
+            each.flags.writeable = False  # many ticks share them
+
+    def among(self, rows: list[_Row], none: _Row) -> list[_Row]:
+        """Return the rows of the agents that are running, and ``none`` for the others."""
+        return [row if runs else none for row, runs in zip(rows, self.up, strict=True)]
+
+
 class FleetTelemetry:
     """The newest telemetry of each agent; row i = agent i."""
 
     def __init__(self, rows: int) -> None:
         self._newest = [NO_TELEMETRY] * rows
         self._turn_deg = [nan] * rows
+        self._claims: _Claims | None = None
+        """None once an agent claims another place or mission."""
+        self._no_reasons = np.full((rows, 4), nan, dtype=np.float32)
 
     def update(self, agent: int, telemetry: Telemetry, heading: float) -> None:
         """Keep an agent's telemetry; heading: the yaw that it observed [rad; world frame]."""
+        last = self._newest[agent]
+        if telemetry.place != last.place or telemetry.mission != last.mission:
+            self._claims = None
         self._newest[agent] = telemetry
         self._turn_deg[agent] = _turn_deg(telemetry.wanted, heading)
 
     def forget(self, agent: int) -> None:
         """Drop the telemetry of an agent's earlier incarnation."""
+        self._claims = None
         self._newest[agent] = NO_TELEMETRY
         self._turn_deg[agent] = nan
 
@@ -53,37 +79,38 @@ class FleetTelemetry:
     ) -> Tick:
         """Return the present tick; agents that are not running have no telemetry in it.
 
-        running: (N,). recorded: also fill links and hierarchy, which are recorded and not judged.
+        running: (N,). recorded: also fill what is recorded and not judged: targets, forces, links
+        and the hierarchy.
         """
-        rows, turns_deg = self._rows(running)
-        reasons = np.array(
-            [(*(row.target or NO_TARGET), row.force) for row in rows], dtype=np.float32
-        )
+        claims = self._claims_of(running)
+        rows = claims.among(self._newest, NO_TELEMETRY) if recorded else []
+        reasons = _reasons(rows) if recorded else self._no_reasons
         return Tick(
             index=world.slot // world.clock.slots_per_tick,
             time_s=world.time_s,
             position=world.vehicles.position.copy(),
             attitude=_attitude(world),
             target=reasons[:, :3],
-            place=np.array([row.place or NO_PLACE for row in rows], dtype=np.int16),
+            place=claims.place,
             force=reasons[:, 3],
-            turn_deg=np.array(turns_deg, dtype=np.float64),
-            alive=running.copy(),
-            mission=np.array([row.mission for row in rows], dtype=np.int64),
+            turn_deg=np.array(claims.among(self._turn_deg, nan), dtype=np.float64),
+            alive=claims.alive,
+            mission=claims.mission,
             links=_links(rows) if recorded else NO_LINKS,
             packets=packets,
             hierarchy=_hierarchy_rows(rows) if recorded else None,
         )
 
-    def _rows(self, running: NDArray[np.bool_]) -> tuple[list[Telemetry], list[float]]:
-        """Return the telemetry and the turn [deg] of each agent that is running."""
-        up = running.tolist()
-        if False not in up:
-            return self._newest, self._turn_deg
-        return (
-            [row if runs else NO_TELEMETRY for row, runs in zip(self._newest, up, strict=True)],
-            [turn if runs else nan for turn, runs in zip(self._turn_deg, up, strict=True)],
-        )
+    def _claims_of(self, running: NDArray[np.bool_]) -> _Claims:
+        claims = self._claims
+        if claims is None or claims.alive.tobytes() != running.tobytes():
+            claims = self._claims = _Claims(self._newest, running)
+        return claims
+
+
+def _reasons(rows: list[Telemetry]) -> NDArray[np.float32]:
+    """Return each agent's target-on-queue and force (N, 4)."""
+    return np.array([(*(row.target or NO_TARGET), row.force) for row in rows], dtype=np.float32)
 
 
 def _attitude(world: World) -> NDArray[np.float32]:
