@@ -116,7 +116,7 @@ class SlotLoop:
         self._recorder = recorder
         self._records_ticks = recorder is not None and recorder.records_ticks
         self._packets = packets
-        self._headings: list[float] = world.vehicles.yaw.tolist()
+        self._headings = list(world.vehicles.yaws)
         """The yaw that each agent last observed [rad; world frame]."""
         self._telemetry = FleetTelemetry(scenario.rows)
 

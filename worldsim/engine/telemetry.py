@@ -88,7 +88,7 @@ class FleetTelemetry:
         return Tick(
             index=world.slot // world.clock.slots_per_tick,
             time_s=world.time_s,
-            position=world.vehicles.position.copy(),
+            position=world.vehicles.position,
             attitude=_attitude(world),
             target=reasons[:, :3],
             place=claims.place,
@@ -114,9 +114,8 @@ def _reasons(rows: list[Telemetry]) -> NDArray[np.float32]:
 
 
 def _attitude(world: World) -> NDArray[np.float32]:
-    attitude = np.empty((len(world.vehicles.yaw), 3), dtype=np.float32)
-    attitude[:, 0], attitude[:, 1:] = world.vehicles.yaw, world.vehicles.tilt
-    return attitude
+    poses = zip(world.vehicles.yaws, world.vehicles.tilts, strict=True)
+    return np.array([(yaw, *tilt) for yaw, tilt in poses], dtype=np.float32)
 
 
 def _links(rows: list[Telemetry]) -> NDArray[np.int32]:

@@ -13,8 +13,7 @@ class Trace:
 
     def poses(self, slot: int, vehicles: Vehicles) -> None:
         """Add the poses at the start of a slot."""
-        rows = vehicles.position.tobytes() + vehicles.yaw.tobytes() + vehicles.tilt.tobytes()
-        self._hash.update(slot.to_bytes(8, "little") + rows)
+        self._hash.update(slot.to_bytes(8, "little") + vehicles.pose_bytes())
 
     def command(self, agent: int, command: bytes) -> None:
         """Add one agent's encoded command; agents come in ascending order."""

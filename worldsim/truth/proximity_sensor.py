@@ -1,15 +1,17 @@
 """The proximity sensor: relative positions of near vehicles and of near obstacles' surfaces."""
 
-from typing import Final, final
+from math import nan
+from typing import final
 
 import numpy as np
 
 from agent.messages import MAX_OBSTACLE_POINTS, PROXIMITY_RANGE_M, Vector
+from netem.range_index import RangeIndex
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
 
-ARRAYS_FROM: Final = 40
-"""Number of vehicles from which arrays are faster."""
+Positions = tuple[Vector | None, ...]
+NOWHERE = (nan, nan, nan)
 
 
 @final
@@ -38,42 +40,47 @@ class ProximitySensor:
         self.seed = seed
         self._noise_m = noise_m
         self._obstacles = obstacles
+        self._index = RangeIndex(0, ())
 
     def read(
-        self, position: Floats, agents: list[int], slot: int, time_s: float
+        self, position: Positions, agents: list[int], slot: int, time_s: float
     ) -> list[ProximityReading]:
         """Return the readings of some agents, in their order.
 
-        position: of all vehicles (N, 3) [m; world frame], NaN for no vehicle.
+        position: of all vehicles [m; world frame], None for no vehicle.
         """
-        vehicles = self._vehicles(position, agents)
+        if len(self._index.positions) != len(position):
+            self._index = RangeIndex(len(position), tuple(range(len(position))))
+        self._index.place(position)
+        vehicles = [self._vehicles(position, agent) for agent in agents]
         points = self._obstacle_points(position, agents, time_s) if len(self._obstacles) else None
         return [
             self._reading(near, points[row] if points is not None else None, agents[row], slot)
             for row, near in enumerate(vehicles)
         ]
 
-    def _vehicles(self, position: Floats, agents: list[int]) -> list[list[Vector]]:
-        """Return the vehicles near each agent [m; relative].
+    def _vehicles(self, position: Positions, agent: int) -> list[Vector]:
+        """Return the vehicles near an agent [m; relative]."""
+        found: list[Vector] = []
+        here = position[agent]
+        if here is None:
+            return found
+        x, y, z = here
+        for row in self._index.near(agent, PROXIMITY_RANGE_M):
+            there = position[row]
+            if there is None or row == agent:
+                continue
+            dx, dy, dz = there[0] - x, there[1] - y, there[2] - z
+            if dx * dx + dy * dy + dz * dz <= PROXIMITY_RANGE_M**2:
+                found.append((dx, dy, dz))
+        return found
 
-        Small fleets are searched in a loop over plain floats, large ones as arrays, by the same
-        operations.
-        """
-        if len(position) < ARRAYS_FROM:
-            rows: list[Vector] = list(map(tuple, position.tolist()))
-            return [_vehicles_by_loop(rows, agent) for agent in agents]
-        relative = position - position.take(agents, axis=0)[:, None]
-        square = relative * relative
-        near = square[:, :, 0] + square[:, :, 1] + square[:, :, 2] <= PROXIMITY_RANGE_M**2
-        near[np.arange(len(agents)), agents] = False
-        return [
-            [(x, y, z) for x, y, z in relative[row, near[row]].tolist()]
-            for row in range(len(agents))
-        ]
-
-    def _obstacle_points(self, position: Floats, agents: list[int], time_s: float) -> list[Floats]:
+    def _obstacle_points(
+        self, position: Positions, agents: list[int], time_s: float
+    ) -> list[Floats]:
         """Return the nearest points of obstacles near each agent, (K, 3) [m; relative]."""
-        distance, outward = self._obstacles.nearest(position.take(agents, axis=0), time_s)
+        points = np.array([position[agent] or NOWHERE for agent in agents])
+        distance, outward = self._obstacles.nearest(points, time_s)
         found = []
         for row in range(len(agents)):
             near = np.flatnonzero(distance[row] <= PROXIMITY_RANGE_M)
@@ -98,13 +105,3 @@ class ProximitySensor:
         generator = np.random.Generator(np.random.Philox(key=[self.seed, agent << 40 | slot]))
         noisy = np.array(true) + self._noise_m * generator.standard_normal((len(true), 3))
         return tuple([(x, y, z) for x, y, z in noisy.tolist()])
-
-
-def _vehicles_by_loop(rows: list[Vector], agent: int) -> list[Vector]:
-    x, y, z = rows[agent]
-    near: list[Vector] = []
-    for row, (a, b, c) in enumerate(rows):
-        dx, dy, dz = a - x, b - y, c - z
-        if dx * dx + dy * dy + dz * dz <= PROXIMITY_RANGE_M**2 and row != agent:
-            near.append((dx, dy, dz))
-    return near

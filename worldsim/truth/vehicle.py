@@ -1,20 +1,21 @@
-"""Vehicles as arrays: every row is one vehicle, in the world frame, in SI units.
-
-Only + - * / sqrt and rounding act across rows here, so that a trace is the same in every clock.
-"""
+"""Vehicles: every row is one vehicle, in the world frame, in SI units."""
 
 from collections.abc import Sequence
-from math import cos, isnan, sin, sqrt
-from typing import NamedTuple, assert_never
+from math import cos, inf, isnan, nan, sin, sqrt, tau
+from struct import pack
+from typing import Final, NamedTuple, assert_never, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agent.config import Vehicle
-from agent.messages import FLIGHT_M, Vector
+from agent.messages import FLIGHT_M, ZERO, Vector
 
 Floats = NDArray[np.float64]
-_TURN = 2.0 * np.pi
+Tilt = tuple[float, float]
+"""Pitch and roll [rad]."""
+LEVEL: Tilt = (0.0, 0.0)
+_TURN: Final = tau
 
 
 class Poses(NamedTuple):
@@ -26,63 +27,104 @@ class Poses(NamedTuple):
     """(N,) [rad; world frame]"""
 
 
-def wrapped(angle: Floats) -> Floats:
-    """Return angles [rad] in [-pi, pi]."""
-    return angle - _TURN * np.rint(angle / _TURN)
+def wrapped(angle: float) -> float:
+    """Return an angle [rad] in [-pi, pi]."""
+    turns = angle / _TURN
+    if -0.5 <= turns <= 0.5:
+        return angle + 0.0  # no negative zero
+    return angle - _TURN * round(turns)
 
 
+@final
 class Vehicles:
-    """Vehicles of all kinds, which move within their limits; a row of NaN is not in the world."""
+    """Vehicles of all kinds, which move within their limits; a row of NaN is not in the world.
+
+    Rows of plain numbers; the arrays are copies.
+    """
 
     def __init__(self, position: Floats, yaw: Floats, limits: Sequence[Vehicle]) -> None:
-        self.position = position.astype(np.float64)
-        """(N, 3) [m; world frame]"""
-        self.velocity = np.zeros_like(self.position)
-        """(N, 3) [m/s; world frame]"""
-        self.yaw = yaw.astype(np.float64)
-        """(N,) [rad; world frame]"""
-        self.tilt = np.zeros((len(self.yaw), 2))
-        """(N, 2): pitch and roll [rad]."""
-        self._max_tilt = np.radians([[each.max_tilt_deg] for each in limits])
-        self._tilts = bool(self._max_tilt.any())
-        self._max_accel = np.array([[_max_accel_mps2(each)] for each in limits])
-        self._accelerates = bool(np.isfinite(self._max_accel).any())
-        self._forward = [row for row, each in enumerate(limits) if _flies_forward(each)]
+        self.positions: list[Vector] = [(x, y, z) for x, y, z in position.tolist()]
+        """[m; world frame]"""
+        self.velocities: list[Vector] = [ZERO for _ in limits]
+        """[m/s; world frame]"""
+        self.yaws: list[float] = yaw.tolist()
+        """[rad; world frame]"""
+        self.tilts: list[Tilt] = [LEVEL for _ in limits]
+        """Pitch and roll [rad]."""
+        self._max_tilt: list[float] = np.radians([each.max_tilt_deg for each in limits]).tolist()
+        self._tilts = any(self._max_tilt)
+        self._max_accel = [_max_accel_mps2(each) for each in limits]
+        self._forward = [_flies_forward(each) for each in limits]
         self._max_speed = [each.max_speed_mps for each in limits]
         self._max_climb = [each.max_climb_mps for each in limits]
-        self._max_yaw_rate = np.radians([each.max_yaw_rate_dps for each in limits])
+        rates_dps = [each.max_yaw_rate_dps for each in limits]
+        self._max_yaw_rate: list[float] = np.radians(rates_dps).tolist()
 
     def __len__(self) -> int:
-        return len(self.yaw)
+        return len(self.yaws)
+
+    @property
+    def position(self) -> Floats:
+        """Return the positions (N, 3) [m; world frame]."""
+        return np.array(self.positions)
+
+    @property
+    def velocity(self) -> Floats:
+        """Return the velocities (N, 3) [m/s; world frame]."""
+        return np.array(self.velocities)
+
+    @property
+    def yaw(self) -> Floats:
+        """Return the yaws (N,) [rad; world frame]."""
+        return np.array(self.yaws)
+
+    @property
+    def tilt(self) -> Floats:
+        """Return pitch and roll (N, 2) [rad]."""
+        return np.array(self.tilts)
+
+    def pose_bytes(self) -> bytes:
+        """Return all positions, then all yaws, then all tilts, as doubles."""
+        row = [axis for each in self.positions for axis in each]
+        row += self.yaws
+        row += [angle for each in self.tilts for angle in each]
+        return pack(f"{len(row)}d", *row)
 
     def place(self, row: int, position: Vector, yaw: float) -> None:
         """Put a vehicle into the world [m; world frame, rad], at rest and level."""
-        self.position[row], self.velocity[row], self.tilt[row] = position, 0.0, 0.0
-        self.yaw[row] = yaw
+        self.positions[row], self.yaws[row] = position, yaw
+        self.velocities[row], self.tilts[row] = ZERO, LEVEL
 
     def remove(self, row: int) -> None:
         """Take a vehicle out of the world."""
-        self.position[row] = self.yaw[row] = np.nan
-        self.velocity[row] = self.tilt[row] = 0.0
+        self.place(row, (nan, nan, nan), nan)
 
-    def integrate(self, velocity: Floats, yaw: Floats, tilt: Floats, dt: float) -> None:
-        """Fly for ``dt`` [s] at velocities (N, 3) [m/s], towards yaws (N,) and tilts (N, 2) [rad].
+    def integrate(
+        self, velocity: Sequence[Vector], yaw: Sequence[float], tilt: Sequence[Tilt], dt: float
+    ) -> None:
+        """Fly for ``dt`` [s] at velocities [m/s], towards yaws and tilts [rad], one for each.
 
         The velocities must be within the vehicles' limits of speed and climb.
         """
-        velocity = velocity.copy()
-        for row in self._forward:
-            velocity[row] = self._along_heading(row, velocity[row])
-        if self._accelerates:
-            velocity = self._accelerated(velocity, dt)
-        self.velocity = velocity
-        moved = self.position + velocity * dt
-        self.position = np.minimum(np.maximum(moved, -FLIGHT_M), FLIGHT_M)
-        reach = self._max_yaw_rate * dt
-        turn = np.minimum(np.maximum(wrapped(yaw - self.yaw), -reach), reach)
-        self.yaw = wrapped(self.yaw + turn)
-        if self._tilts:
-            self._tilt_towards(tilt, reach[:, None])
+        for row, (x, y, z) in enumerate(self.positions):
+            flown = velocity[row]
+            if self._forward[row]:
+                flown = self._along_heading(row, flown)
+            if self._max_accel[row] < inf:
+                flown = self._accelerated(row, flown, dt)
+            self.velocities[row] = flown
+            if isnan(x):
+                continue
+            u, v, w = flown
+            self.positions[row] = (
+                _within(x + u * dt, FLIGHT_M),
+                _within(y + v * dt, FLIGHT_M),
+                _within(z + w * dt, FLIGHT_M),
+            )
+            reach, now = self._max_yaw_rate[row] * dt, self.yaws[row]
+            self.yaws[row] = wrapped(now + _within(wrapped(yaw[row] - now), reach))
+            if self._tilts:
+                self._tilt_towards(row, tilt[row], reach)
 
     def within_limits(self, row: int, velocity: Vector) -> Vector:
         """Return a velocity [m/s] scaled down to a vehicle's limits of speed and climb."""
@@ -94,29 +136,34 @@ class Vehicles:
         scale = min(1.0, max_speed / sqrt(square), max_climb / max(abs(z), 1e-12))
         return x * scale, y * scale, z * scale
 
-    def _along_heading(self, row: int, velocity: Floats) -> Vector:
+    def _along_heading(self, row: int, velocity: Vector) -> Vector:
         """Return the part of a velocity [m/s] that a vehicle flies which only moves forward."""
-        x, y, z = velocity.tolist()
-        yaw = float(self.yaw[row])
+        x, y, z = velocity
+        yaw = self.yaws[row]
         c, s = (0.0, 0.0) if isnan(yaw) else (cos(yaw), sin(yaw))
         forward = max(0.0, c * x + s * y)
         return c * forward, s * forward, z
 
-    def _accelerated(self, velocity: Floats, dt: float) -> Floats:
-        """Return the velocities [m/s] reached after ``dt`` [s] towards those commanded."""
-        change = velocity - self.velocity
-        size = np.sqrt(
-            change[:, :1] * change[:, :1]
-            + change[:, 1:2] * change[:, 1:2]
-            + change[:, 2:] * change[:, 2:]
-        )
-        share = np.minimum(1.0, self._max_accel * dt / np.maximum(size, 1e-12))
+    def _accelerated(self, row: int, velocity: Vector, dt: float) -> Vector:
+        """Return the velocity [m/s] reached after ``dt`` [s] towards one that is commanded."""
+        (x, y, z), (u, v, w) = self.velocities[row], velocity
+        du, dv, dw = u - x, v - y, w - z
+        size = sqrt(du * du + dv * dv + dw * dw)
+        share = self._max_accel[row] * dt / max(size, 1e-12)
         # A share of 1 would add rounding errors to vehicles that reach any velocity at once.
-        return np.where(share < 1.0, self.velocity + share * change, velocity)
+        return (x + share * du, y + share * dv, z + share * dw) if share < 1.0 else velocity
 
-    def _tilt_towards(self, tilt: Floats, reach: Floats) -> None:
-        tilt = np.minimum(np.maximum(tilt, -self._max_tilt), self._max_tilt)
-        self.tilt = self.tilt + np.minimum(np.maximum(tilt - self.tilt, -reach), reach)
+    def _tilt_towards(self, row: int, tilt: Tilt, reach: float) -> None:
+        (pitch, roll), most = self.tilts[row], self._max_tilt[row]
+        self.tilts[row] = (
+            pitch + _within(_within(tilt[0], most) - pitch, reach),
+            roll + _within(_within(tilt[1], most) - roll, reach),
+        )
+
+
+def _within(value: float, most: float) -> float:
+    """Return a value limited to [-most, most]."""
+    return -most if value < -most else most if value > most else value
 
 
 def _max_accel_mps2(vehicle: Vehicle) -> float:

@@ -5,16 +5,14 @@ A pure state machine over slots. ``slot`` counts them; ``time_s`` is slot / slot
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
+from math import isnan
 
 from agent.config import Vehicle
-from agent.messages import Command, Observation, Scan, Vector
+from agent.messages import ZERO, Command, Observation, Scan, Vector
 from worldsim.truth.proximity_sensor import NO_READING, ProximitySensor
 from worldsim.truth.scanning_sensors import ScanningSensors
 from worldsim.truth.sensor_faults import SensorFaults
-from worldsim.truth.vehicle import Poses, Vehicles
+from worldsim.truth.vehicle import LEVEL, Poses, Tilt, Vehicles
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +58,8 @@ class World:
         self.clock = clock
         self.slot = 0
         self.vehicles = Vehicles(start.position, start.yaw, limits)
-        self._absent = {*np.flatnonzero(np.isnan(start.position[:, 0])).tolist()}
-        """The agents without a vehicle in the world."""
+        self._positions: tuple[Vector | None, ...] | None = None
+        """Of the present slot; None until they are needed."""
         self.latest: list[Command | None] = [None] * rows
         """The last accepted command of each agent."""
         self.discarded = 0
@@ -71,12 +69,13 @@ class World:
         self._proximity = proximity
         self._scanning = scanning
         self._max_validity = command_ticks * clock.slots_per_tick
-        self._expires = np.zeros(rows, dtype=np.int64)
-        # One row for velocity, yaw, pitch and roll, so that a command is one assignment.
-        self._commanded = np.zeros((rows, 6))
-        self._velocity, self._tilt = self._commanded[:, :3], self._commanded[:, 4:]
-        self._yaw = self._commanded[:, 3]
-        self._yaw[:] = self.vehicles.yaw
+        self._expires = [0] * rows
+        """The slot in which each agent's command expires."""
+        self._first_expires = 0
+        """No command expires before this slot."""
+        self._velocity: list[Vector] = [ZERO] * rows
+        self._yaw = list(self.vehicles.yaws)
+        self._tilt: list[Tilt] = [LEVEL] * rows
 
     @property
     def time_s(self) -> float:
@@ -85,26 +84,26 @@ class World:
 
     def positions(self) -> tuple[Vector | None, ...]:
         """Return true positions, row i = agent i [m; world frame], None where there is none."""
-        found: list[Vector | None] = list(map(tuple, self.vehicles.position.tolist()))
-        for agent in self._absent:
-            found[agent] = None
-        return tuple(found)
+        found = self._positions
+        if found is None:
+            found = tuple([None if isnan(each[0]) else each for each in self.vehicles.positions])
+            self._positions = found
+        return found
 
     def enter(self, agent: int, position: Vector, yaw: float) -> None:
         """Put an agent's vehicle into the world [m; world frame, rad]; it hovers."""
         self.vehicles.place(agent, position, yaw)
-        self._absent.discard(agent)
         self._halt(agent)
 
     def leave(self, agent: int) -> None:
         """Take an agent's vehicle out of the world."""
         self.vehicles.remove(agent)
-        self._absent.add(agent)
         self._halt(agent)
 
     def observe(self, agents: list[int]) -> list[Observation]:
         """Return the present slot's observations of some agents, in their order."""
-        read = self._proximity.read(self.vehicles.position, agents, self.slot, self.time_s)
+        slot, time_s, vehicles = self.slot, self.time_s, self.vehicles
+        read = self._proximity.read(self.positions(), agents, slot, time_s)
         readings = [
             each if self._has_proximity[agent] else NO_READING
             for agent, each in zip(agents, read, strict=True)
@@ -116,25 +115,19 @@ class World:
                 for agent, each in zip(agents, readings, strict=True)
             ]
             scans = {a: self.sensor_faults.scans(a, each, self.slot) for a, each in scans.items()}
-        slot, time_s = self.slot, self.time_s
-        position = map(tuple, self.vehicles.position.take(agents, axis=0).tolist())
-        velocity = map(tuple, self.vehicles.velocity.take(agents, axis=0).tolist())
-        yaw = self.vehicles.yaw.take(agents).tolist()
         return [
             Observation(
                 slot,
                 time_s,
-                here,
-                motion,
-                heading,
+                vehicles.positions[agent],
+                vehicles.velocities[agent],
+                vehicles.yaws[agent],
                 each.vehicles,
                 each.obstacles,
                 (),
                 scans.get(agent, ()),
             )
-            for agent, here, motion, heading, each in zip(
-                agents, position, velocity, yaw, readings, strict=True
-            )
+            for agent, each in zip(agents, readings, strict=True)
         ]
 
     def _scans(self, agents: list[int]) -> dict[int, tuple[Scan, ...]]:
@@ -160,25 +153,31 @@ class World:
             self.discarded += 1
             return False
         self.latest[agent] = command
-        self._expires[agent] = min(command.expires_slot, command.slot + self._max_validity)
-        velocity = self.vehicles.within_limits(agent, command.velocity)
-        self._commanded[agent] = (*velocity, command.yaw, *command.tilt)
+        expires = min(command.expires_slot, command.slot + self._max_validity)
+        self._expires[agent] = expires
+        self._first_expires = min(self._first_expires, expires)
+        self._velocity[agent] = self.vehicles.within_limits(agent, command.velocity)
+        self._yaw[agent], self._tilt[agent] = command.yaw, command.tilt
         return True
 
     def advance(self) -> None:
         """Fly through the present slot; a vehicle whose command has expired stops and hovers."""
-        expired = self._expires <= self.slot
-        if np.count_nonzero(expired):
-            self._hover(expired)
+        if self._first_expires <= self.slot:
+            self._hover_expired()
         self.vehicles.integrate(self._velocity, self._yaw, self._tilt, 1.0 / self.clock.slot_hz)
+        self._positions = None
         self.slot += 1
 
     def _halt(self, agent: int) -> None:
-        self._expires[agent] = 0
-        self._velocity[agent] = self._tilt[agent] = 0.0
-        self._yaw[agent] = self.vehicles.yaw[agent]
+        self._positions = None
+        self._expires[agent] = self._first_expires = 0
+        self._velocity[agent], self._tilt[agent] = ZERO, LEVEL
+        self._yaw[agent] = self.vehicles.yaws[agent]
 
-    def _hover(self, rows: NDArray[np.bool_]) -> None:
-        self._velocity[rows] = 0.0
-        self._yaw[rows] = self.vehicles.yaw[rows]
-        self._tilt[rows] = self.vehicles.tilt[rows]
+    def _hover_expired(self) -> None:
+        for agent, expires in enumerate(self._expires):
+            if expires <= self.slot:
+                self._velocity[agent] = ZERO
+                self._yaw[agent] = self.vehicles.yaws[agent]
+                self._tilt[agent] = self.vehicles.tilts[agent]
+        self._first_expires = min(self._expires)
