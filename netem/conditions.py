@@ -6,7 +6,8 @@ Faults that are in force together compose: changes of conditions apply in the or
 began, and a link is cut where any fault cuts it. Faults end by their number, in any order.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import Final, NamedTuple, TypeVar, assert_never
 
 import msgspec
@@ -14,6 +15,7 @@ import msgspec
 from netem.faults import FaultOrder, Flap, Heal, Jam, LastingFault, Partition, Position
 from netem.link_model import LinkModel
 from netem.link_parameters import RATE_KEYS, Conditions, LinkKeys
+from netem.range_index import InRange
 from netem.wire.channels import CHANNELS
 
 _Keys = TypeVar("_Keys", bound=LinkKeys)
@@ -67,6 +69,25 @@ class LinkModels:
         return self._reach_m.get((channel, source), self._channels[channel].reach_m)
 
 
+def differing(a: LinkModels, b: LinkModels, channel: int, source: int, near: InRange) -> int:
+    """Return how many of a source's links to receivers near it differ between two sets of models.
+
+    A link that is within its range by both, or out of it by both, does not differ by the range.
+    """
+    links = 0
+    for receiver, distance_m in near:
+        one, other = a.of_link(channel, source, receiver), b.of_link(channel, source, receiver)
+        if one is not other and distance_m <= max(one.reach_m, other.reach_m):
+            links += distance_m > min(one.reach_m, other.reach_m) or _differ_within(one, other)
+    return links
+
+
+@lru_cache(maxsize=256)
+def _differ_within(one: LinkModel, other: LinkModel) -> bool:
+    """Whether two links differ where both are in range."""
+    return msgspec.structs.replace(one, range_m=other.range_m) != other
+
+
 class PartitionCut:
     """The directed links that one partition cuts."""
 
@@ -116,9 +137,10 @@ class NetworkConditions:
     def __init__(self, base: Conditions) -> None:
         self._base = base
         self._in_force: dict[int, InForce] = {}
-        self._partitions: list[PartitionCut] = []
-        self._jams: list[Jam] = []
-        self._flaps: list[tuple[float, Flap]] = []
+        # What is in force of each kind, by the fault's number.
+        self._partitions: dict[int, PartitionCut] = {}
+        self._jams: dict[int, Jam] = {}
+        self._flaps: dict[int, tuple[float, Flap]] = {}
         """With the start of each [s; simulated time]."""
         self.conditions = base
         """The base conditions with all changes in force."""
@@ -126,6 +148,8 @@ class NetworkConditions:
         """The link models under these conditions."""
         self.obstructed = False
         """Whether any partition, jam or flap is in force."""
+        self.without: dict[int, LinkModels] = {}
+        """For each change of conditions in force, by number: the link models if it were not."""
 
     @property
     def in_force(self) -> Mapping[int, InForce]:
@@ -162,21 +186,34 @@ class NetworkConditions:
 
     def partitions(self, source: int, destination: int) -> bool:
         """Return whether a partition cuts a directed link."""
-        return any(partition.cuts(source, destination) for partition in self._partitions)
+        return any(partition.cuts(source, destination) for partition in self._partitions.values())
 
-    def cuts(self, source: int, destination: int, now_s: float) -> bool:
-        """Return whether a partition or a flap cuts a directed link at a time [s]."""
-        if self.partitions(source, destination):
-            return True
-        return any(
-            _is_down(flap, since_s, now_s)
-            for since_s, flap in self._flaps
-            if not flap.links or (source, destination) in flap.links
-        )
+    def cutters(
+        self,
+        source: int,
+        destination: int,
+        now_s: float,
+        radios: Sequence[Position | None] = (),
+    ) -> list[int]:
+        """Return the numbers of the faults that cut a directed link at a time [s].
+
+        radios: the positions of its two radios [m; world frame].
+        """
+        found = [
+            n for n, partition in self._partitions.items() if partition.cuts(source, destination)
+        ]
+        for number, (since_s, flap) in self._flaps.items():
+            on_link = not flap.links or (source, destination) in flap.links
+            if on_link and _is_down(flap, since_s, now_s):
+                found.append(number)
+        for number, jam in self._jams.items():
+            if any(each is not None and _is_within(jam, each) for each in radios):
+                found.append(number)
+        return found
 
     def jammed(self, position: Position) -> bool:
         """Return whether a radio at a position [m; world frame] is in a jam's sphere."""
-        return any(_is_within(jam, position) for jam in self._jams)
+        return any(_is_within(jam, position) for jam in self._jams.values())
 
     def _end_partitions(self) -> None:
         self._in_force = {
@@ -187,23 +224,35 @@ class NetworkConditions:
 
     def _refresh(self) -> None:
         """Derive the effects of the faults in force."""
-        self._partitions, self._jams, self._flaps = [], [], []
-        conditions = self._base
-        for since_s, fault in self._in_force.values():
+        self._partitions, self._jams, self._flaps = {}, {}, {}
+        changes: dict[int, Conditions] = {}
+        for number, (since_s, fault) in self._in_force.items():
             match fault:
                 case Conditions():
-                    conditions = overlaid(conditions, fault)
+                    changes[number] = fault
                 case Partition():
-                    self._partitions.append(PartitionCut(fault))
+                    self._partitions[number] = PartitionCut(fault)
                 case Jam():
-                    self._jams.append(fault)
+                    self._jams[number] = fault
                 case Flap():
-                    self._flaps.append((since_s, fault))
+                    self._flaps[number] = since_s, fault
                 case _:
                     assert_never(fault)
+        self.without = {
+            number: LinkModels(self._changed(each for n, each in changes.items() if n != number))
+            for number in changes
+        }
+        conditions = self._changed(changes.values())
         if conditions != self.conditions:
             self.conditions, self.models = conditions, LinkModels(conditions)
         self.obstructed = bool(self._partitions or self._jams or self._flaps)
+
+    def _changed(self, changes: Iterable[Conditions]) -> Conditions:
+        """Return the base conditions with some changes, in this order."""
+        conditions = self._base
+        for change in changes:
+            conditions = overlaid(conditions, change)
+        return conditions
 
 
 def overlaid(conditions: Conditions, change: Conditions) -> Conditions:

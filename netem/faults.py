@@ -95,6 +95,12 @@ class RadioEvent(
         assert_never(fault)
 
     @property
+    def radio_kind(self) -> str:
+        """The key that is set; empty where there is none."""
+        keys = RadioEvent.__struct_fields__
+        return next((key for key in keys if getattr(self, key) is not None), "")
+
+    @property
     def radio_fault(self) -> RadioFault | None:
         """The fault whose key is set; None where there is none."""
         if self.partition is not None and not isinstance(self.partition, Partition):

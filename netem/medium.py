@@ -13,7 +13,7 @@ from math import inf
 
 import msgspec
 
-from netem.conditions import NetworkConditions
+from netem.conditions import NetworkConditions, differing
 from netem.delivery_log import FATE, HEAD, DeliveryLog
 from netem.faults import FaultOrder, Position
 from netem.link import LOST_TO_PARTITION, LOST_TO_QUEUE, Cause, Links, Sending, Verdict
@@ -62,6 +62,8 @@ class Medium:
         self._counts: dict[tuple[int, int, int], int] = {}
         self._rate_queues: dict[tuple[int, int], RateQueue] = {}
         self._fates = [0] * len(Cause)
+        self._struck: dict[int, int] = {}
+        """Frames, times the links that a radio fault cut or altered, by the fault's number."""
         self._delivery_log = DeliveryLog(setup.agents)
         self._sent_b = [0] * (len(CHANNELS) * setup.agents)
         self.sent = self.addressed = self.in_flight = self.duplicated = self.corrupted = 0
@@ -150,11 +152,14 @@ class Medium:
             duplicated=self.duplicated,
             corrupted=self.corrupted,
             sent_b=tuple(self._sent_b),
+            struck=tuple(sorted(self._struck.items())),
         )
 
     def _send(self, frame: Frame, sent_s: float) -> None:
         """Decide the fate of one frame on its link to every other agent, in ascending order."""
         source, channel, models = frame.source, frame.channel, self._conditions.models
+        if self._conditions.without:
+            self._count_altered(source, channel)
         key = (source, frame.incarnation, channel, frame.count)
         sending = Sending(frame, key, sent_s, 0.0)
         model = models.of_channel(channel)
@@ -172,6 +177,16 @@ class Medium:
             self._decide_plain(sending, near, common)
         else:
             self._deliver_all(sending, near, sending.waited_s + common.clean_delay_s)
+
+    def _count_altered(self, source: int, channel: int) -> None:
+        """Count a frame for each change of conditions, times the links that it makes differ."""
+        models = self._conditions.models
+        for number, without in self._conditions.without.items():
+            reach_m = max(models.reach_m(channel, source), without.reach_m(channel, source))
+            near = self._range_index.in_range(source, reach_m)
+            links = differing(models, without, channel, source, near)
+            if links:
+                self._struck[number] = self._struck.get(number, 0) + links
 
     def _enter_rate_queue(self, sending: Sending, model: LinkModel) -> float | None:
         """Return the delay in the queue of the sender's channel [s].
@@ -258,11 +273,13 @@ class Medium:
         self.in_flight += 1
 
     def _is_cut(self, source: int, receiver: int, now_s: float) -> bool:
-        """Return whether a partition, a flap or a jam cuts a directed link at a time [s]."""
-        ends = (self._range_index.positions[source], self._range_index.positions[receiver])
-        return self._conditions.cuts(source, receiver, now_s) or any(
-            position is not None and self._conditions.jammed(position) for position in ends
-        )
+        """Return whether a fault cuts a directed link at a time [s], and count that for each."""
+        positions = self._range_index.positions
+        radios = (positions[source], positions[receiver])
+        cutters = self._conditions.cutters(source, receiver, now_s, radios)
+        for number in cutters:
+            self._struck[number] = self._struck.get(number, 0) + 1
+        return bool(cutters)
 
 
 def _count_fitting(due: Sequence[_InFlight]) -> int:

@@ -4,6 +4,7 @@ Structs marked ``array_like`` are encoded as msgpack arrays, so the order of the
 wire format.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -88,6 +89,8 @@ class MediumCounters(
     """Delivered frames with a flipped bit."""
     sent_b: tuple[Count, ...] = ()
     """Payload bytes that each agent sent on each channel, channels of one agent side by side."""
+    struck: tuple[tuple[Count, Count], ...] = ()
+    """Numbers of radio faults, each with frames, times the links that it cut or altered."""
 
     def packets(self) -> dict[str, int]:
         """Return the packet counters under their keys of summary.json."""
@@ -146,6 +149,9 @@ def merged(shards: Sequence[MediumCounters]) -> MediumCounters:
     if len(shards) == 1:
         return first
     causes = {cause for shard in shards for cause in shard.rejected}
+    struck: Counter[int] = Counter()
+    for shard in shards:
+        struck.update(dict(shard.struck))
     return msgspec.structs.replace(
         first,
         addressed=sum(shard.addressed for shard in shards),
@@ -154,4 +160,5 @@ def merged(shards: Sequence[MediumCounters]) -> MediumCounters:
         rejected={c: sum(shard.rejected.get(c, 0) for shard in shards) for c in sorted(causes)},
         duplicated=sum(shard.duplicated for shard in shards),
         corrupted=sum(shard.corrupted for shard in shards),
+        struck=tuple(sorted(struck.items())),
     )

@@ -11,9 +11,9 @@ from netem.faults import Flap, Heal, Jam, Partition
 from netem.link_model import LinkModel
 from netem.link_parameters import Conditions, DirectedLink, GilbertElliott, LinkKeys, PathLoss
 from netem.medium import Medium
-from netem.messages import MediumSetup
+from netem.messages import MediumCounters, MediumSetup
 from netem.wire.channels import LOCAL, MULTIHOP
-from netem.wire.frame import Outgoing, Transmission
+from netem.wire.frame import Outgoing, Transmission, pack, unpack
 from tests.netem.fault_orders import begin, end
 
 FIELDS = LinkKeys.__struct_fields__
@@ -111,6 +111,54 @@ def test_a_partition_cuts_later_frames_and_a_heal_ends_it():
     assert (fates["dropped_partition"], fates["delivered"]) == (1, 5)
 
 
+def test_each_fault_counts_the_frames_that_it_cuts():
+    medium = radio()
+    medium.apply(begin(1, Partition(((0, 1),))))
+    send(medium, 0.0)
+    medium.apply(begin(2, Partition(((0,), (1,)))))
+    send(medium, 0.05)
+    medium.apply(end(1))
+    medium.apply(begin(3, Jam((50.0, 0.0, 0.0), 1.0)))
+    medium.apply(begin(4, Flap(1.0, ((0, 1),))))
+    send(medium, 0.1)
+    counters = medium.counters(0)
+    assert counters.struck == ((1, 2), (2, 4), (4, 1))
+    assert counters.fates["dropped_partition"] == 5
+    assert unpack(pack(counters), MediumCounters, 4096) == counters
+
+
+@pytest.mark.parametrize(
+    ("change", "links"),
+    [
+        (Conditions(loss_percent=100.0), 2),
+        (Conditions(loss_percent=20.0), 0),  # as before
+        (Conditions(local=LinkKeys(delay_ms=5.0)), 2),
+        (Conditions(multihop=LinkKeys(delay_ms=5.0)), 0),  # nothing is sent there
+        (Conditions(link=(DirectedLink(source=0, to=2, delay_ms=5.0),)), 1),
+        (Conditions(link=(DirectedLink(source=2, to=0, delay_ms=5.0),)), 0),
+        (Conditions(range_m=0.5), 2),
+        (Conditions(range_m=100.0), 0),  # they were in range already
+    ],
+)
+def test_a_change_counts_frames_on_the_links_that_it_makes_differ(change, links):
+    medium = radio(loss_percent=20.0, range_m=4.0)
+    medium.place(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (3.0, 0.0, 0.0)))
+    medium.apply(begin(7, change))
+    send(medium, 0.0)
+    medium.apply(end(7))
+    send(medium, 0.05)
+    assert medium.counters(0).struck == (((7, links),) if links else ())
+
+
+def test_a_change_of_links_out_of_range_counts_nothing():
+    medium = radio(range_m=2.0)
+    medium.place(((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), None))
+    link = DirectedLink(source=0, to=1, delay_ms=5.0)
+    medium.apply(begin(1, Conditions(loss_percent=50.0, link=(link,))))
+    send(medium, 0.0)
+    assert medium.counters(0).struck == ()
+
+
 def test_frames_in_flight_to_a_radio_that_disappears_are_dropped_by_the_medium():
     medium = radio(delay_ms=100.0)
     send(medium, 0.0)
@@ -134,7 +182,7 @@ def in_force(**faults):
 
 
 def open_links(network, now_s=0.0):
-    return {pair for pair in permutations(AGENTS, 2) if not network.cuts(*pair, now_s)}
+    return {pair for pair in permutations(AGENTS, 2) if not network.cutters(*pair, now_s)}
 
 
 def within(*groups):

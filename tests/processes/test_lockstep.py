@@ -105,6 +105,8 @@ def test_a_run_with_faults_equals_virtual_time(
     assert summary["trace_sha256"] == flight.loop.trace.sha256
     packets = flight.medium_counters.packets()
     assert {name: summary["packets"][name] for name in packets} == packets
+    frames = {row["number"]: row["frames"] for row in summary["faults"] if row["frames"]}
+    assert frames == dict(flight.medium_counters.struck) != {}
     assert {each.partition("-")[2] for each in pids(run) if each.startswith("netem-")} == {
         str(shard) for shard in range(1, shards)
     }

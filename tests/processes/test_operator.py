@@ -88,7 +88,10 @@ def test_in_a_fleet_started_by_hand_only_the_radio_can_be_changed(
     eventually(lambda: any(event["kind"] == "heal" for event in events_of(run)), 10.0)
     fleet.kill_group(signal.SIGINT)
     assert fleet.status(10.0) == -signal.SIGINT, fleet.text
-    assert json.loads((run / "summary.json").read_text())["packets"]["dropped_partition"] > 0
+    summary = json.loads((run / "summary.json").read_text())
+    (fault,) = summary["faults"]
+    assert (fault["kind"], fault["by"]) == ("partition", "operator")
+    assert 0 < fault["frames"] == summary["packets"]["dropped_partition"]
 
 
 def state(pid: int) -> str:

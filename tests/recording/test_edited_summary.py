@@ -44,7 +44,7 @@ converge = false
 UNRECORDED = {
     "schema", "reason", "rejected_by_cause", "direct_links", "needed_links", "bytes_per_s",
     "delivery", "delivery_late_ms", "late_tick_fraction", "real_time_factor", "trace_sha256",
-    "overload", "resources",
+    "overload", "resources", "faults",
     "version", "commit", "commit_dirty", "python", "packages", "host",
 }  # fmt: skip
 """Keys of summary.json of which a recording shows nothing."""

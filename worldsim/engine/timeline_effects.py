@@ -11,6 +11,7 @@ from agent.messages import NO_MISSION
 from agent.qstructure.formation import FormationSpec, formation_of
 from netem.conditions import NetworkConditions
 from netem.faults import FaultOrder, RadioEvent, RadioFault
+from worldsim.engine.fault_reports import FaultReports
 from worldsim.engine.membership import Membership
 from worldsim.engine.missions import Missions
 from worldsim.engine.operations import (
@@ -65,6 +66,7 @@ class TimelineEffects:
         self.members = Membership(scenario)
         self.network = NetworkConditions(scenario.netem)
         self.missions = Missions(scenario)
+        self.faults = FaultReports()
         self.places: list[tuple[int, int] | None] = [None] * scenario.rows
         """The place (queue, rank) that each agent claims, as last reported; row i = agent i."""
         self._spacing_m = scenario.control.spacing_m
@@ -87,6 +89,8 @@ class TimelineEffects:
         time_s = self._world.time_s
         for step in self.timeline.due(time_s):
             operation = self.operation(step)
+            if step.ends:
+                self.faults.end(step.number, self._t_s)
             if operation is not None:
                 yield operation
         if self.members.next_boot_s <= time_s + SLACK_S:
@@ -113,6 +117,7 @@ class TimelineEffects:
 
     def apply(self, operation: Operation, by: By = None) -> None:
         """Apply an operation that was carried out, and emit its events."""
+        self.faults.begin(operation, self._t_s, by)
         match operation:
             case EndProcesses():
                 self._end(operation, by)

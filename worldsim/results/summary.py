@@ -23,6 +23,7 @@ from worldsim.results.expectation_text import (
     RecoveryRow,
     expectation_texts,
 )
+from worldsim.results.fault_rows import FaultRow, fault_rows, idle_text
 from worldsim.results.provenance import Provenance, provenance
 from worldsim.scenario.tables import Scenario
 
@@ -163,6 +164,7 @@ class Summary(Provenance):
     encounters: list[EncounterRow]
     attitude_error_deg: float | None  # largest at the last tick
     turns_over_limit_fraction: float | None  # of moving steps
+    faults: list[FaultRow]  # in the order in which they began
     packets: dict[str, int | None]  # by fate
     rejected_by_cause: dict[str, dict[str, int]]  # messages, by component and cause
     direct_links: LinksRow  # agents heard
@@ -185,7 +187,9 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
     expectations = [_expectation_row(expectation) for expectation in judge.expectations()]
     invariants = judge.invariants()
     use = run.loop.radio_use
-    outcome, reason = _outcome(run, expectations)
+    faults = _fault_rows(run)
+    idle = None if scenario.expect.idle_faults else idle_text(faults)
+    outcome, reason = _outcome(run, expectations, idle)
     summary: Summary = {
         "schema": SCHEMA,
         "scenario": scenario.name,
@@ -204,6 +208,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "encounters": _encounter_rows(judge),
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
+        "faults": faults,
         "packets": _packets(counters, rejected),
         "rejected_by_cause": rejected,
         "direct_links": _links_row(use.heard()),
@@ -226,11 +231,23 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
     return plain
 
 
-def _outcome(run: FinishedRun, expectations: list[ExpectationRow]) -> tuple[Outcome, str | None]:
+def _fault_rows(run: FinishedRun) -> list[FaultRow]:
+    counters = run.medium_counters
+    return fault_rows(
+        run.loop.effects.faults.all,
+        dict(counters.struck) if counters is not None else None,
+        run.loop.world.sensor_faults.struck,
+    )
+
+
+def _outcome(
+    run: FinishedRun, expectations: list[ExpectationRow], idle: str | None
+) -> tuple[Outcome, str | None]:
     """Return the outcome and its reason.
 
     A violated invariant is a failure also in a run that was cut off. On a host that was too slow,
-    only those are that do not rest on news arriving in time: the others are named.
+    only those are that do not rest on news arriving in time: the others are named. idle: which
+    faults struck nothing; what would pass is inconclusive then.
     """
     if run.failure is not None:
         return "fail", run.failure
@@ -248,7 +265,9 @@ def _outcome(run: FinishedRun, expectations: list[ExpectationRow]) -> tuple[Outc
         return "fail", f"never evaluated: {', '.join(found.unseen)}"
     texts = expectation_texts(expectations, _circumstances(run))
     missed = [text for text, row in zip(texts, expectations, strict=True) if not row["held"]]
-    return ("fail", "; ".join(missed)) if missed else ("pass", None)
+    if missed:
+        return "fail", "; ".join(missed)
+    return ("inconclusive", idle) if idle is not None else ("pass", None)
 
 
 def _with_words(invariants: list[str]) -> str:

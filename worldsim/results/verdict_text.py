@@ -15,6 +15,7 @@ from worldsim.results.expectation_text import (
     figure,
     was_tested,
 )
+from worldsim.results.fault_rows import fault_texts
 from worldsim.results.overall import Overall, Row, ScenarioRow
 from worldsim.results.summary import DeliveryRow, Summary
 
@@ -41,6 +42,7 @@ def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
         _head(summary),
         *_expectations(summary["expectations"], _circumstances(summary)),
         *_encounters(summary["encounters"]),
+        *(f"  {text}" for text in fault_texts(summary["faults"])),
         f"  {_accuracy(summary)}",
         *_sub_formations(summary["sub_formations"]),
         *_delivery(summary["delivery"]),

@@ -57,6 +57,11 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
         return self.keys[0]
 
     @property
+    def is_fault(self) -> bool:
+        """Whether the event strikes something; missions, and what only undoes a fault, do not."""
+        return self.kind in FAULTS
+
+    @property
     def action(self) -> Action:
         """The action whose key is set. Raises LookupError without one."""
         fault = self.radio_fault or self._process_fault or self.sensor
@@ -92,3 +97,5 @@ ACTIONS = (*_OTHERS, *_RADIO)
 _LASTING = tuple(key for key in _RADIO if key != "heal")
 UNDOABLE = ("kill", "leave", "pause", *_LASTING, "sensor")
 """The keys of the actions that ``for_s`` can undo."""
+FAULTS = UNDOABLE
+"""The keys of the actions that are faults: each of them can be undone."""

@@ -159,6 +159,8 @@ def _of_expectations(scenario: Scenario) -> Iterator[Problem]:
         each.oriented for each in _specs(scenario)
     ):
         yield Problem("expect.attitude_within_deg", "no effect: no queue has an orientation")
+    if expect.idle_faults and not any(each.is_fault for each in scenario.event):
+        yield Problem("expect.idle_faults", "no effect: no event is a fault")
 
 
 def _specs(scenario: Scenario) -> Iterator[FormationSpec]:

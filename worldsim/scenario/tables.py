@@ -101,7 +101,8 @@ class Expectations(Table, frozen=True):
     as with a controller that knows none. min_separation_m: between centres; left out:
     control.separation_m. min_obstacle_distance_m: from a vehicle's centre to a surface; left out:
     control.clearance_m. attitude_within_deg: how far an agent's attitude may be from its queue's
-    orientation, at the end and from the formation's convergence on.
+    orientation, at the end and from the formation's convergence on. idle_faults: whether the run
+    may pass though a fault struck nothing.
     """
 
     converge_within_s: Positive | None = None
@@ -110,6 +111,7 @@ class Expectations(Table, frozen=True):
     min_separation_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
     min_obstacle_distance_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
     attitude_within_deg: Annotated[float, Meta(ge=LEAST, le=180)] | None = None
+    idle_faults: bool = False
 
 
 class Scenario(Table, frozen=True, omit_defaults=False):

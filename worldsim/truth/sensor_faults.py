@@ -26,12 +26,15 @@ class SensorFaults:
         self._seed = seed
         self._faults: dict[tuple[int, str], dict[int, FailureMode]] = {}
         """Faults in force by number, in the order in which they began."""
-        self._modes: dict[tuple[int, str], FailureMode] = {}
+        self._acting: dict[tuple[int, str], tuple[int, FailureMode]] = {}
+        """The number and mode of the fault that acts on a sensor."""
+        self.struck: dict[int, int] = {}
+        """How many readings each fault changed, by its number."""
         self._stuck_readings: dict[int, ProximityReading] = {}
         self._stuck_scans: dict[tuple[int, str], Scan] = {}
 
     def __bool__(self) -> bool:
-        return bool(self._modes)
+        return bool(self._acting)
 
     def begin(self, number: int, agent: int, sensor: str | None, mode: FailureMode) -> None:
         """Begin a fault of an agent's sensor (None: of all its sensors)."""
@@ -47,20 +50,29 @@ class SensorFaults:
 
     def _act(self, agent: int, name: str) -> None:
         """Let the latest fault in force act on a sensor, from its present reading on."""
-        self._modes.pop((agent, name), None)
+        self._acting.pop((agent, name), None)
         self._stuck_scans.pop((agent, name), None)
         if name == "proximity":
             self._stuck_readings.pop(agent, None)
-        modes = list(self._faults[agent, name].values())
-        if modes:
-            self._modes[agent, name] = modes[-1]
+        faults = list(self._faults[agent, name].items())
+        if faults:
+            self._acting[agent, name] = faults[-1]
 
     def reading(self, agent: int, true: ProximityReading, slot: int) -> ProximityReading:
         """Return the reading of an agent's proximity sensor, given the true one."""
-        mode = self._modes.get((agent, "proximity"))
+        acting = self._acting.get((agent, "proximity"))
+        if acting is None:
+            return true
+        number, mode = acting
+        reading = self._failed_reading(mode, agent, true, slot)
+        shown, seen = (reading.vehicles, reading.obstacles), (true.vehicles, true.obstacles)
+        self._count(number, changed=shown != seen)
+        return reading
+
+    def _failed_reading(
+        self, mode: FailureMode, agent: int, true: ProximityReading, slot: int
+    ) -> ProximityReading:
         match mode:
-            case None:
-                return true
             case "silent":
                 return NO_READING
             case "stuck":
@@ -69,21 +81,29 @@ class SensorFaults:
                 return self._wrong_reading(true, agent, slot)
         assert_never(mode)
 
+    def _count(self, number: int, *, changed: bool) -> None:
+        self.struck[number] = self.struck.get(number, 0) + changed
+
     def scans(self, agent: int, true: tuple[Scan, ...], slot: int) -> tuple[Scan, ...]:
         """Return the scans of an agent's scanning sensors, given the true ones."""
         scans = (self._scan(agent, scan, slot) for scan in true)
         return tuple(scan for scan in scans if scan is not None)
 
     def _scan(self, agent: int, true: Scan, slot: int) -> Scan | None:
-        name = SCANNERS[true.kind]
-        mode = self._modes.get((agent, name))
+        acting = self._acting.get((agent, SCANNERS[true.kind]))
+        if acting is None:
+            return true
+        number, mode = acting
+        scan = self._failed_scan(mode, agent, true, slot)
+        self._count(number, changed=scan != true)
+        return scan
+
+    def _failed_scan(self, mode: FailureMode, agent: int, true: Scan, slot: int) -> Scan | None:
         match mode:
-            case None:
-                return true
             case "silent":
                 return None
             case "stuck":
-                return self._stuck_scans.setdefault((agent, name), true)
+                return self._stuck_scans.setdefault((agent, SCANNERS[true.kind]), true)
             case "wrong":
                 return self._wrong_scan(true, agent, slot)
         assert_never(mode)

@@ -1,0 +1,84 @@
+"""Proof of effect: a run says what each fault struck, and does not pass if one struck nothing."""
+
+import pytest
+
+from tests.small_scenario import SMALL
+from worldsim.campaign.pool import finished
+from worldsim.engine.virtual import fly
+from worldsim.results.fault_rows import fault_texts, idle_text
+from worldsim.results.summary import Summary, summarise
+from worldsim.scenario.file import parse
+
+STRIKE = {
+    "partition": ("partition = [[0], [1]]", "frames"),
+    "jam": ("jam = { centre_m = [0, 0, 0], radius_m = 20 }", "frames"),
+    "flap": ("flap = { period_s = 0.2 }", "frames"),
+    "netem": ("netem = { delay_ms = 20 }", "frames"),
+    "sensor": ('sensor = { agents = [1], mode = "silent" }', "readings"),
+    "pause": ("pause = [1]", "agents"),
+    "kill": ("kill = [1]", "agents"),
+    "leave": ("leave = [1]", "agents"),
+}
+MISS = {
+    "partition": "partition = [[0, 1]]",
+    "jam": "jam = { centre_m = [500, 0, 0], radius_m = 1 }",
+    "netem": "netem = { loss_percent = 0 }",
+}
+SENSED = '[vehicle]\nsensors = ["proximity"]\n'
+LEFT = "[[event]]\nat_s = 2.0\nleave = [1]\n"
+
+
+def flown(*events: str, expect: str = "", before: str = "") -> Summary:
+    tables = "".join(f"[[event]]\n{event}\n" for event in events)
+    scenario = parse(f"{SMALL}{SENSED}{before}{tables}[expect]\nconverge = false\n{expect}")
+    return summarise(scenario, finished(fly(scenario), scenario))
+
+
+@pytest.mark.parametrize("kind", STRIKE)
+def test_a_fault_says_when_it_was_in_force_and_what_it_struck(kind: str) -> None:
+    fault, counted = STRIKE[kind]
+    summary = flown(f"at_s = 3.0\nfor_s = 1.0\n{fault}")
+    (row,) = summary["faults"]
+    assert (row["number"], row["kind"], row["from_s"], row["to_s"]) == (0, kind, 3.0, 4.0)
+    assert row[counted]  # type: ignore[literal-required]
+    assert idle_text(summary["faults"]) is None
+
+
+def test_a_fault_that_is_in_force_to_the_end_has_no_end() -> None:
+    (row,) = flown("at_s = 3.0\npartition = [[0], [1]]")["faults"]
+    assert row["to_s"] is None
+    assert fault_texts([row]) == [f"partition, 3 s to the end: cut {row['frames']} frames"]
+
+
+def test_a_heal_ends_the_partitions() -> None:
+    (row,) = flown("at_s = 3.0\npartition = [[0], [1]]", "at_s = 4.0\nheal = true")["faults"]
+    assert row["to_s"] == 4.0
+
+
+def test_a_fault_whose_agents_another_fault_still_holds_has_ended() -> None:
+    rows = flown("at_s = 1.0\nfor_s = 1.0\nkill = [1]", "at_s = 1.5\nkill = [1]")["faults"]
+    assert [(row["to_s"], row["agents"]) for row in rows] == [(2.0, [1]), (None, [1])]
+
+
+def test_a_run_whose_fault_strikes_nothing_does_not_pass() -> None:
+    missed = flown(f"at_s = 3.0\n{MISS['jam']}", f"at_s = 4.0\n{MISS['netem']}")
+    assert missed["outcome"] == "inconclusive"
+    assert missed["reason"] == "the jam at 3 s and the netem at 4 s struck nothing"
+    allowed = flown(f"at_s = 3.0\n{MISS['jam']}", expect="idle_faults = true")
+    assert (allowed["outcome"], allowed["reason"]) == ("pass", None)
+    assert fault_texts(allowed["faults"]) == ["jam, 3 s to the end: struck nothing"]
+
+
+@pytest.mark.parametrize("kind", MISS)
+def test_a_fault_that_misses_is_found(kind: str) -> None:
+    assert (
+        idle_text(flown(f"at_s = 3.0\n{MISS[kind]}")["faults"])
+        == f"the {kind} at 3 s struck nothing"
+    )
+
+
+@pytest.mark.parametrize("mode", ["stuck", "silent", "wrong"])
+def test_a_fault_of_sensors_that_changes_no_reading_is_found(mode: str) -> None:
+    """An agent alone, far from everything, has an empty reading however its sensor fails."""
+    alone = flown(f"at_s = 3.0\nsensor = {{ agents = [0], mode = '{mode}' }}", before=LEFT)
+    assert idle_text(alone["faults"]) == "the sensor at 3 s struck nothing"

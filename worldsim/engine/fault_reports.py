@@ -1,0 +1,70 @@
+"""What each fault of a run did: when it began and ended, and what it struck.
+
+A fault that strikes nothing proves nothing of the fleet, however well the run ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from netem.faults import FaultOrder, Heal, RadioEvent
+from worldsim.engine.operations import EndProcesses, Operation, PauseProcesses, SetSensorMode
+from worldsim.judge.event import By
+
+
+class FaultReport:
+    """One fault of a run.
+
+    number: of its event, as in events.jsonl; kind: the event's key; from_s: when it began [s];
+    to_s: when it ended [s], None while it is in force; agents: those that it struck, ascending.
+    """
+
+    def __init__(
+        self, number: int, kind: str, from_s: float, by: By, agents: Sequence[int]
+    ) -> None:
+        self.number, self.kind, self.from_s, self.by = number, kind, from_s, by
+        self.agents = sorted(agents)
+        self.to_s: float | None = None
+
+    @property
+    def on_radio(self) -> bool:
+        """Whether it strikes frames, not agents."""
+        return self.kind in RadioEvent.__struct_fields__
+
+
+class FaultReports:
+    """The faults of a run so far, in the order in which they began."""
+
+    def __init__(self) -> None:
+        self.all: list[FaultReport] = []
+
+    def begin(self, operation: Operation, t_s: float, by: By) -> None:
+        """Take an operation that was carried out at a time [s]; one that begins no fault is none.
+
+        Agents that an earlier fault holds down are struck too: this one may hold them for longer.
+        """
+        match operation:
+            case EndProcesses():
+                kind = "leave" if operation.leaves else "kill"
+                agents = operation.agents + operation.ended_before
+            case PauseProcesses():
+                kind, agents = "pause", operation.agents + operation.paused_before
+            case SetSensorMode() if operation.mode is not None:
+                kind, agents = "sensor", operation.agents
+            case FaultOrder(fault=Heal()):
+                self._end([each for each in self.all if each.kind == "partition"], t_s)
+                return
+            case FaultOrder(event=event) if event is not None:
+                kind, agents = event.radio_kind, ()
+            case _:
+                return
+        self.all.append(FaultReport(operation.number, kind, t_s, by, agents))
+
+    def end(self, number: int, t_s: float) -> None:
+        """Note that the time of a fault is over [s]; its agents may be held down by others."""
+        self._end([each for each in self.all if each.number == number], t_s)
+
+    def _end(self, faults: Sequence[FaultReport], t_s: float) -> None:
+        for each in faults:
+            if each.to_s is None:
+                each.to_s = t_s

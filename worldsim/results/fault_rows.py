@@ -1,0 +1,81 @@
+"""Proof of effect: what each fault of a run struck, for summary.json and in words."""
+
+from collections.abc import Mapping, Sequence
+from typing import TypedDict
+
+from worldsim.engine.fault_reports import FaultReport
+
+
+class FaultRow(TypedDict):
+    """A fault of the run and what it struck; None for what a fault of its kind does not strike."""
+
+    number: int  # as in events.jsonl
+    kind: str  # the event's key
+    from_s: float
+    to_s: float | None  # None: in force to the end
+    by: str | None  # "operator", or None for the timeline
+    agents: list[int] | None  # ended, paused, or with a sensor that failed
+    frames: int | None  # times the links on which the fault cut or altered them
+    readings: int | None  # of sensors, that differ from the true ones
+
+
+def fault_rows(
+    faults: Sequence[FaultReport], frames: Mapping[int, int] | None, readings: Mapping[int, int]
+) -> list[FaultRow]:
+    """Return the faults with what they struck.
+
+    frames, readings: how many each fault struck, by its number; frames None: nobody counted them.
+    """
+    return [
+        {
+            "number": each.number,
+            "kind": each.kind,
+            "from_s": each.from_s,
+            "to_s": each.to_s,
+            "by": each.by,
+            "agents": None if each.on_radio else each.agents,
+            "frames": frames.get(each.number, 0) if each.on_radio and frames is not None else None,
+            "readings": readings.get(each.number, 0) if each.kind == "sensor" else None,
+        }
+        for each in faults
+    ]
+
+
+def idle_text(rows: Sequence[FaultRow]) -> str | None:
+    """Return which faults struck nothing, in words; None where each struck something."""
+    idle = [f"the {row['kind']} at {row['from_s']:g} s" for row in rows if _is_idle(row)]
+    return f"{' and '.join(idle)} struck nothing" if idle else None
+
+
+def _is_idle(row: FaultRow) -> bool:
+    counts = [row["frames"], row["readings"]]
+    if row["kind"] != "sensor" and row["agents"] is not None:
+        counts.append(len(row["agents"]))
+    return any(count == 0 for count in counts)
+
+
+def fault_texts(rows: Sequence[FaultRow]) -> list[str]:
+    """Return a line for each fault: what it was, when it was in force, and what it struck."""
+    return [f"{_when(row)}: {_struck(row)}" for row in rows]
+
+
+def _when(row: FaultRow) -> str:
+    by = f" by the {row['by']}" if row["by"] is not None else ""
+    until = "the end" if row["to_s"] is None else f"{row['to_s']:g} s"
+    return f"{row['kind']}{by}, {row['from_s']:g} s to {until}"
+
+
+def _struck(row: FaultRow) -> str:
+    if _is_idle(row):
+        return "struck nothing"
+    agents = ", ".join(map(str, row["agents"] or ()))
+    if row["readings"] is not None:
+        return f"changed {_counted(row['readings'], 'reading')} of agent {agents}"
+    if row["frames"] is not None:
+        done = "changed the links of" if row["kind"] == "netem" else "cut"
+        return f"{done} {_counted(row['frames'], 'frame')}"
+    return f"struck agent {agents}" if agents else "not counted"
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
