@@ -94,6 +94,35 @@ def test_a_radio_fault_is_reported_while_it_is_in_force() -> None:
     assert remaining == [RadioEvent(flap=Flap(3.0))]
 
 
+def test_a_fault_ends_early_by_its_name() -> None:
+    fleet = OperatedFleet(event="[{ at_s = 0.5, kill = [4] }]")
+    fleet.ask(jam={"centre_m": [0, 0, 0], "radius_m": 2}, for_s=9, name="storm")
+    fleet.ask(jam={"centre_m": [9, 0, 0], "radius_m": 2})
+    assert [each.name for each in fleet.ask().faults] == ["storm", "jam-3"]
+    assert [event.kind for event in fleet.ask(end="storm").events] == ["jam"]
+    assert [each.name for each in fleet.ask().faults] == ["jam-3"]
+    assert [event.agent for event in fleet.ask(end="kill-0").events] == [4]
+    fleet.fly(12.0)  # the jam's own end finds nothing to end
+    assert [(each.kind, each.to_s) for each in fleet.loop.effects.faults.all] == [
+        ("kill", 1.0),
+        ("jam", 1.0),
+        ("jam", None),
+    ]
+    for event, reason in (
+        ({"end": "storm"}, "end: no fault 'storm' is in force; there are jam-3"),
+        ({"end": "no"}, "end: no fault 'no' is in force; there are jam-3"),
+        ({"kill": [1], "name": "storm"}, "name: 'storm' is the name of another event"),
+    ):
+        with pytest.raises(RequestError, match=re.escape(reason)):
+            fleet.ask(**event)
+
+
+def test_the_end_of_a_fault_whose_agents_another_one_holds_changes_nothing() -> None:
+    fleet = OperatedFleet(event="[{ at_s = 0.5, kill = [4] }, { at_s = 0.6, kill = [4] }]")
+    assert fleet.ask(end="kill-0").events == ()
+    assert [event.kind for event in fleet.ask(end="kill-1").events] == ["restart"]
+
+
 def test_an_answer_is_equal_after_encoding_and_decoding() -> None:
     answer = OperatedFleet().ask(kill=[3])
     assert msgspec.json.decode(msgspec.json.encode(answer), type=Answer) == answer

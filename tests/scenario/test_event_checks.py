@@ -36,6 +36,11 @@ VALID = [
     [f"at_s = 5, formation = {LINES}", "at_s = 6, kill = ['vertex:V3']"],
     ["at_s = 5, frame = { yaw_deg = 90, waypoints_m = [[1, 2, 3]] }"],
     [
+        "at_s = 5, for_s = 9, name = 'storm', netem = { loss_percent = 90 }",
+        "at_s = 7, end = 'storm'",
+    ],
+    ["at_s = 6, end = 'kill-1'", "at_s = 5, kill = [0]"],
+    [
         "at_s = 5, frame = { waypoints_m = [[0, 0, 0], [1, 0, 0]], speed_mps = 0.2, yaw = 'path' }",
         "at_s = 6, frame = { yaw_deg = 20 }",
     ],
@@ -111,6 +116,26 @@ INVALID = [
     (["at_s = 5, kill = []"], "event[0].kill", "1 to 1000"),
     (["at_s = 5, heal = true"], "event[0].heal", "no partition"),
     (["at_s = 5, heal = false"], "event[0].heal", "true"),
+    (["at_s = 5, end = 'jam-1'"], "event[0].end", "no fault 'jam-1'; there are none"),
+    (["at_s = 5, kill = [0]", "at_s = 6, end = 'x'"], "event[1].end", "there are kill-0"),
+    (["at_s = 5, kill = [0]", "at_s = 5, end = 'kill-0'"], "event[1].end", "begins at 5 s"),
+    (
+        ["at_s = 5, kill = [0], for_s = 1", "at_s = 6, end = 'kill-0'"],
+        "event[1].end",
+        "over at 6 s",
+    ),
+    (
+        ["at_s = 5, kill = [0]", "at_s = 6, end = 'kill-0'", "at_s = 7, end = 'kill-0'"],
+        "event[2].end",
+        "ended by the event at 6 s already",
+    ),
+    (["at_s = 5, join = 1", "at_s = 6, end = 'join-0'"], "event[1].end", "no fault 'join-0'"),
+    (["at_s = 5, join = 1, name = 'more'"], "event[0].name", "join is not undone; name goes with"),
+    (
+        ["at_s = 5, kill = [0]", "at_s = 6, name = 'kill-0', kill = [1]"],
+        "event[1].name",
+        "'kill-0' is the name of event[0] too",
+    ),
     (
         ["at_s = 5, partition = [[1]], for_s = 2", "at_s = 8, heal = true"],
         "event[1].heal",

@@ -89,8 +89,40 @@ def test_an_operators_event_begins_now_and_ends_by_its_own_number() -> None:
     (event,) = scenario("at_s = 2\npause = [1]\nfor_s = 3").event
     step = timeline.begin_now(event)
     assert (step.ends, step.number) == (False, 2)
-    timeline.end_later(step)
+    timeline.keep(step)
     assert [(each.at_s, each.number, each.ends) for each in timeline.due(60.0)] == [
         (5.0, 2, True),
         (9.0, 0, False),
     ]
+
+
+def test_an_event_ends_a_fault_before_its_time_and_then_it_ends_no_more() -> None:
+    jam = "at_s = 1\nfor_s = 9\njam = { centre_m = [0, 0, 0], radius_m = 1 }"
+    assert [(t_s, n, ends) for t_s, n, _, ends in played(jam, "at_s = 3\nend = 'jam-0'")] == [
+        (1.0, 0, False),
+        (3.0, 0, True),
+        (3.0, 1, False),
+    ]
+
+
+def test_a_fault_of_a_given_name_that_has_no_end_is_ended() -> None:
+    kill = "at_s = 1\nname = 'outage'\nkill = [0]"
+    steps = played(kill, "at_s = 3\nend = 'outage'")
+    assert [(t_s, n, ends) for t_s, n, _, ends in steps if n == 0] == [
+        (1.0, 0, False),
+        (3.0, 0, True),
+    ]
+
+
+def test_an_operator_ends_faults_by_their_names() -> None:
+    timeline = Timeline(scenario("at_s = 1\npause = [0]"))
+    (event,) = scenario("at_s = 2\nname = 'storm'\nnetem = { loss_percent = 90 }").event
+    timeline.keep(timeline.begin_now(event))
+    found = timeline.end_now("storm", 5.0)
+    assert found is not None
+    assert (found.at_s, found.event, found.ends) == (5.0, event, True)
+    assert timeline.name_of(found.number) == "storm"
+    named = timeline.end_now("pause-0", 5.0)
+    assert named is not None
+    assert named.number == 0
+    assert timeline.end_now("netem-2", 5.0) is None

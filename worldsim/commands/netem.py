@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from worldsim.commands.operate import ForSeconds, change_radio
+from worldsim.commands.operate import EventName, ForSeconds, change_radio
 from worldsim.commands.options import Seed, Settings, examples, overrides_of
 from worldsim.results.exit_status import FAIL, PASS
 
@@ -24,6 +24,7 @@ commands = typer.Typer()
         "qswarm netem runs/mine partition groups=[[0,1]] kind=one_way --for 5",
         "qswarm netem runs/mine jam centre_m=[0,0,0] radius_m=2",
         "qswarm netem runs/mine show",
+        "qswarm netem runs/mine end jam-2",
     )
 )
 def netem(
@@ -31,7 +32,7 @@ def netem(
         list[str],
         typer.Argument(
             metavar="check SCENARIO | RUN ACTION [KEY=VALUE]",
-            help="ACTION: show, set, partition, heal, jam or flap.",
+            help="ACTION: show, set, partition, heal, jam, flap or end.",
         ),
     ],
     seed: Seed = None,
@@ -45,6 +46,7 @@ def netem(
         ),
     ] = None,
     for_s: ForSeconds = None,
+    name: EventName = None,
 ) -> int:
     """Check a scenario's radio, or change a running fleet's radio.
 
@@ -54,11 +56,12 @@ def netem(
     match words:
         case ["check", *scenarios]:
             scenario = _one_scenario(scenarios)
-            if for_s is not None:
-                raise typer.BadParameter("check undoes nothing; omit it", param_hint="--for")
+            if for_s is not None or name is not None:
+                option = "--for" if for_s is not None else "--name"
+                raise typer.BadParameter("check changes nothing; omit it", param_hint=option)
             return _check(scenario, overrides_of(settings, None, seed, None), plot)
         case [run, action, *rest]:
-            return change_radio(Path(run), action, rest, for_s)
+            return change_radio(Path(run), action, rest, for_s, name)
     raise typer.BadParameter(
         f"{' '.join(words)!r}; write check SCENARIO, or RUN ACTION", param_hint="netem"
     )

@@ -12,10 +12,16 @@ import typer
 from worldsim.commands.options import RunFolder, examples
 from worldsim.results.exit_status import PASS
 
-FAULTS = ("kill", "leave", "restart", "pause", "resume", "join")
-RADIO_ACTIONS = ("show", "set", "partition", "heal", "jam", "flap")
+FAULTS = ("kill", "leave", "restart", "pause", "resume", "join", "end")
+RADIO_ACTIONS = ("show", "set", "partition", "heal", "jam", "flap", "end")
 ForSeconds = Annotated[
     float | None, typer.Option("--for", metavar="S", help="Undo it after S simulated seconds.")
+]
+EventName = Annotated[
+    str | None,
+    typer.Option(
+        "--name", metavar="NAME", help="Name by which it can be ended.", show_default="KIND-NUMBER"
+    ),
 ]
 
 commands = typer.Typer()
@@ -71,6 +77,8 @@ def mission(
         "qswarm fault runs/mine kill 2 vertex:V1 --for 5",
         "qswarm fault runs/mine pause random:2",
         "qswarm fault runs/mine join 2",
+        "qswarm fault runs/mine kill 3 --for 60 --name outage",
+        "qswarm fault runs/mine end outage",
     )
 )
 def fault(
@@ -82,25 +90,34 @@ def fault(
         list[str],
         typer.Argument(
             metavar="SELECTOR",
-            help="Agents: ids, vertex:V1, queue:Q1, random:2 or all. With join: how many.",
+            help="Agents: ids, vertex:V1, queue:Q1, random:2 or all. With join: how many."
+            " With end: a fault's name.",
         ),
     ],
     for_s: ForSeconds = None,
+    name: EventName = None,
 ) -> int:
     """Inject a process fault into a running fleet.
 
     kill ends processes, leave removes the vehicles too, restart brings them back; pause stops
-    processes until resume; join adds new agents.
+    processes until resume; join adds new agents. end ends a fault of any kind before its time, by
+    its name: its kind and number, as in "kill-2", unless --name gave it another one.
     """
     if action not in FAULTS:
         raise _bad(action, "ACTION", f"allowed: {', '.join(FAULTS)}")
-    if action == "join":
-        return _request(run, {"join": _number(" ".join(selectors), "SELECTOR")}, for_s=for_s)
-    chosen = [int(each) if each.isdecimal() else each for each in selectors]
-    return _request(run, {action: chosen}, for_s=for_s)
+    match action:
+        case "join":
+            event: dict[str, Any] = {"join": _number(" ".join(selectors), "SELECTOR")}
+        case "end":
+            event = _end(selectors)
+        case _:
+            event = {action: [int(each) if each.isdecimal() else each for each in selectors]}
+    return _request(run, event, for_s=for_s, name=name)
 
 
-def change_radio(run: Path, action: str, words: list[str], for_s: float | None) -> int:
+def change_radio(
+    run: Path, action: str, words: list[str], for_s: float | None, name: str | None
+) -> int:
     """Change the radio of a running fleet, or print its state; return the exit status."""
     if action in {"show", "heal"} and words:
         raise _bad(" ".join(words), "KEY=VALUE", f"{action} takes no further words")
@@ -111,16 +128,31 @@ def change_radio(run: Path, action: str, words: list[str], for_s: float | None) 
             event: dict[str, Any] = {"netem": _table(words)}
         case "heal":
             event = {"heal": True}
+        case "end":
+            event = _end(words)
         case "partition" if not any("=" in word for word in words):
             event = {"partition": _groups(words)}
         case "partition" | "jam" | "flap":
             event = {action: _table(words)}
         case _:
             raise _bad(action, "ACTION", f"allowed: {', '.join(RADIO_ACTIONS)}")
-    return _request(run, event, for_s=for_s)
+    return _request(run, event, for_s=for_s, name=name)
 
 
-def _request(run: Path, event: dict[str, Any], *, for_s: float | None = None, **terms: Any) -> int:
+def _end(words: list[str]) -> dict[str, Any]:
+    if len(words) != 1:
+        raise _bad(" ".join(words), "NAME", "end takes the name of one fault")
+    return {"end": words[0]}
+
+
+def _request(
+    run: Path,
+    event: dict[str, Any],
+    *,
+    for_s: float | None = None,
+    name: str | None = None,
+    **terms: Any,
+) -> int:
     """Request an event from a run's world, and print the events that followed."""
     from worldsim.fleet.control import Request
     from worldsim.fleet.operator_client import ask
@@ -128,8 +160,13 @@ def _request(run: Path, event: dict[str, Any], *, for_s: float | None = None, **
 
     if for_s is not None:
         event = {**event, "for_s": for_s}
-    for followed in ask(run, Request(event, **terms)).events:
+    if name is not None:
+        event = {**event, "name": name}
+    answer = ask(run, Request(event, **terms))
+    for followed in answer.events:
         print(f"{followed.t_s:.2f} s: {sentence(followed)}")
+    if "end" in event and not answer.events:
+        print(f"{answer.t_s:.2f} s: {event['end']} ends; other faults hold down what it struck")
     return PASS
 
 
@@ -146,7 +183,8 @@ def _print_radio(run: Path) -> int:
     for active in answer.faults:
         for kind, keys in msgspec.to_builtins(active.fault).items():
             if kind != "netem":  # the conditions below include it
-                in_force.setdefault(kind, []).append({"since_s": active.since_s, **keys})
+                found = {"name": active.name, "since_s": active.since_s, **keys}
+                in_force.setdefault(kind, []).append(found)
     counts = [_counted(kind, len(each)) for kind, each in in_force.items() if kind != "partition"]
     parted = "partitioned" if "partition" in in_force else "not partitioned"
     print(f"# at {answer.t_s:.2f} s: {', '.join([parted, *counts])}")

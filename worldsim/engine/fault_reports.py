@@ -38,6 +38,11 @@ class FaultReports:
     def __init__(self) -> None:
         self.all: list[FaultReport] = []
 
+    @property
+    def in_force(self) -> list[int]:
+        """The numbers of the faults that have not ended, in the order in which they began."""
+        return [each.number for each in self.all if each.to_s is None]
+
     def begin(self, operation: Operation, t_s: float, by: By) -> None:
         """Take an operation that was carried out at a time [s]; one that begins no fault is none.
 

@@ -41,6 +41,7 @@ from worldsim.judge.run_events import (
     SensorChanged,
 )
 from worldsim.scenario.faults import (
+    EndFault,
     Join,
     Kill,
     Leave,
@@ -113,6 +114,8 @@ class TimelineEffects:
                 return self.members.sensor_fault(number, action, step.ends, self._claims)
             case FormationSpec() | FrameChange():
                 return None if step.ends else self.missions.changed(action, step.at_s)
+            case EndFault():
+                return None  # it put the fault's end into the timeline
         assert_never(action)
 
     def apply(self, operation: Operation, by: By = None) -> None:

@@ -58,6 +58,8 @@ class ActiveFault(msgspec.Struct, frozen=True):
     """A radio fault in force."""
 
     number: int
+    name: str
+    """By which it can be ended."""
     since_s: float
     """When it began [s; simulated time]."""
     fault: RadioEvent
@@ -97,9 +99,15 @@ class Control:
         request = _request(data)
         first = len(self._loop.events)
         if request.event is not None:
-            step = self._timeline.begin_now(self._event(request.event))
-            carry_out(self._operation(step, request), "operator")
-            self._timeline.end_later(step)
+            event = self._event(request.event)
+            if event.end is not None:
+                operation = self._end(event.end)
+                if operation is not None:
+                    carry_out(operation, "operator")
+            else:
+                step = self._timeline.begin_now(event)
+                carry_out(self._operation(step, request), "operator")
+                self._timeline.keep(step)
         return self._answer(self._loop.events[first:])
 
     def _event(self, keys: dict[str, Any]) -> EventTable:
@@ -111,12 +119,27 @@ class Control:
             event = decode({**keys, "at_s": self._loop.world.time_s}, EventTable, "")
         except ScenarioError as error:
             raise RequestError(f"{error.key}: {error.detail}") from error
+        if event.name is not None and self._timeline.end_now(event.name, event.at_s):
+            raise RequestError(f"name: {event.name!r} is the name of another event")
         problem = problem_now(self._scenario, event, self._fleet_now())
         if problem is not None:
             raise RequestError(": ".join(part for part in problem if part))
         if isinstance(event.action, ProcessFault) and not self._launcher:
             raise RequestError(f"{event.kind}: this fleet has no launcher; do it by hand")
         return event
+
+    def _end(self, name: str) -> Operation | None:
+        """Return the operation that ends a fault now; None where others hold all that it struck.
+
+        Raises RequestError where no such fault is in force.
+        """
+        step = self._timeline.end_now(name, self._loop.world.time_s)
+        open_faults = self._loop.effects.faults.in_force
+        if step is None or step.number not in open_faults:
+            names = ", ".join(map(self._timeline.name_of, open_faults))
+            raise RequestError(f"end: no fault {name!r} is in force; there are {names or 'none'}")
+        self._loop.effects.faults.end(step.number, round(step.at_s, 6))
+        return self._loop.effects.operation(step)
 
     def _fleet_now(self) -> FleetNow:
         effects, members = self._loop.effects, self._loop.members
@@ -171,7 +194,7 @@ class Control:
     def _answer(self, events: list[RunEvent]) -> Answer:
         network = self._loop.network
         faults = tuple(
-            ActiveFault(number, since_s, RadioEvent.of(fault))
+            ActiveFault(number, self._timeline.name_of(number), since_s, RadioEvent.of(fault))
             for number, (since_s, fault) in network.in_force.items()
         )
         t_s = round(self._loop.world.time_s, 6)

@@ -43,7 +43,7 @@ def fault_rows(
 
 def idle_text(rows: Sequence[FaultRow]) -> str | None:
     """Return which faults struck nothing, in words; None where each struck something."""
-    idle = [f"the {row['kind']} at {row['from_s']:g} s" for row in rows if _is_idle(row)]
+    idle = [f"the {row['kind']} at {_rounded(row['from_s'])} s" for row in rows if _is_idle(row)]
     return f"{' and '.join(idle)} struck nothing" if idle else None
 
 
@@ -61,8 +61,8 @@ def fault_texts(rows: Sequence[FaultRow]) -> list[str]:
 
 def _when(row: FaultRow) -> str:
     by = f" by the {row['by']}" if row["by"] is not None else ""
-    until = "the end" if row["to_s"] is None else f"{row['to_s']:g} s"
-    return f"{row['kind']}{by}, {row['from_s']:g} s to {until}"
+    until = "the end" if row["to_s"] is None else f"{_rounded(row['to_s'])} s"
+    return f"{row['kind']}{by}, {_rounded(row['from_s'])} s to {until}"
 
 
 def _struck(row: FaultRow) -> str:
@@ -79,3 +79,7 @@ def _struck(row: FaultRow) -> str:
 
 def _counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def _rounded(time_s: float) -> str:
+    return f"{round(time_s, 2):g}"

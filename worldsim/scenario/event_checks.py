@@ -15,7 +15,16 @@ from agent.qstructure.mission_check import MissionError, check_mission
 from netem.faults import RadioFault
 from netem.link_parameters import Conditions
 from worldsim.scenario.events import ACTIONS, UNDOABLE, EventTable
-from worldsim.scenario.faults import Join, Kill, Leave, Pause, Restart, Resume, SensorFault
+from worldsim.scenario.faults import (
+    EndFault,
+    Join,
+    Kill,
+    Leave,
+    Pause,
+    Restart,
+    Resume,
+    SensorFault,
+)
 from worldsim.scenario.foreseen_fleet import FleetNow, ForeseenFleet
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.radio_checks import radio_problems
@@ -62,6 +71,7 @@ def check_timeline(scenario: Scenario, file: Path, sources: dict[int, FormationS
     """
     for index, event in enumerate(scenario.event):
         problem = _one_action(event) or _in_time(scenario, event)
+        problem = problem or _named(scenario, index) or _end_problem(scenario, event)
         if problem is not None:
             raise _error(file, index, problem)
     if scenario.rows > MAX_AGENTS:
@@ -115,8 +125,10 @@ def _one_action(event: EventTable) -> Problem | None:
         return Problem("heal", "only true is allowed; a partition stays without an event")
     if event.netem == Conditions():
         return Problem("netem", "no key to set")
-    if event.for_s is not None and first not in UNDOABLE:
-        return Problem("for_s", f"{first} is not undone; for_s goes with {', '.join(UNDOABLE)}")
+    for key, value in (("for_s", event.for_s), ("name", event.name)):
+        if value is not None and first not in UNDOABLE:
+            detail = f"{first} is not undone; {key} goes with {', '.join(UNDOABLE)}"
+            return Problem(key, detail)
     return None
 
 
@@ -124,6 +136,35 @@ def _in_time(scenario: Scenario, event: EventTable) -> Problem | None:
     if event.at_s < scenario.duration_s:
         return None
     return Problem("at_s", f"{event.at_s:g}; below duration_s = {scenario.duration_s:g} is allowed")
+
+
+def _named(scenario: Scenario, index: int) -> Problem | None:
+    """Return what is wrong with an event's name: another event has it."""
+    event = scenario.event[index]
+    if event.name is None:
+        return None
+    for other, each in enumerate(scenario.event):
+        if other != index and each.keys and each.called(other) == event.name:
+            return Problem("name", f"{event.name!r} is the name of event[{other}] too")
+    return None
+
+
+def _end_problem(scenario: Scenario, event: EventTable) -> Problem | None:
+    """Return why an event cannot end the fault that it names."""
+    if event.end is None:
+        return None
+    faults = {each.called(n): each for n, each in enumerate(scenario.event) if each.is_fault}
+    fault = faults.get(event.end)
+    if fault is None:
+        return Problem("end", f"no fault {event.end!r}; there are {', '.join(faults) or 'none'}")
+    if event.at_s <= fault.at_s:
+        return Problem("end", f"{event.end!r} begins at {fault.at_s:g} s, not before that time")
+    if fault.for_s is not None and event.at_s >= fault.at_s + fault.for_s:
+        return Problem("end", f"{event.end!r} is over at {fault.at_s + fault.for_s:g} s")
+    first = next(each for each in scenario.event if each.end == event.end)
+    if first is not event:
+        return Problem("end", f"{event.end!r} is ended by the event at {first.at_s:g} s already")
+    return None
 
 
 class EventChecks:
@@ -150,6 +191,8 @@ class EventChecks:
                 return self._frame_change(action, event.at_s)
             case FormationSpec():
                 return self._formation(action)
+            case EndFault():
+                return iter(())
         assert_never(action)
 
     def _selection(

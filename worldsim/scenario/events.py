@@ -3,11 +3,16 @@
 ``event_checks`` checks events against each other.
 """
 
+from typing import Annotated
+
+from msgspec import Meta
+
 from agent.config import Positive
 from agent.qstructure.formation import FormationSpec
 from netem.faults import RadioEvent
 from worldsim.scenario.faults import (
     Action,
+    EndFault,
     Join,
     Joiners,
     Kill,
@@ -21,6 +26,16 @@ from worldsim.scenario.faults import (
 from worldsim.scenario.selectors import Selectors
 from worldsim.scenario.target_frame import FrameChange, Time
 
+Name = Annotated[
+    str,
+    Meta(
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*\Z",
+        max_length=80,
+        description="a name of letters, digits, '.', '_' and '-', at most 80, no '.' first",
+    ),
+]
+"""A name of a run or of an event."""
+
 
 class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
     """One action at ``at_s``; ``for_s`` undoes it after that time, where it can be undone.
@@ -30,12 +45,14 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
     processes, the vehicles hover when the last command has expired; resume: continues them.
     partition: cuts the links between groups, unnamed agents form one more; a table for other kinds;
     heal: ends all partitions. jam: a sphere in which no radio works; flap: links that go down and
-    up. netem: changes keys of [netem]. sensor: lets sensors fail. formation, frame: a mission for
-    the team.
+    up. netem: changes keys of [netem]. sensor: lets sensors fail. end: ends a fault by its name,
+    which is its kind and the event's index, as in "jam-2", unless ``name`` gives another one.
+    formation, frame: a mission for the team.
     """
 
     at_s: Time
     for_s: Positive | None = None
+    name: Name | None = None
     kill: Selectors | None = None
     leave: Selectors | None = None
     restart: Selectors | None = None
@@ -43,6 +60,7 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
     resume: Selectors | None = None
     join: Joiners | Join | None = None
     sensor: SensorFault | None = None
+    end: str | None = None
     formation: FormationSpec | None = None
     frame: FrameChange | None = None
 
@@ -59,16 +77,24 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
     @property
     def is_fault(self) -> bool:
         """Whether the event strikes something; missions, and what only undoes a fault, do not."""
-        return self.kind in FAULTS
+        return any(key in FAULTS for key in self.keys)
 
     @property
     def action(self) -> Action:
         """The action whose key is set. Raises LookupError without one."""
         fault = self.radio_fault or self._process_fault or self.sensor
-        action = fault or self.formation or self.frame
+        action = fault or self.formation or self.frame or self._end
         if action is None:
             raise LookupError("the event has no action")
         return action
+
+    def called(self, number: int) -> str:
+        """Return the event's name. number: its index, or the number of an operator's event."""
+        return self.name or f"{self.kind}-{number}"
+
+    @property
+    def _end(self) -> EndFault | None:
+        return EndFault(self.end) if self.end is not None else None
 
     @property
     def _process_fault(self) -> ProcessFault | None:
@@ -89,9 +115,9 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
         return self.join.count if isinstance(self.join, Join) else self.join or 0
 
 
-_TIMES = ("at_s", "for_s")
+_NO_ACTIONS = ("at_s", "for_s", "name")
 _RADIO = RadioEvent.__struct_fields__
-_OTHERS = (key for key in EventTable.__struct_fields__ if key not in (*_TIMES, *_RADIO))
+_OTHERS = (key for key in EventTable.__struct_fields__ if key not in (*_NO_ACTIONS, *_RADIO))
 ACTIONS = (*_OTHERS, *_RADIO)
 """The keys of all actions."""
 _LASTING = tuple(key for key in _RADIO if key != "heal")

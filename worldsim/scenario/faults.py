@@ -61,7 +61,14 @@ class SensorFault(Table, frozen=True):
     kind: SensorKind | None = None
 
 
+class EndFault(msgspec.Struct, frozen=True):
+    """End a fault before its time, or one that has no end."""
+
+    fault: str
+    """Its name."""
+
+
 ProcessFault = Kill | Leave | Restart | Pause | Resume | Join
 MissionChange = FormationSpec | FrameChange
-Action = RadioFault | ProcessFault | SensorFault | MissionChange
+Action = RadioFault | ProcessFault | SensorFault | MissionChange | EndFault
 """The action of one event."""

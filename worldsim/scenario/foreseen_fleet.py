@@ -9,6 +9,7 @@ from typing import NamedTuple, assert_never
 from agent.qstructure.formation import Formation, FormationSpec, formation_of
 from netem.faults import Heal, Partition, RadioFault
 from worldsim.scenario.faults import (
+    EndFault,
     Join,
     Kill,
     Leave,
@@ -98,8 +99,8 @@ class ForeseenFleet:
                 self.frame = changed_frame(self.frame, action, step.at_s)
             case FormationSpec():
                 self.spec, self.formation = action, self.made(action)
-            case SensorFault():
-                pass
+            case SensorFault() | EndFault():
+                pass  # an event that ends a fault puts the fault's end into the timeline
             case _:
                 assert_never(action)
 

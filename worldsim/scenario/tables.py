@@ -27,7 +27,7 @@ from agent.messages import AT_HOME, AgentId
 from agent.qstructure.formation import FormationSpec
 from netem.link_parameters import Conditions
 from netem.messages import MediumSetup
-from worldsim.scenario.events import EventTable
+from worldsim.scenario.events import EventTable, Name
 from worldsim.scenario.obstacle_tables import ObstacleField, Obstacles
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.target_frame import FrameTable, path_of
@@ -38,15 +38,6 @@ CONVERGED_M = 0.12
 """An agent within this distance of its slot [m] is in place."""
 CONVERGED_S = 2.0
 """A team in place for this time [s] has converged."""
-
-RunName = Annotated[
-    str,
-    Meta(
-        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*\Z",
-        max_length=80,
-        description="a name of letters, digits, '.', '_' and '-', at most 80, no '.' first",
-    ),
-]
 
 Briefed = Annotated[
     Literal["all"] | Annotated[tuple[AgentId, ...], Meta(max_length=MAX_AGENTS)],
@@ -122,7 +113,7 @@ class Scenario(Table, frozen=True, omit_defaults=False):
         FormationSpec, Meta(description="a table of file, or of name, vertices, queue")
     ]
     schema: Annotated[int, Meta(ge=1, le=1)] = 1
-    name: RunName = "unnamed"
+    name: Name = "unnamed"
     seed: Annotated[int, Meta(ge=0, lt=2**53)] = 1
     duration_s: Annotated[float, Meta(ge=LEAST, le=86_400)] = 20.0
     vehicle: Vehicle = Vehicle()

@@ -15,7 +15,8 @@ from msgspec import NODEFAULT, inspect
 
 from worldsim.scenario.allowed_values import allowed_by
 from worldsim.scenario.decoding import decode
-from worldsim.scenario.tables import RunName, Scenario
+from worldsim.scenario.events import Name
+from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
 
 COLUMN = 34
@@ -141,7 +142,7 @@ def write(name: str) -> Path:
     """
     name = name.removesuffix(".toml")
     file = Path(f"{name}.toml")
-    decode(name, RunName, file)
+    decode(name, Name, file)
     try:
         with file.open("x", encoding="utf-8") as out:
             out.write(template(name))

@@ -24,14 +24,19 @@ class Step(NamedTuple):
 
 
 def steps(scenario: Scenario) -> list[Step]:
-    """Return the steps of all events in order of time; at one time, ends before beginnings."""
-    begun = [Step(event.at_s, i, event, False) for i, event in enumerate(scenario.event)]
-    ended = [
-        Step(_sum(event.at_s, event.for_s), i, event, True)
-        for i, event in enumerate(scenario.event)
-        if event.for_s is not None
-    ]
-    return sorted(begun + ended, key=lambda step: (step.at_s, not step.ends, step.number))
+    """Return the steps of all events in order of time; at one time, ends before beginnings.
+
+    A fault ends once: when its time is over, or when an event ends it before.
+    """
+    found = []
+    ended = {event.end: event.at_s for event in scenario.event if event.end is not None}
+    for number, event in enumerate(scenario.event):
+        found.append(Step(event.at_s, number, event, False))
+        ends_s = inf if event.for_s is None else _sum(event.at_s, event.for_s)
+        ends_s = min(ends_s, ended.get(event.called(number), inf))
+        if ends_s < inf:
+            found.append(Step(ends_s, number, event, True))
+    return sorted(found, key=lambda step: (step.at_s, not step.ends, step.number))
 
 
 class Timeline:
@@ -41,6 +46,8 @@ class Timeline:
         self._steps = steps(scenario)
         self._next = 0
         self._number = len(scenario.event)
+        self._events = dict(enumerate(scenario.event))
+        """All events, the operator's so far too, by number."""
 
     @property
     def next_s(self) -> float:
@@ -64,11 +71,23 @@ class Timeline:
         self._number += 1
         return Step(event.at_s, self._number, event, False)
 
-    def end_later(self, begun: Step) -> None:
-        """Add the end of an operator's event, where it has one."""
+    def keep(self, begun: Step) -> None:
+        """Add an operator's event that was carried out, and its end, where it has one."""
+        self._events[begun.number] = begun.event
         if begun.event.for_s is not None:
             step = begun._replace(at_s=_sum(begun.at_s, begun.event.for_s), ends=True)
             insort(self._steps, step, lo=self._next, key=lambda each: each.at_s)
+
+    def end_now(self, name: str, at_s: float) -> Step | None:
+        """Return the step that ends the event of a name at a time [s]; None where there is none."""
+        for number, event in self._events.items():
+            if event.called(number) == name:
+                return Step(at_s, number, event, True)
+        return None
+
+    def name_of(self, number: int) -> str:
+        """Return the name of the event of a number."""
+        return self._events[number].called(number)
 
 
 def _sum(at_s: float, for_s: float) -> float:
