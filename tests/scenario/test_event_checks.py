@@ -40,6 +40,7 @@ VALID = [
         "at_s = 7, end = 'storm'",
     ],
     ["at_s = 6, end = 'kill-1'", "at_s = 5, kill = [0]"],
+    ["at_s = 1, for_s = 2, every_s = 3, kill = ['random:1']", "at_s = 9, end = 'kill-0'"],
     [
         "at_s = 5, frame = { waypoints_m = [[0, 0, 0], [1, 0, 0]], speed_mps = 0.2, yaw = 'path' }",
         "at_s = 6, frame = { yaw_deg = 20 }",
@@ -130,6 +131,9 @@ INVALID = [
         "ended by the event at 6 s already",
     ),
     (["at_s = 5, join = 1", "at_s = 6, end = 'join-0'"], "event[1].end", "no fault 'join-0'"),
+    (["at_s = 5, join = 1, every_s = 2"], "event[0].every_s", "join is not undone"),
+    (["at_s = 5, kill = [0], for_s = 2, every_s = 2"], "event[0].every_s", "than for_s = 2"),
+    (["at_s = 5, kill = [0], every_s = 0.001"], "event[0].every_s", "at most 1000 times"),
     (["at_s = 5, join = 1, name = 'more'"], "event[0].name", "join is not undone; name goes with"),
     (
         ["at_s = 5, kill = [0]", "at_s = 6, name = 'kill-0', kill = [1]"],

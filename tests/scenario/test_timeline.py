@@ -118,11 +118,42 @@ def test_an_operator_ends_faults_by_their_names() -> None:
     timeline = Timeline(scenario("at_s = 1\npause = [0]"))
     (event,) = scenario("at_s = 2\nname = 'storm'\nnetem = { loss_percent = 90 }").event
     timeline.keep(timeline.begin_now(event))
-    found = timeline.end_now("storm", 5.0)
-    assert found is not None
+    (number,) = timeline.numbers_of("storm")
+    found = timeline.end_now(number, 5.0)
     assert (found.at_s, found.event, found.ends) == (5.0, event, True)
-    assert timeline.name_of(found.number) == "storm"
-    named = timeline.end_now("pause-0", 5.0)
-    assert named is not None
-    assert named.number == 0
-    assert timeline.end_now("netem-2", 5.0) is None
+    assert timeline.name_of(number) == "storm"
+    assert timeline.numbers_of("pause-0") == [0]
+    assert timeline.numbers_of("netem-2") == []
+
+
+LOOP = "at_s = 1\nfor_s = 0.5\nevery_s = 20\nkill = ['random:1']"
+
+
+def test_an_event_repeats_to_the_end_of_the_run_with_numbers_of_its_own() -> None:
+    steps = [(t_s, n, ends) for t_s, n, _, ends in played(LOOP, "at_s = 2\nkill = [0]")]
+    assert steps == [
+        *((1.0, 0, False), (1.5, 0, True), (2.0, 1, False)),
+        *((21.0, 2, False), (21.5, 2, True), (41.0, 3, False), (41.5, 3, True)),
+    ]
+
+
+def test_an_event_that_ends_one_that_repeats_ends_it_for_good() -> None:
+    steps = played(LOOP, "at_s = 41.2\nend = 'kill-0'")
+    assert [(t_s, ends) for t_s, n, _, ends in steps if n != 1] == [
+        *((1.0, False), (1.5, True), (21.0, False), (21.5, True), (41.0, False), (41.2, True)),
+    ]
+    steps = played(LOOP, "at_s = 30\nend = 'kill-0'")
+    assert [t_s for t_s, n, _, ends in steps if n != 1 and not ends] == [1.0, 21.0]
+
+
+def test_an_operators_event_repeats_until_the_operator_ends_it() -> None:
+    timeline = Timeline(scenario())
+    (event,) = scenario(LOOP).event
+    begun = timeline.begin_now(event)
+    timeline.keep(begun)
+    assert [(each.at_s, each.ends) for each in timeline.due(30.0)] == [
+        *((1.5, True), (21.0, False), (21.5, True)),
+    ]
+    assert timeline.name_of(begun.number + 1) == "kill-1"
+    timeline.end_now(begun.number + 1, 30.0)
+    assert [each.at_s for each in timeline.due(60.0) if not each.ends] == []

@@ -53,15 +53,16 @@ def netem(
     check sends 100 000 packets over each kind of link, compares what was configured with what was
     measured, and draws a picture.
     """
+    more = {"for_s": for_s, "name": name}
     match words:
         case ["check", *scenarios]:
             scenario = _one_scenario(scenarios)
-            if for_s is not None or name is not None:
-                option = "--for" if for_s is not None else "--name"
-                raise typer.BadParameter("check changes nothing; omit it", param_hint=option)
+            for option, value in (("--for", for_s), ("--name", name)):
+                if value is not None:
+                    raise typer.BadParameter("check changes nothing; omit it", param_hint=option)
             return _check(scenario, overrides_of(settings, None, seed, None), plot)
         case [run, action, *rest]:
-            return change_radio(Path(run), action, rest, for_s, name)
+            return change_radio(Path(run), action, rest, more)
     raise typer.BadParameter(
         f"{' '.join(words)!r}; write check SCENARIO, or RUN ACTION", param_hint="netem"
     )

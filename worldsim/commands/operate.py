@@ -4,6 +4,7 @@ A running fleet is found by its run directory. Its world carries out the request
 the events that followed.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,12 +18,19 @@ RADIO_ACTIONS = ("show", "set", "partition", "heal", "jam", "flap", "end")
 ForSeconds = Annotated[
     float | None, typer.Option("--for", metavar="S", help="Undo it after S simulated seconds.")
 ]
+EverySeconds = Annotated[
+    float | None,
+    typer.Option("--every", metavar="S", help="Do it again every S seconds, until it is ended."),
+]
 EventName = Annotated[
     str | None,
     typer.Option(
         "--name", metavar="NAME", help="Name by which it can be ended.", show_default="KIND-NUMBER"
     ),
 ]
+
+EventKeys = Mapping[str, float | str | None]
+NO_KEYS: EventKeys = {}
 
 commands = typer.Typer()
 
@@ -77,7 +85,7 @@ def mission(
         "qswarm fault runs/mine kill 2 vertex:V1 --for 5",
         "qswarm fault runs/mine pause random:2",
         "qswarm fault runs/mine join 2",
-        "qswarm fault runs/mine kill 3 --for 60 --name outage",
+        "qswarm fault runs/mine kill random:1 --for 2 --every 10 --name outage",
         "qswarm fault runs/mine end outage",
     )
 )
@@ -95,6 +103,7 @@ def fault(
         ),
     ],
     for_s: ForSeconds = None,
+    every_s: EverySeconds = None,
     name: EventName = None,
 ) -> int:
     """Inject a process fault into a running fleet.
@@ -112,13 +121,14 @@ def fault(
             event = _end(selectors)
         case _:
             event = {action: [int(each) if each.isdecimal() else each for each in selectors]}
-    return _request(run, event, for_s=for_s, name=name)
+    return _request(run, event, {"for_s": for_s, "every_s": every_s, "name": name})
 
 
-def change_radio(
-    run: Path, action: str, words: list[str], for_s: float | None, name: str | None
-) -> int:
-    """Change the radio of a running fleet, or print its state; return the exit status."""
+def change_radio(run: Path, action: str, words: list[str], more: EventKeys) -> int:
+    """Change the radio of a running fleet, or print its state; return the exit status.
+
+    more: keys of the event besides its action; None for one that is not given.
+    """
     if action in {"show", "heal"} and words:
         raise _bad(" ".join(words), "KEY=VALUE", f"{action} takes no further words")
     match action:
@@ -136,7 +146,7 @@ def change_radio(
             event = {action: _table(words)}
         case _:
             raise _bad(action, "ACTION", f"allowed: {', '.join(RADIO_ACTIONS)}")
-    return _request(run, event, for_s=for_s, name=name)
+    return _request(run, event, more)
 
 
 def _end(words: list[str]) -> dict[str, Any]:
@@ -148,9 +158,7 @@ def _end(words: list[str]) -> dict[str, Any]:
 def _request(
     run: Path,
     event: dict[str, Any],
-    *,
-    for_s: float | None = None,
-    name: str | None = None,
+    more: EventKeys = NO_KEYS,
     **terms: Any,
 ) -> int:
     """Request an event from a run's world, and print the events that followed."""
@@ -158,10 +166,7 @@ def _request(
     from worldsim.fleet.operator_client import ask
     from worldsim.judge.event_text import sentence
 
-    if for_s is not None:
-        event = {**event, "for_s": for_s}
-    if name is not None:
-        event = {**event, "name": name}
+    event = event | {key: value for key, value in more.items() if value is not None}
     answer = ask(run, Request(event, **terms))
     for followed in answer.events:
         print(f"{followed.t_s:.2f} s: {sentence(followed)}")

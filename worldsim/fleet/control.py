@@ -119,7 +119,7 @@ class Control:
             event = decode({**keys, "at_s": self._loop.world.time_s}, EventTable, "")
         except ScenarioError as error:
             raise RequestError(f"{error.key}: {error.detail}") from error
-        if event.name is not None and self._timeline.end_now(event.name, event.at_s):
+        if event.name is not None and self._timeline.numbers_of(event.name):
             raise RequestError(f"name: {event.name!r} is the name of another event")
         problem = problem_now(self._scenario, event, self._fleet_now())
         if problem is not None:
@@ -133,13 +133,14 @@ class Control:
 
         Raises RequestError where no such fault is in force.
         """
-        step = self._timeline.end_now(name, self._loop.world.time_s)
-        open_faults = self._loop.effects.faults.in_force
-        if step is None or step.number not in open_faults:
-            names = ", ".join(map(self._timeline.name_of, open_faults))
+        effects, now_s = self._loop.effects, self._loop.world.time_s
+        known = self._timeline.numbers_of(name)
+        number = next((each for each in effects.faults.in_force if each in known), None)
+        if number is None:
+            names = ", ".join(dict.fromkeys(map(self._timeline.name_of, effects.faults.in_force)))
             raise RequestError(f"end: no fault {name!r} is in force; there are {names or 'none'}")
-        self._loop.effects.faults.end(step.number, round(step.at_s, 6))
-        return self._loop.effects.operation(step)
+        effects.faults.end(number, round(now_s, 6))
+        return effects.operation(self._timeline.end_now(number, now_s))
 
     def _fleet_now(self) -> FleetNow:
         effects, members = self._loop.effects, self._loop.members

@@ -49,9 +49,11 @@ from worldsim.scenario.target_frame import (
     frame_problem,
     path_of,
 )
-from worldsim.scenario.timeline import Step, steps
+from worldsim.scenario.timeline import Step, occurrences, steps
 from worldsim.scenario.toml import ScenarioError
 
+MAX_REPETITIONS = 1000
+"""An event happens at most so often."""
 MAX_SLOTS_CHECKED = 50_000
 """Most slots of all formations, each filled by all agents, that a timeline may ask to check."""
 
@@ -83,17 +85,28 @@ def check_timeline(scenario: Scenario, file: Path, sources: dict[int, FormationS
             f" at most {MAX_SLOTS_CHECKED // scenario.rows} for so many"
         )
         raise ScenarioError(file, "event", detail)
+    _check_count(scenario, file)
     checks = EventChecks(scenario, ForeseenFleet(scenario))
+    index_of = {number: each.origin for number, each in occurrences(scenario).items()}
     for step in steps(scenario):
         try:
             problem = next(checks.problems(step), None)
         except FormationError as error:
-            default = FormationSource(file, f"event[{step.number}].formation.")
-            source = sources.get(step.number, default)
+            index = index_of[step.number]
+            default = FormationSource(file, f"event[{index}].formation.")
+            source = sources.get(index, default)
             raise ScenarioError(source.file, source.prefix + error.key, error.detail) from error
         if problem is not None:
-            raise _error(file, step.number, problem)
+            raise _error(file, index_of[step.number], problem)
         checks.fleet.apply(step)
+
+
+def _check_count(scenario: Scenario, file: Path) -> None:
+    """Raise ScenarioError where events happen too often."""
+    for index, event in enumerate(scenario.event):
+        if event.every_s is not None and scenario.duration_s / event.every_s > MAX_REPETITIONS:
+            detail = f"{event.every_s:g}; at most {MAX_REPETITIONS} times in a run"
+            raise _error(file, index, Problem("every_s", detail))
 
 
 def problem_now(scenario: Scenario, event: EventTable, now: FleetNow) -> Problem | None:
@@ -125,10 +138,18 @@ def _one_action(event: EventTable) -> Problem | None:
         return Problem("heal", "only true is allowed; a partition stays without an event")
     if event.netem == Conditions():
         return Problem("netem", "no key to set")
-    for key, value in (("for_s", event.for_s), ("name", event.name)):
-        if value is not None and first not in UNDOABLE:
-            detail = f"{first} is not undone; {key} goes with {', '.join(UNDOABLE)}"
+    return _times_problem(event, first)
+
+
+def _times_problem(event: EventTable, action: str) -> Problem | None:
+    """Return what is wrong with when an event ends, and happens again."""
+    own = (("for_s", event.for_s), ("every_s", event.every_s), ("name", event.name))
+    for key, value in own:
+        if value is not None and action not in UNDOABLE:
+            detail = f"{action} is not undone; {key} goes with {', '.join(UNDOABLE)}"
             return Problem(key, detail)
+    if event.every_s is not None and event.every_s <= (event.for_s or 0.0):
+        return Problem("every_s", f"{event.every_s:g}; longer than for_s = {event.for_s:g}")
     return None
 
 
@@ -159,7 +180,8 @@ def _end_problem(scenario: Scenario, event: EventTable) -> Problem | None:
         return Problem("end", f"no fault {event.end!r}; there are {', '.join(faults) or 'none'}")
     if event.at_s <= fault.at_s:
         return Problem("end", f"{event.end!r} begins at {fault.at_s:g} s, not before that time")
-    if fault.for_s is not None and event.at_s >= fault.at_s + fault.for_s:
+    once = fault.every_s is None
+    if once and fault.for_s is not None and event.at_s >= fault.at_s + fault.for_s:
         return Problem("end", f"{event.end!r} is over at {fault.at_s + fault.for_s:g} s")
     first = next(each for each in scenario.event if each.end == event.end)
     if first is not event:

@@ -40,6 +40,7 @@ Name = Annotated[
 class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
     """One action at ``at_s``; ``for_s`` undoes it after that time, where it can be undone.
 
+    every_s: what can be undone happens again after this time, to the end of the run.
     kill: ends processes, the vehicles stop and hover; leave: the vehicles leave the world too;
     restart: starts such agents again; join: adds new agents, under the next free ids. pause: stops
     processes, the vehicles hover when the last command has expired; resume: continues them.
@@ -52,6 +53,7 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
 
     at_s: Time
     for_s: Positive | None = None
+    every_s: Positive | None = None
     name: Name | None = None
     kill: Selectors | None = None
     leave: Selectors | None = None
@@ -115,7 +117,7 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
         return self.join.count if isinstance(self.join, Join) else self.join or 0
 
 
-_NO_ACTIONS = ("at_s", "for_s", "name")
+_NO_ACTIONS = ("at_s", "for_s", "every_s", "name")
 _RADIO = RadioEvent.__struct_fields__
 _OTHERS = (key for key in EventTable.__struct_fields__ if key not in (*_NO_ACTIONS, *_RADIO))
 ACTIONS = (*_OTHERS, *_RADIO)

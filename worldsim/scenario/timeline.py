@@ -1,8 +1,10 @@
 """The timeline: the steps of a scenario's events in time, the same for every clock."""
 
 from bisect import insort
-from math import inf
+from math import ceil, inf
 from typing import NamedTuple
+
+from msgspec.structs import replace
 
 from worldsim.scenario.events import EventTable
 from worldsim.scenario.tables import Scenario
@@ -23,14 +25,36 @@ class Step(NamedTuple):
     """Whether the event ends; otherwise it begins."""
 
 
+class Occurrence(NamedTuple):
+    """One time at which an event of the scenario happens."""
+
+    origin: int
+    """The index of the event in the scenario."""
+    event: EventTable
+    """With its own time. One that repeats an event has that event's name."""
+
+
+def occurrences(scenario: Scenario) -> dict[int, Occurrence]:
+    """Return each time that an event happens, by number.
+
+    Events have their index as number. The repetitions of those with ``every_s`` get the next ones.
+    """
+    found = {index: Occurrence(index, event) for index, event in enumerate(scenario.event)}
+    ended = _ended_s(scenario)
+    for index, event in enumerate(scenario.event):
+        until_s = min(scenario.duration_s, ended.get(event.called(index), inf))
+        for each in _repetitions(event, index, until_s):
+            found[len(found)] = Occurrence(index, each)
+    return found
+
+
 def steps(scenario: Scenario) -> list[Step]:
     """Return the steps of all events in order of time; at one time, ends before beginnings.
 
     A fault ends once: when its time is over, or when an event ends it before.
     """
-    found = []
-    ended = {event.end: event.at_s for event in scenario.event if event.end is not None}
-    for number, event in enumerate(scenario.event):
+    found, ended = [], _ended_s(scenario)
+    for number, (_, event) in occurrences(scenario).items():
         found.append(Step(event.at_s, number, event, False))
         ends_s = inf if event.for_s is None else _sum(event.at_s, event.for_s)
         ends_s = min(ends_s, ended.get(event.called(number), inf))
@@ -39,15 +63,37 @@ def steps(scenario: Scenario) -> list[Step]:
     return sorted(found, key=lambda step: (step.at_s, not step.ends, step.number))
 
 
+def _ended_s(scenario: Scenario) -> dict[str, float]:
+    """Return when events end other ones, by their names [s]."""
+    return {event.end: event.at_s for event in scenario.event if event.end is not None}
+
+
+def _repetitions(event: EventTable, number: int, until_s: float) -> list[EventTable]:
+    """Return an event's repetitions before a time [s]."""
+    if event.every_s is None:
+        return []
+    count = ceil((until_s - event.at_s) / event.every_s - SLACK_S)
+    return [
+        replace(
+            event,
+            at_s=_sum(event.at_s, k * event.every_s),
+            every_s=None,
+            name=event.called(number),
+        )
+        for k in range(1, count)
+    ]
+
+
 class Timeline:
     """The steps of a scenario's events and of the operator's events, in order of time."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._steps = steps(scenario)
         self._next = 0
-        self._number = len(scenario.event)
-        self._events = dict(enumerate(scenario.event))
+        self._duration_s = scenario.duration_s
+        self._events = {n: event for n, (_, event) in occurrences(scenario).items()}
         """All events, the operator's so far too, by number."""
+        self._number = len(self._events)
 
     @property
     def next_s(self) -> float:
@@ -72,18 +118,31 @@ class Timeline:
         return Step(event.at_s, self._number, event, False)
 
     def keep(self, begun: Step) -> None:
-        """Add an operator's event that was carried out, and its end, where it has one."""
-        self._events[begun.number] = begun.event
-        if begun.event.for_s is not None:
-            step = begun._replace(at_s=_sum(begun.at_s, begun.event.for_s), ends=True)
+        """Add an operator's event that was carried out: its end and repetitions, if it has any."""
+        self._add(begun)
+        for event in _repetitions(begun.event, begun.number, self._duration_s):
+            step = self.begin_now(event)
+            insort(self._steps, step, lo=self._next, key=lambda each: each.at_s)
+            self._add(step)
+
+    def _add(self, begins: Step) -> None:
+        event = self._events[begins.number] = begins.event
+        if event.for_s is not None:
+            step = begins._replace(at_s=_sum(begins.at_s, event.for_s), ends=True)
             insort(self._steps, step, lo=self._next, key=lambda each: each.at_s)
 
-    def end_now(self, name: str, at_s: float) -> Step | None:
-        """Return the step that ends the event of a name at a time [s]; None where there is none."""
-        for number, event in self._events.items():
-            if event.called(number) == name:
-                return Step(at_s, number, event, True)
-        return None
+    def numbers_of(self, name: str) -> list[int]:
+        """Return the numbers of all events of a name: one, and its repetitions."""
+        return [number for number, event in self._events.items() if event.called(number) == name]
+
+    def end_now(self, number: int, at_s: float) -> Step:
+        """Return the step that ends an event at a time [s], which then repeats no more."""
+        event = self._events[number]
+        waiting = set(self.numbers_of(event.called(number))) - {number}
+        self._steps[self._next :] = [
+            step for step in self._steps[self._next :] if step.number not in waiting or step.ends
+        ]
+        return Step(at_s, number, event, True)
 
     def name_of(self, number: int) -> str:
         """Return the name of the event of a number."""
