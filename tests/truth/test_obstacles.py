@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.truth.shapes import any_shape, surface, triples
 from worldsim.scenario.obstacle_tables import Box, Cylinder, Sphere, Wall
-from worldsim.truth.obstacles import Obstacles
+from worldsim.truth.obstacles import Obstacles, Relative
 
 UNIT = {
     "sphere": Sphere(centre_m=(0, 0, 0), radius_m=1.0),
@@ -92,7 +92,8 @@ def test_the_swept_distance_is_the_least_along_the_line(shape, start, way):
     centre = obstacles.centres(0.0)
     before = np.array(start) - centre[None]
     after = before + 0.3 * np.array(way)
-    swept = obstacles.swept(before, after)[0, 0]
+    ends = [Relative(each, obstacles.from_centres(each)) for each in (before, after)]
+    swept = obstacles.swept(*ends)[0, 0]
     along = np.linspace(0.0, 1.0, 400)[:, None, None]
     least = obstacles.from_centres(before + along * (after - before)).distance.min()
     step = 0.3 * np.sqrt((np.array(way) ** 2).sum()) / 399

@@ -119,22 +119,14 @@ class _Sweep:
 def swept_obstacle_distance(
     before: Floats, after: Floats, obstacles: Obstacles, times_s: tuple[float, float]
 ) -> Floats:
-    """Return each vehicle's least distance (N,) [m] to any of some obstacles between two ticks."""
-    least: Floats = np.min(swept_obstacle_distances(before, after, obstacles, times_s), axis=1)
-    return least
-
-
-def swept_obstacle_distances(
-    before: Floats, after: Floats, obstacles: Obstacles, times_s: tuple[float, float]
-) -> Floats:
-    """Return the least distances (N, M) [m], centre to surface, between two ticks.
+    """Return each vehicle's least distance (N,) [m] to any of some obstacles between two ticks.
 
     before, after: (N, 3) [m; world frame] at ``times_s``. Vehicles and obstacles are taken to move
     straight in between. Negative inside an obstacle; NaN where there is no vehicle.
     """
-    starts = before[:, None] - obstacles.centres(times_s[0])
-    ends = after[:, None] - obstacles.centres(times_s[1])
-    return obstacles.swept(starts, ends)
+    start, end = obstacles.relative(before, times_s[0]), obstacles.relative(after, times_s[1])
+    least: Floats = np.min(obstacles.swept(start, end), axis=1)
+    return least
 
 
 def keeps(distance_m: float, bound_m: float) -> bool:

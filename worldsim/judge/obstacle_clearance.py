@@ -13,11 +13,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from worldsim.judge.metrics import ROUNDING_M, keeps, swept_obstacle_distances
+from worldsim.judge.metrics import ROUNDING_M, keeps
 from worldsim.judge.tick import Tick
 from worldsim.scenario.obstacle_tables import Movable
 from worldsim.scenario.tables import Scenario
-from worldsim.truth.obstacles import Obstacles
+from worldsim.truth.obstacles import Obstacles, Relative
 from worldsim.truth.vehicle import Floats
 
 
@@ -54,6 +54,8 @@ class ObstacleClearance:
         """The least so far of those that a controller answers for [m]; None while there is none."""
         self.encounters: list[Encounter] = []
         """Of vehicles that could not give way, in order."""
+        self._last: tuple[Tick, Relative] | None = None
+        """The last tick, and where its vehicles were relative to the obstacles."""
         self._lasting: dict[tuple[int, int], Encounter] = {}
         """By agent and obstacle: encounters that are not over."""
 
@@ -71,10 +73,9 @@ class ObstacleClearance:
 
         At fault is a vehicle that comes nearer than ``bound_m`` and could give way.
         """
-        times_s = (before.time_s, tick.time_s)
-        distance = swept_obstacle_distances(
-            before.position, tick.position, self._obstacles, times_s
-        )
+        start = self._relative_at(before)
+        self._last = tick, self._obstacles.relative(tick.position, tick.time_s)
+        distance = self._obstacles.swept(start, self._last[1])
         self.least_m = _lesser(self.least_m, distance)
         near = distance < self.bound_m - ROUNDING_M
         excused = self._excused(before, tick, near)
@@ -82,6 +83,11 @@ class ObstacleClearance:
         self.answerable_m = _lesser(self.answerable_m, answerable)
         self._note(tick, distance, excused)
         return np.min(distance, axis=1), bool(np.any(near & ~excused))
+
+    def _relative_at(self, tick: Tick) -> Relative:
+        if self._last is not None and self._last[0] is tick:
+            return self._last[1]
+        return self._obstacles.relative(tick.position, tick.time_s)
 
     def _excused(self, before: Tick, tick: Tick, near: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return which pairs (N, M) are too near without fault of the vehicle's controller."""

@@ -35,6 +35,14 @@ class SurfaceDistances(NamedTuple):
     """(P, M, 3), unit vectors along which the distance grows fastest [world axes]."""
 
 
+class Relative(NamedTuple):
+    """Where P points are relative to M obstacles at one time."""
+
+    position: Floats
+    """(P, M, 3) [m], relative to the centres."""
+    surface: SurfaceDistances
+
+
 class Solid(NamedTuple):
     """The shape of an obstacle about its centre."""
 
@@ -113,8 +121,12 @@ class Obstacles:
 
     def nearest(self, points: Floats, time_s: float) -> SurfaceDistances:
         """Return the distances of points (P, 3) [m; world frame] from each surface at a time."""
-        relative = points[:, None] - self.centres(time_s)
-        return self.from_centres(relative)
+        return self.relative(points, time_s).surface
+
+    def relative(self, points: Floats, time_s: float) -> Relative:
+        """Return where points (P, 3) [m; world frame] are relative to each obstacle at a time."""
+        position = points[:, None] - self.centres(time_s)
+        return Relative(position, self.from_centres(position))
 
     def from_centres(self, relative: Floats) -> SurfaceDistances:
         """Return the distances of points (P, M, 3) [m], given relative to the centres."""
@@ -129,12 +141,12 @@ class Obstacles:
                 distance[:, columns], outward[:, columns] = found
         return SurfaceDistances(distance, outward)
 
-    def swept(self, before: Floats, after: Floats) -> Floats:
+    def swept(self, start: Relative, end: Relative) -> Floats:
         """Return the least distances (P, M) [m] on the straight lines between relative points.
 
-        before, after: (P, M, 3) [m], relative to the centres at the two times. NaN stays NaN.
+        NaN stays NaN.
         """
-        first, last = self.from_centres(before), self.from_centres(after)
+        (before, first), (after, last) = start, end
         way = after - before
         least = np.minimum(first.distance, last.distance)
         passing = (_dot(first.outward, way) < 0.0) & (_dot(last.outward, way) > 0.0)
