@@ -36,8 +36,11 @@ class RangeIndex:
         self.positions: tuple[Position | None, ...] = (None,) * radios
         self._array: Floats | None = None
         """The receivers' positions now, (3, R); None until they are needed."""
+        self._before: tuple[Position | None, ...] = self.positions
+        """The positions when ``_near`` was begun, and the receivers' as an array (3, R)."""
         self._array_before: Floats = np.full((3, len(receivers)), nan)
-        """The receivers' positions when ``_near`` was begun, (3, R)."""
+        self._near_holds = False
+        """Whether it is known that ``_near`` holds now."""
         self._near: dict[tuple[int, float], tuple[Position, Sequence[int]]] = {}
         """Where a sender was, and the receivers near it, by its id and reach."""
         self._found: dict[tuple[int, float], InRange] = {}
@@ -46,6 +49,7 @@ class RangeIndex:
         """Set the true positions, row i = radio i [m; world frame]; None where there is none."""
         self.positions = positions
         self._array = None
+        self._near_holds = False
         self._found.clear()
 
     def in_range(self, source: int, reach_m: float) -> InRange:
@@ -64,7 +68,8 @@ class RangeIndex:
         here = self.positions[source]
         if here is None:
             return ()
-        self._placed()
+        if not self._near_holds:
+            self._check_near()
         near = self._near.get((source, reach_m))
         if near is None or not _is_within(here, near[0], MOST_MOVED_M):
             pairs = self._by_array(self._array_before, source, here, reach_m + MARGIN_M)
@@ -78,17 +83,21 @@ class RangeIndex:
             return self._by_loop(source, here, reach_m, near)
         return self._by_array(self._placed(), source, here, reach_m)
 
+    def _check_near(self) -> None:
+        """Begin ``_near`` anew if any receiver has moved too far."""
+        self._near_holds = True
+        for receiver in self._receivers:
+            here, before = self.positions[receiver], self._before[receiver]
+            if here is not None and (before is None or not _is_within(here, before, MOST_MOVED_M)):
+                self._before, self._array_before = self.positions, self._placed()
+                self._near.clear()
+                return
+
     def _placed(self) -> Floats:
-        """Return the receivers' positions (3, R) [m]; begin ``_near`` anew if any moved too far."""
+        """Return the receivers' positions (3, R) [m]."""
         if self._array is None:
             known = [self.positions[receiver] or (nan, nan, nan) for receiver in self._receivers]
             self._array = np.array(known).T.copy()
-            moved = self._array - self._array_before
-            square = moved * moved
-            stayed = square[0] + square[1] + square[2] <= MOST_MOVED_M**2
-            if not (stayed | np.isnan(self._array[0])).all():
-                self._array_before = self._array
-                self._near.clear()
         return self._array
 
     def _by_loop(
