@@ -50,7 +50,7 @@ class RadioUse:
 
     def __init__(self, rows: int, tick_hz: float) -> None:
         self._tick_hz = tick_hz
-        self._running_ticks = np.zeros(rows, dtype=np.int64)
+        self._running_ticks = [0] * rows
         self._heard = LinkCounter(rows)
         self._needed = LinkCounter(rows)
 
@@ -65,7 +65,9 @@ class RadioUse:
 
     def count_tick(self, running: NDArray[np.bool_]) -> None:
         """Count one tick for the agents that are running (N,)."""
-        self._running_ticks += running
+        for agent, runs in enumerate(running.tolist()):
+            if runs:
+                self._running_ticks[agent] += 1
 
     def heard(self) -> Links:
         """Return each agent's direct links."""
@@ -82,7 +84,7 @@ class RadioUse:
         """
         if counters is None or not counters.sent_b:
             return None
-        running_s = (self._running_ticks / self._tick_hz).tolist()
+        running_s = [ticks / self._tick_hz for ticks in self._running_ticks]
         return {
             name: [
                 sent_b / time_s if time_s else None

@@ -114,8 +114,10 @@ def _reasons(rows: list[Telemetry]) -> NDArray[np.float32]:
 
 
 def _attitude(world: World) -> NDArray[np.float32]:
-    poses = zip(world.vehicles.yaws, world.vehicles.tilts, strict=True)
-    return np.array([(yaw, *tilt) for yaw, tilt in poses], dtype=np.float32)
+    row: list[float] = []
+    for yaw, (pitch, roll) in zip(world.vehicles.yaws, world.vehicles.tilts, strict=True):
+        row += (yaw, pitch, roll)
+    return np.array(row, dtype=np.float32).reshape(-1, 3)
 
 
 def _links(rows: list[Telemetry]) -> NDArray[np.int32]:

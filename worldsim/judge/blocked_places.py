@@ -93,14 +93,19 @@ class Watchers:
         """(N,): the farthest distance from which each agent ever heard a member [m]."""
         self._hearer = self._heard = np.empty(0, dtype=np.int64)
         """(P,): the pairs that may still raise the distance of a hearer."""
+        self._hears: NDArray[np.bool_] | None = None
+        """What they were found from; None after a restart."""
 
     def restart(self, agent: int) -> None:
         """Forget what an agent heard: its process starts anew."""
         self._farthest_m[agent] = 0.0
+        self._hears = None
 
     def hear(self, hears: NDArray[np.bool_]) -> None:
         """Take which agent hears which from now on. hears: (N, N), row hears column."""
-        self._keep(*np.nonzero(hears))
+        if hears is not self._hears:
+            self._hears = hears
+            self._keep(*np.nonzero(hears))
 
     def see(self, position: Floats) -> None:
         """Take where the vehicles are (N, 3) [m; world frame]; ticks come in order."""

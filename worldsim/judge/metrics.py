@@ -43,18 +43,25 @@ class Separation:
         sweep = _Sweep(self._before if self._before is not None else after, after)
         self._before = after
         self._place(after)
-        searched = 0
-        for row in range(len(after)):
+        everyone, searched = list(range(len(after))), 0
+        for row in everyone:
             near = self._index.near(row, self._within_m)
-            sweep.take(row, [other for other in near if other > row])
             searched += len(near)
+            if len(near) == len(after):
+                sweep.take(row, everyone[row + 1 :])
+            else:
+                sweep.take(row, [other for other in near if other > row])
         if searched < len(after) ** 2:
-            far = sweep.beyond(self._within_m)
-            for row in far:
-                sweep.take(row, [other for other in range(len(after)) if other != row])
-            if len(far) > len(after) // FEW:
-                self._within_m *= 2.0
+            self._search_far(sweep, everyone)
         return np.array([sqrt(square) if square < inf else nan for square in sweep.square])
+
+    def _search_far(self, sweep: "_Sweep", everyone: list[int]) -> None:
+        """Search the nearest farther away; next time near by where that is done for many."""
+        far = sweep.beyond(self._within_m)
+        for row in far:
+            sweep.take(row, everyone[:row] + everyone[row + 1 :])
+        if len(far) > len(everyone) // FEW:
+            self._within_m *= 2.0
 
     def _place(self, position: list[Vector]) -> None:
         if len(self._index.positions) != len(position):
