@@ -126,3 +126,20 @@ def test_a_member_that_takes_its_place_later_is_waited_for():
         return replace(tick, place=place)
 
     assert judged(gathered, unplaced).stands_s == [pytest.approx(4.0), 0.0, 0.0, 0.0]
+
+
+def test_a_member_that_creeps_away_breaks_its_line_once_it_is_too_far():
+    def creeping(time_s):
+        position = SLOTS.copy()
+        outward = SLOTS[FIRST[-1]] - SLOTS[FIRST[0]]
+        position[FIRST[-1]] += 0.1 * max(0.0, time_s - 2.0) * outward
+        return position
+
+    found = judged(creeping)
+    assert found.stands_s[0] is None
+    assert found.stands_s[1:] == [0.0] * 3
+
+
+def test_a_line_that_creeps_away_as_a_whole_stands():
+    found = judged(lambda time_s: SLOTS + 0.1 * time_s * AWAY)
+    assert found.stands_s == [0.0] * 4
