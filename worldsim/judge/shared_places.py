@@ -1,6 +1,5 @@
 """Places that several agents claim, and for how long: I4 of the invariants."""
 
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -30,13 +29,13 @@ class SharedPlaces:
         """Find the agents that share their place. members: the rows of each component."""
         self._claims, self._shared = claims, [False] * len(claims)
         for rows in members:
-            held = Counter(claims[row] for row in rows)
+            holders: dict[tuple[int, int], list[int]] = {}
             for row in rows:
-                claim = claims[row]
-                twice = claim[0] >= 0 and held[claim] > 1
-                self._shared[row] = twice and (
-                    not self.local or self._hears_rival(row, rows, hears)
-                )
+                holders.setdefault(claims[row], []).append(row)
+            for claim, sharing in holders.items():
+                if claim[0] >= 0 and len(sharing) > 1:
+                    for row in sharing:
+                        self._shared[row] = not self.local or _hears_rival(row, sharing, hears)
 
     def count_lasting(self, time_s: float, longest_s: float) -> int:
         """Return how many agents have shared their present place for longer than that [s]."""
@@ -56,11 +55,9 @@ class SharedPlaces:
         """Start anew: none has shared its place until now."""
         self._since = {}
 
-    def _hears_rival(self, row: int, rows: Sequence[int], hears: Hears | None) -> bool:
-        """Whether an agent of the component that it hears, and that hears it, claims its place."""
-        return hears is not None and any(
-            other != row
-            and self._claims[other] == self._claims[row]
-            and bool(hears[row, other] and hears[other, row])
-            for other in rows
-        )
+
+def _hears_rival(row: int, sharing: Sequence[int], hears: Hears | None) -> bool:
+    """Whether an agent hears another of those that share its place, and is heard by it."""
+    if hears is None:
+        return False
+    return any(other != row and bool(hears[row, other] and hears[other, row]) for other in sharing)
