@@ -232,7 +232,8 @@ class _Reached(NamedTuple):
 def _neighbours(linked: NDArray[np.bool_]) -> list[list[int]]:
     """Return the agents to which frames of each get through. linked: (N, N), row to column."""
     found: list[list[int]] = [[] for _ in range(len(linked))]
-    for row, column in np.argwhere(linked).tolist():
+    rows, columns = np.nonzero(linked)
+    for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
         found[row].append(column)
     return found
 
