@@ -7,6 +7,7 @@ agents then remember the vehicle, for a limited time.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,10 +90,10 @@ class Watchers:
 
     def __init__(self, senses: Sequence[bool]) -> None:
         self._senses = senses
-        self._farthest_m = np.zeros(len(senses))
-        """(N,): the farthest distance from which each agent ever heard a member [m]."""
-        self._hearer = self._heard = np.empty(0, dtype=np.int64)
-        """(P,): the pairs that may still raise the distance of a hearer."""
+        self._farthest_m = [0.0] * len(senses)
+        """The farthest distance from which each agent ever heard a member [m]."""
+        self._heard: dict[int, list[int]] = {}
+        """By hearer: those that it hears, while it senses farther than it has heard."""
         self._hears: NDArray[np.bool_] | None = None
         """What they were found from; None after a restart."""
 
@@ -103,17 +104,29 @@ class Watchers:
 
     def hear(self, hears: NDArray[np.bool_]) -> None:
         """Take which agent hears which from now on. hears: (N, N), row hears column."""
-        if hears is not self._hears:
-            self._hears = hears
-            self._keep(*np.nonzero(hears))
+        if hears is self._hears:
+            return
+        self._hears, self._heard = hears, {}
+        hearers, heard = np.nonzero(hears)
+        for hearer, other in zip(hearers.tolist(), heard.tolist(), strict=True):
+            if self._farthest_m[hearer] < SURE_RANGE_M:
+                self._heard.setdefault(hearer, []).append(other)
 
     def see(self, position: Floats) -> None:
         """Take where the vehicles are (N, 3) [m; world frame]; ticks come in order."""
-        if not len(self._hearer):
+        if not self._heard:
             return
-        away = position[self._hearer] - position[self._heard]
-        np.fmax.at(self._farthest_m, self._hearer, np.sqrt(np.sum(away * away, axis=1)))
-        self._keep(self._hearer, self._heard)
+        rows: list[Vector] = [(x, y, z) for x, y, z in position.tolist()]
+        for hearer, heard in list(self._heard.items()):
+            x, y, z = rows[hearer]
+            farthest = self._farthest_m[hearer]
+            for other in heard:
+                a, b, c = rows[other]
+                u, v, w = x - a, y - b, z - c
+                farthest = max(farthest, sqrt(u * u + v * v + w * w))
+            self._farthest_m[hearer] = farthest
+            if farthest >= SURE_RANGE_M:
+                del self._heard[hearer]
 
     def seen_by(self, position: Floats, team: list[int]) -> NDArray[np.bool_]:
         """Return which vehicles (N,) some agents of a team (rows) surely take for occupants.
@@ -123,14 +136,9 @@ class Watchers:
         watchers = [row for row in team if self._senses[row]]
         away = position[watchers, None] - position[None]
         distance = np.sqrt(np.sum(away * away, axis=2))
-        reach_m = np.minimum(SURE_RANGE_M, self._farthest_m[watchers])
-        seen: NDArray[np.bool_] = np.any(distance <= reach_m[:, None], axis=0)
+        reach_m = [min(SURE_RANGE_M, self._farthest_m[row]) for row in watchers]
+        seen: NDArray[np.bool_] = np.any(distance <= np.array(reach_m)[:, None], axis=0)
         return seen
-
-    def _keep(self, hearer: NDArray[np.int64], heard: NDArray[np.int64]) -> None:
-        """Keep the pairs whose hearer senses farther than it has heard."""
-        open_ = self._farthest_m[hearer] < SURE_RANGE_M
-        self._hearer, self._heard = hearer[open_], heard[open_]
 
 
 @dataclass(frozen=True)

@@ -149,13 +149,16 @@ class Connectivity:
 
         None gets from an agent to itself. position (N, 3) [m; world frame].
         """
-        away = position[:, None] - position[None]
+        square = np.zeros((len(position), len(position)))
+        for axis in position.T:
+            away = axis[:, None] - axis
+            square += away * away
         usable = ~self._cut & alive[:, None] & alive
         if self._network.obstructed:
             free = [not self._network.jammed((x, y, z)) for x, y, z in position.tolist()]
             usable &= np.outer(free, free)
         np.fill_diagonal(usable, val=False)
-        return np.sqrt(np.sum(away * away, axis=2)), usable
+        return np.sqrt(square), usable
 
     def _lost_over(self, channel: int, distance: Floats) -> Floats:
         """Return the share of a channel's frames that links lose over distances (N, N) [m].

@@ -5,7 +5,7 @@ from typing import Final, final
 
 import numpy as np
 
-from agent.messages import Vector
+from agent.messages import FLIGHT_M, Vector
 from netem.range_index import RangeIndex
 from worldsim.judge.tick import Packets
 from worldsim.truth.obstacles import Obstacles
@@ -16,9 +16,9 @@ MIN_SQUARE_M2: Final = 1e-300
 ROUNDING_M: Final = 1e-9
 """A distance this much below its bound keeps it [m]: at 1e6 m, positions are rounded to 1e-10 m."""
 FIRST_WITHIN_M: Final = 2.0
-"""[m]"""
-FEW: Final = 8
-"""At most one vehicle in so many is searched for its nearest among all others."""
+"""Within this distance, a vehicle of a large fleet is searched for its nearest first [m]."""
+LAST_WITHIN_M: Final = 4.0 * FLIGHT_M
+"""No two vehicles are so far apart [m]."""
 FATES = ("delivered", "dropped_", "in_flight")
 """Prefixes of the counters that together hold every addressed packet."""
 
@@ -30,8 +30,6 @@ class Separation:
     def __init__(self) -> None:
         self._index = RangeIndex(0, ())
         self._before: list[Vector] | None = None
-        self._within_m = FIRST_WITHIN_M
-        """Within this distance, a vehicle of a large fleet is searched for its nearest first."""
 
     def swept(self, position: Floats) -> Floats:
         """Return the distances (N,) [m] since the previous tick; at the first tick, those now.
@@ -45,23 +43,24 @@ class Separation:
         self._place(after)
         everyone, searched = list(range(len(after))), 0
         for row in everyone:
-            near = self._index.near(row, self._within_m)
+            near = self._index.near(row, FIRST_WITHIN_M)
             searched += len(near)
             if len(near) == len(after):
                 sweep.take(row, everyone[row + 1 :])
             else:
                 sweep.take(row, [other for other in near if other > row])
         if searched < len(after) ** 2:
-            self._search_far(sweep, everyone)
+            for row in everyone:
+                self._search_farther(sweep, row)
         return np.array([sqrt(square) if square < inf else nan for square in sweep.square])
 
-    def _search_far(self, sweep: "_Sweep", everyone: list[int]) -> None:
-        """Search the nearest farther away; next time near by where that is done for many."""
-        far = sweep.beyond(self._within_m)
-        for row in far:
-            sweep.take(row, everyone[:row] + everyone[row + 1 :])
-        if len(far) > len(everyone) // FEW:
-            self._within_m *= 2.0
+    def _search_farther(self, sweep: "_Sweep", row: int) -> None:
+        """Search a vehicle's nearest in wider and wider circles, as far as it takes."""
+        within_m = FIRST_WITHIN_M
+        while sweep.may_be_farther(row, within_m) and within_m < LAST_WITHIN_M:
+            within_m *= 2.0
+            near = self._index.near(row, within_m)
+            sweep.take(row, [other for other in near if other != row])
 
     def _place(self, position: list[Vector]) -> None:
         if len(self._index.positions) != len(position):
@@ -80,6 +79,7 @@ class _Sweep:
         self._before, self._after = before, after
         self.square: list[float] = [inf] * len(after)
         """Of the least distance so far [m^2]; infinite before any."""
+        self._longest_way_m = _longest_way_m(before, after)
 
     def take(self, row: int, others: list[int]) -> None:
         """Take how near a vehicle and others come to each other."""
@@ -100,27 +100,14 @@ class _Sweep:
             square[other] = min(square[other], found)
         square[row] = least
 
-    def beyond(self, within_m: float) -> list[int]:
-        """Return the vehicles whose nearest may be none of those within a distance [m] now.
+    def may_be_farther(self, row: int, within_m: float) -> bool:
+        """Return whether a vehicle's nearest may be none of those within a distance [m] now.
 
         Two vehicles that are farther apart now were no nearer than both ways allow.
         """
-        surely_m = within_m - 2.0 * self._longest_way_m() - ROUNDING_M
-        surely = surely_m * surely_m if surely_m > 0.0 else -1.0
-        return [
-            row
-            for row, square in enumerate(self.square)
-            if square > surely and not isnan(self._after[row][0])
-        ]
-
-    def _longest_way_m(self) -> float:
-        """Return how far a vehicle has moved at most [m]."""
-        longest = 0.0
-        for (x, y, z), (to_x, to_y, to_z) in zip(self._before, self._after, strict=True):
-            u, v, w = to_x - x, to_y - y, to_z - z
-            square = u * u + v * v + w * w
-            longest = max(longest, square)
-        return sqrt(longest)
+        surely_m = within_m - 2.0 * self._longest_way_m - ROUNDING_M
+        found = surely_m > 0.0 and self.square[row] <= surely_m * surely_m
+        return not found and not isnan(self._after[row][0])
 
 
 def swept_obstacle_distance(
@@ -148,3 +135,12 @@ def conserved(packets: Packets) -> bool:
         if name.startswith(FATES):
             known += count
     return known == packets["addressed"]
+
+
+def _longest_way_m(before: list[Vector], after: list[Vector]) -> float:
+    """Return how far a vehicle has moved at most [m]."""
+    longest = 0.0
+    for (x, y, z), (to_x, to_y, to_z) in zip(before, after, strict=True):
+        u, v, w = to_x - x, to_y - y, to_z - z
+        longest = max(longest, u * u + v * v + w * w)
+    return sqrt(longest)
