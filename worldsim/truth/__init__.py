@@ -1,1 +1,1 @@
-"""The true state of the world as arrays over the fleet: vehicles, sensors and obstacles."""
+"""The true state of the world: vehicles, sensors and obstacles."""
