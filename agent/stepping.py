@@ -33,11 +33,8 @@ class AgentStepper:
         self._guard.enter()
         outbox = self.core.step(observation)
         self._guard.leave()
+        frames = tuple([Outgoing(channel, payload) for channel, payload in outbox.frames])
+        transmission = pack(Transmission(observation.slot, self._incarnation, frames))
+        # One directly after the other: the two then often leave in one packet.
         self._put_command(encode(outbox.command))
-        frames = tuple(
-            Outgoing(channel=channel, payload=payload) for channel, payload in outbox.frames
-        )
-        transmission = Transmission(
-            slot=observation.slot, incarnation=self._incarnation, frames=frames
-        )
-        self._put_transmission(pack(transmission))
+        self._put_transmission(transmission)

@@ -5,6 +5,9 @@ thread of ours or blocks a sender.
 """
 
 import signal
+
+# signal.signal without its conversions to and from enums, which cost more than the rest of a wait.
+from _signal import signal as _set_handler  # type: ignore[import-not-found]
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from operator import call
 from types import FrameType
@@ -20,6 +23,7 @@ QUERY_TIMEOUT = "Timeout"
 """Zenoh's error reply in place of a process that received a query and did not reply in time."""
 LIVELINESS_RING = 4096
 QUERY_RING = 4096
+_ALARM = int(signal.SIGALRM)
 
 _T = TypeVar("_T")
 _T_co = TypeVar("_T_co", covariant=True)
@@ -55,7 +59,7 @@ class _Alarm:
     def within(self, timeout_s: float, wait: Callable[[], _T]) -> _T | None:
         """Return the result of ``wait``, or None when it has none by ``timeout_s`` [s]."""
         items: list[_T] = []
-        before = signal.signal(signal.SIGALRM, self._ring)
+        before = _set_handler(_ALARM, self._ring)
         try:
             self._waiting = True
             signal.setitimer(signal.ITIMER_REAL, timeout_s)
@@ -66,7 +70,7 @@ class _Alarm:
             self._waiting = False
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
-            signal.signal(signal.SIGALRM, before)
+            _set_handler(_ALARM, before)
         return items[0] if items else None
 
     def _ring(self, _number: int, _frame: FrameType | None) -> None:

@@ -19,6 +19,14 @@ MAX_MESSAGE_B = 4 * 1024 * 1024
 LONG_LEASE_S = 24 * 3600
 """Lease of a session in lockstep: a process that is paused sends no keep-alives for so long."""
 
+_RUNTIMES = ("acc", "net", "rx", "tx")
+"""What Zenoh calls its groups of threads, beside that of the application."""
+ROUTER_THREADS = "(rx: (worker_threads: 1))"
+"""One receiving thread is enough, and saves a tenth of the CPU time."""
+CLIENT_THREADS = "({})".format(", ".join(f"{each}: (handover: app)" for each in _RUNTIMES))
+"""A client's one thread reads, writes and watches its only socket: no thread has to wake another.
+A router needs several: it waits for room in a queue that another thread empties."""
+
 _ENDPOINT = re.compile(r"(?P<protocol>[a-z][a-z-]*)/(?P<address>.+)")
 _IN_USE = re.compile(r"in use|lock", re.IGNORECASE)
 
@@ -38,7 +46,7 @@ def open_router(
     """
     _refuse_all_but_loopback(listen)
     try:
-        return _open(router_config(listen, long_lease, access))
+        return _open(router_config(listen, long_lease, access), ROUTER_THREADS)
     except zenoh.ZError as error:
         raise SessionError(f"{listen}: {_cause(error)}") from error
 
@@ -56,16 +64,18 @@ def open_client(
     """
     _address(connect)
     try:
-        return _open(client_config(connect, timeout_s, long_lease, login))
+        return _open(client_config(connect, timeout_s, long_lease, login), CLIENT_THREADS)
     except zenoh.ZError as error:
         raise SessionError(f"no router answers at {connect} within {timeout_s:g} s") from error
 
 
-def _open(config: zenoh.Config) -> zenoh.Session:
-    """Open a session. Raises ZError, and SessionError where Zenoh itself breaks down."""
-    # One receiving thread is enough, and saves a tenth of the CPU time. A value of the user's own
-    # that Zenoh does not understand would end the process.
-    os.environ["ZENOH_RUNTIME"] = "(rx: (worker_threads: 1))"
+def _open(config: zenoh.Config, threads: str) -> zenoh.Session:
+    """Open a session. Raises ZError, and SessionError where Zenoh itself breaks down.
+
+    threads: only those of a process's first session count.
+    """
+    # A value of the user's own that Zenoh does not understand would end the process.
+    os.environ["ZENOH_RUNTIME"] = threads
     try:
         return zenoh.open(config)
     except BaseException as error:
