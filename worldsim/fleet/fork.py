@@ -17,6 +17,8 @@ from worldsim.fleet.child_output import finish_output, flush_output, redirect_ou
 END_SIGNALS = frozenset({signal.SIGINT, signal.SIGHUP, signal.SIGTERM})
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
+_prctl_of_libc = ctypes.CDLL(None, use_errno=True).prctl
+"""Looked up once: a look-up makes a class, in every child on memory pages of its own."""
 
 
 class ProcessExit(NamedTuple):
@@ -144,6 +146,5 @@ def _parent_of(pid: int) -> int | None:
 
 
 def _prctl(option: int, value: int, name: str) -> None:
-    libc = ctypes.CDLL(None, use_errno=True)
-    if libc.prctl(option, value, 0, 0, 0) != 0:
+    if _prctl_of_libc(option, value, 0, 0, 0) != 0:
         raise OSError(ctypes.get_errno(), f"prctl({name})")

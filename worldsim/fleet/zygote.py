@@ -31,6 +31,7 @@ from worldsim.fleet.ipc import (
     ToZygote,
     ZygoteToLauncher,
 )
+from worldsim.fleet.warm_up import warm_up
 
 END_WITHIN_S = 2.0
 AGENT_MEMORY_B = 2 * 1024**3
@@ -72,6 +73,7 @@ class Zygote:
         Returns the exit status: 0, or 1 after a message that does not decode.
         """
         adopt_orphans()
+        warm_up()
         gc.freeze()  # keeps the warm objects' memory pages shared with the children
         self._selector.register(self._launcher, selectors.EVENT_READ, self._receive)
         while not self._ending:
