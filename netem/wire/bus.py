@@ -100,15 +100,21 @@ class Subscriber:
 
     def __init__(self, session: zenoh.Session, key: str, size: int) -> None:
         self._handler = session.declare_subscriber(key, RingChannel(size))
+        self._try_recv = self._handler.try_recv
 
     def wait(self, timeout_s: float) -> bytes | None:
         """Return the next payload, or None when none arrives by ``timeout_s`` [s]."""
-        sample = receive(self._handler, timeout_s)
+        sample = self._try_recv()
+        if sample is None:
+            sample = _alarm.within(timeout_s, self._handler.recv)
         return sample.payload.to_bytes() if sample is not None else None
 
     def drain(self, quota: int) -> list[bytes]:
         """Return the payloads that have arrived, oldest first, at most ``quota``."""
-        return [sample.payload.to_bytes() for sample in drain(self._handler, quota)]
+        payloads: list[bytes] = []
+        while len(payloads) < quota and (sample := self._try_recv()) is not None:
+            payloads.append(sample.payload.to_bytes())
+        return payloads
 
 
 class FairSubscriber:
