@@ -21,6 +21,8 @@ class FreeRunningAgent:
     """An agent on wall-clock pace; about once a second it reports how late frames were used."""
 
     def __init__(self, bus: Bus, setup: AgentSetup, guard: StepGuard | None = None) -> None:
+        self.inputs = bus.subscriber("observation", setup.id)
+        """Each makes the agent step: the newest observation."""
         command, radio = bus.publisher("command", setup.id), bus.publisher("tx", setup.id)
         self._stepper = AgentStepper(setup, command, radio, guard)
         self._batches = bus.subscriber("rx", setup.id, BATCH_RING)

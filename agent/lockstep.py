@@ -1,49 +1,35 @@
-"""The lockstep shell of an agent: it waits for both the observation and the inbox of each slot.
+"""The lockstep shell of an agent: it steps on the inbox of each slot, observation included.
 
-A message of another slot ends the run.
+A message that cannot be decoded ends the run.
 """
-
-from collections.abc import Callable
 
 from agent.codec import decode_observation
 from agent.config import AgentSetup
+from agent.messages import Observation
 from agent.rejection import RejectedError
 from agent.step_page import StepGuard
 from agent.stepping import AgentStepper
-from netem.wire.barrier import LOCKSTEP_RING, LockstepError, await_message, check_slot
-from netem.wire.bus import Bus, Subscriber
+from netem.wire.barrier import LOCKSTEP_RING, LockstepError, check_slot
+from netem.wire.bus import Bus
 from netem.wire.frame import Batch, Inbox, WireError, unpack_batch, unpack_inbox
 
 
 class LockstepAgent:
-    """An agent in lockstep. run_is_over: asked while it waits for an inbox."""
+    """An agent in lockstep."""
 
-    def __init__(
-        self,
-        bus: Bus,
-        setup: AgentSetup,
-        run_is_over: Callable[[], bool],
-        guard: StepGuard | None = None,
-    ) -> None:
+    def __init__(self, bus: Bus, setup: AgentSetup, guard: StepGuard | None = None) -> None:
+        self.inputs = bus.subscriber("rx", setup.id, LOCKSTEP_RING)
+        """Each makes the agent step: an inbox."""
         command = bus.publisher("command", setup.id, lockstep=True)
         radio = bus.publisher("tx", setup.id, lockstep=True)
         self._stepper = AgentStepper(setup, command, radio, guard)
-        self._inbox = bus.subscriber("rx", setup.id, LOCKSTEP_RING)
-        self._run_is_over = run_is_over
 
     def observe(self, data: bytes) -> None:
-        """Step on an encoded observation, with the inbox of its slot.
-
-        Raises LockstepError if either is missing, cannot be decoded or is of another slot;
-        UnwantedError if the run ends while it waits.
-        """
-        try:
-            observation = decode_observation(data)
-        except RejectedError as error:
-            raise LockstepError(f"an observation cannot be decoded: {error}") from error
-        name = f"the inbox of slot {observation.slot}"
-        inbox = _inbox(name, self._inbox, self._run_is_over)
-        check_slot(name, inbox.slot, observation.slot)
+        """Step on an encoded inbox. Raises LockstepError if it, or a part of it, is malformed."""
+        inbox = _inbox(data)
+        name = f"the inbox of slot {inbox.slot}"
+        observation = _observation(name, inbox.observation)
+        check_slot(f"the observation in {name}", observation.slot, inbox.slot)
         for batch in inbox.batches:
             self._stepper.receive(_batch(name, batch), observation.time_s)
         self._stepper.step(observation)
@@ -52,11 +38,18 @@ class LockstepAgent:
         """Report nothing: in lockstep no frame is late."""
 
 
-def _inbox(name: str, subscriber: Subscriber, run_is_over: Callable[[], bool]) -> Inbox:
+def _inbox(data: bytes) -> Inbox:
     try:
-        return unpack_inbox(await_message(subscriber, name, run_is_over))
+        return unpack_inbox(data)
     except WireError as error:
-        raise LockstepError(f"{name}: {error}") from error
+        raise LockstepError(f"an inbox: {error}") from error
+
+
+def _observation(name: str, data: bytes) -> Observation:
+    try:
+        return decode_observation(data)
+    except RejectedError as error:
+        raise LockstepError(f"{name}: its observation cannot be decoded: {error}") from error
 
 
 def _batch(name: str, data: bytes) -> Batch:

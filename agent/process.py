@@ -16,8 +16,8 @@ from agent.free_running import FreeRunningAgent
 from agent.lockstep import LockstepAgent
 from agent.step_page import StepGuard
 from netem.wire.access import AccessError, login_of
-from netem.wire.barrier import LockstepError, RunOverError
-from netem.wire.bus import Bus, RefusedError, Subscriber
+from netem.wire.barrier import LockstepError
+from netem.wire.bus import Bus, RefusedError
 from netem.wire.keys import Keys, agent_name
 from netem.wire.session import SessionError, open_client
 from netem.wire.shutdown import RunEnd, StopRequest
@@ -119,20 +119,14 @@ def _checked_setup(answer: bytes) -> AgentSetup:
 
 
 def _run_shell(bus: Bus, setup: AgentSetup, guard: StepGuard, ending: RunEnd, run: str) -> None:
-    observations = bus.subscriber("observation", setup.id)
     shell = (
-        LockstepAgent(bus, setup, ending, guard)
-        if setup.lockstep
-        else FreeRunningAgent(bus, setup, guard)
+        LockstepAgent(bus, setup, guard) if setup.lockstep else FreeRunningAgent(bus, setup, guard)
     )
     _wait_for_listener(bus, ending)
     bus.declare_alive(f"agent-{setup.id}")
     print(f"agent-{setup.id} flies in run {run!r}", flush=True)
-    try:
-        _step_until_over(shell, observations, run, ending)
-        shell.report()
-    except RunOverError:
-        print(f"agent-{setup.id}: the run ended within a slot", flush=True)
+    _step_until_over(shell, run, ending)
+    shell.report()
     print(f"agent-{setup.id} is done", flush=True)
 
 
@@ -145,17 +139,15 @@ def _wait_for_listener(bus: Bus, ending: RunEnd) -> None:
         time.sleep(LISTEN_EVERY_S)
 
 
-def _step_until_over(
-    shell: FreeRunningAgent | LockstepAgent, observations: Subscriber, run: str, ending: RunEnd
-) -> None:
-    """Step on each observation until the run is over.
+def _step_until_over(shell: FreeRunningAgent | LockstepAgent, run: str, ending: RunEnd) -> None:
+    """Step on each of the shell's inputs until the run is over.
 
     Silence is counted in waits, not on a clock: a process that was stopped for a minute has not
     listened for a minute.
     """
     silent_s = 0.0
     while not ending():
-        data = observations.wait(WAIT_S)
+        data = shell.inputs.wait(WAIT_S)
         if data is not None:
             silent_s = 0.0
             shell.observe(data)

@@ -65,7 +65,7 @@ class LockstepMedium:
         for order in slot_input.orders:
             self._medium.apply(order)
         self._medium.place(slot_input.truth.positions)
-        self._send_batches(slot_input)
+        self._send_inboxes(slot_input)
         for sender in slot_input.participants:
             self._transmit(sender, slot_input)
         self._queue_batches(slot_input)
@@ -83,10 +83,12 @@ class LockstepMedium:
         rows = {len(slot_input.truth.positions), len(slot_input.incarnations), self._setup.agents}
         if len(rows) > 1 or max(slot_input.participants, default=0) >= self._setup.agents:
             raise LockstepError(f"the world's truth is not of {self._setup.agents} agents")
+        if len(slot_input.observations) != len(slot_input.participants):
+            raise LockstepError("the world's truth has not one observation for each participant")
         return slot_input
 
-    def _send_batches(self, slot_input: SlotInput) -> None:
-        """Send their pending batches to the participants.
+    def _send_inboxes(self, slot_input: SlotInput) -> None:
+        """Send the participants their observations, and the batches that wait for them.
 
         Batches for an agent that is gone, or for an earlier incarnation of it, are dropped.
         """
@@ -96,10 +98,12 @@ class LockstepMedium:
             gone = truth.positions[agent] is None
             if gone or incarnation != self._pending[agent].incarnation:
                 self._pending[agent] = PendingBatches(incarnation, deque(maxlen=BATCH_RING))
-        for agent in slot_input.participants:
+        for agent, observation in zip(
+            slot_input.participants, slot_input.observations, strict=True
+        ):
             if agent in self._own:
                 batches = self._pending[agent].batches
-                self._receivers[agent](pack(Inbox(truth.slot, tuple(batches))))
+                self._receivers[agent](pack(Inbox(truth.slot, observation, tuple(batches))))
                 batches.clear()
 
     def _transmit(self, sender: int, slot_input: SlotInput) -> None:

@@ -13,12 +13,12 @@ from msgspec import Meta
 
 from netem.faults import FaultOrder, Position
 from netem.link_parameters import Conditions
-from netem.wire.frame import AgentId, Count, unpack_typed
+from netem.wire.frame import AgentId, Count, EncodedObservation, unpack_typed
 
 MAX_TRUTH_B = 256 * 1024
 MAX_CONDITIONS_B = 1024 * 1024
 MAX_ORDERS_B = 1024 * 1024
-MAX_SLOT_INPUT_B = MAX_TRUTH_B + MAX_ORDERS_B
+MAX_SLOT_INPUT_B = 4 * 1024 * 1024
 MAX_SLOT_RESULT_B = 4 * 1024 * 1024
 
 
@@ -107,11 +107,13 @@ class MediumCounters(
 class SlotInput(
     msgspec.Struct, frozen=True, kw_only=True, array_like=True, gc=False, forbid_unknown_fields=True
 ):
-    """Everything that the medium needs to play one slot in lockstep."""
+    """Everything that the medium and the agents need to play one slot in lockstep."""
 
     truth: Truth
     participants: tuple[AgentId, ...]
     """The agents that step in the slot, in ascending order."""
+    observations: tuple[EncodedObservation, ...]
+    """Row i is for participant i, in its inbox."""
     incarnations: tuple[Count, ...]
     """Row i = agent i's current incarnation."""
     orders: tuple[FaultOrder, ...] = ()

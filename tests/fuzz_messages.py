@@ -144,6 +144,7 @@ def _targets(
     slot_input = SlotInput(
         truth=Truth(slot=3, time_s=0.0375, positions=positions),
         participants=(3, 7),
+        observations=(b"observation", b""),
         incarnations=(0,) * len(positions),
     )
     slot_result = SlotResult(slot=3, pages=((1, b"page"),), counters=fleet.medium_counters)
@@ -166,7 +167,7 @@ def _targets(
         Target("batch", unpack_batch, [batch]),
         Target("delivery", unpack_delivery, [pack(Delivery(3, heard, tuple(range(len(heard)))))]),
         Target("arrivals", unpack_report, [pack(tally.report(0))]),
-        Target("inbox", unpack_inbox, [pack(Inbox(3, (batch,)))]),
+        Target("inbox", unpack_inbox, [pack(Inbox(3, b"observation", (batch,)))]),
         Target("slot input", unpack_slot_input, [pack(slot_input)]),
         Target("slot result", unpack_slot_result, [pack(slot_result)]),
         Target("orders", lambda data: FaultQueue().put(data), [ORDERS]),

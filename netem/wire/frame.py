@@ -20,7 +20,8 @@ MAX_BATCH_B = 256 * 1024
 BATCH_RING = 8
 """Number of batches that wait for an agent; newer ones replace the oldest."""
 MAX_EARLY_US = 2**32 - 1
-MAX_INBOX_B = BATCH_RING * (MAX_BATCH_B + 5) + 16
+MAX_OBSERVATION_B = 64 * 1024
+MAX_INBOX_B = BATCH_RING * (MAX_BATCH_B + 5) + MAX_OBSERVATION_B + 16
 MAX_FRAMES = 4096
 """Greatest number of frames in a batch."""
 FRAME_HEAD_B = 26
@@ -31,6 +32,7 @@ MAX_DELIVERY_B = MAX_BATCH_B + 5 * (MAX_FRAMES + 1)
 Count = Annotated[int, Meta(ge=0, lt=2**53)]
 AgentId = Annotated[int, Meta(ge=0, lt=2**16)]
 Payload = Annotated[bytes, Meta(max_length=MAX_PAYLOAD_B)]
+EncodedObservation = Annotated[bytes, Meta(max_length=MAX_OBSERVATION_B)]
 
 
 class WireError(ValueError):
@@ -81,13 +83,13 @@ class Delivery(Batch, frozen=True, array_like=True, gc=False, forbid_unknown_fie
 
 
 class Inbox(msgspec.Struct, frozen=True, array_like=True, gc=False, forbid_unknown_fields=True):
-    """All batches that wait for one agent when it steps in a slot, encoded; for lockstep.
-
-    Usually one; none at an agent's first step, several after a pause.
-    """
+    """Everything that one agent needs for its step in a slot; for lockstep."""
 
     slot: Count
+    observation: EncodedObservation
+    """From the world; the medium passes it on unread."""
     batches: Annotated[tuple[bytes, ...], Meta(max_length=BATCH_RING)]
+    """Encoded, oldest first: usually one; none at an agent's first step, several after a pause."""
 
 
 _T = TypeVar("_T")

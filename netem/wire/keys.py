@@ -33,10 +33,14 @@ TOPICS = {
     "orders": Topic("orders", "world", "netem", "at an event", True, "changes, partitions"),
     "control": Topic("control", "world", "operator", "query, at will", True, "missions, faults"),
     "truth": Topic("truth", "world", "netem", "each slot", False, "true positions"),
-    "observation": Topic("obs/{id}", "world", "agent", "tick_hz", False, "own pose and sensors"),
+    "observation": Topic(
+        "obs/{id}", "world", "agent", "tick_hz, not in lockstep", False, "own pose and sensors"
+    ),
     "command": Topic("cmd/{id}", "agent", "world", "tick_hz", False, "velocity and telemetry"),
     "tx": Topic("radio/tx/{id}", "agent", "netem", "tick_hz", False, "frames to send"),
-    "rx": Topic("radio/rx/{id}", "netem", "agent", "tick_hz", False, "a batch of frames"),
+    "rx": Topic(
+        "radio/rx/{id}", "netem", "agent", "tick_hz", False, "frames; observation too in lockstep"
+    ),
     "arrivals": Topic("arrivals/{id}", "agent", "world", "1 Hz and at the end", False, "latency"),
     "done": Topic("done/{id}", "netem", "world", "each slot, lockstep", True, "a slot's verdicts"),
     "verdicts": Topic("verdicts", "netem", "world", "1 Hz and at the end", False, "counters"),

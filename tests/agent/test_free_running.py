@@ -30,8 +30,8 @@ class FakeBus:
         self.received = FakeSubscriber()
         self.published = defaultdict(list)
 
-    def subscriber(self, _topic, _agent, _size):
-        return self.received
+    def subscriber(self, topic, _agent, _size=1):
+        return self.received if topic == "rx" else FakeSubscriber()
 
     def publisher(self, topic, _agent):
         return self.published[topic].append

@@ -1,8 +1,9 @@
 """A fleet of real processes in lockstep: simulated time waits for every process.
 
-In each slot the due operations are carried out and confirmed; a turn is sent to each medium and an
-observation to each agent that steps; when every agent's command and every medium's answer have
-arrived, the vehicles move. Whatever the host's speed and load, the run equals that of virtual time.
+In each slot the due operations are carried out and confirmed; its input is sent to each medium,
+which passes the observations on with the frames; when every agent's command and every medium's
+answer have arrived, the vehicles move. Whatever the host's speed and load, the run equals that of
+virtual time.
 """
 
 import time
@@ -102,7 +103,6 @@ class LockstepFleet:
         self._digest = Digest()
         self._truth = bus.publisher("truth", lockstep=True)
         self._over = bus.publisher("over")
-        self._observers = [bus.publisher("observation", agent, lockstep=True) for agent in rows]
         self._commands = [bus.subscriber("command", agent, LOCKSTEP_RING) for agent in rows]
         self._done = [bus.subscriber("done", shard, LOCKSTEP_RING) for shard in range(shards)]
 
@@ -163,13 +163,12 @@ class LockstepFleet:
     def _send(self, opened: OpenSlot) -> None:
         slot_input = SlotInput(
             truth=Truth(slot=opened.slot, time_s=opened.time_s, positions=opened.positions),
-            participants=tuple(agent for agent, _ in opened.observations),
+            participants=tuple([agent for agent, _ in opened.observations]),
+            observations=tuple([encode(observation) for _, observation in opened.observations]),
             incarnations=tuple(self.loop.members.incarnations),
             orders=self._actions.orders(),
         )
         self._truth(pack(slot_input))
-        for agent, observation in opened.observations:
-            self._observers[agent](encode(observation))
 
     def _await_command(self, agent: int, slot: int) -> None:
         what = f"agent-{agent}'s command of slot {slot}"

@@ -54,10 +54,11 @@ def warm_up() -> list[Command]:
 
 def _step(agent: Agent, step: int, batch: bytes) -> Outbox:
     """Step as an agent's shell does, with all messages encoded and decoded."""
-    observation = decode_observation(encode(_observation(agent.id, step)))
-    inbox = unpack_inbox(pack(Inbox(observation.slot, (batch,))))
-    for data in inbox.batches:
-        for frame in unpack_batch(data).frames:
+    data = pack(Inbox(SLOTS_PER_TICK * step, encode(_observation(agent.id, step)), (batch,)))
+    inbox = unpack_inbox(data)
+    observation = decode_observation(inbox.observation)
+    for each in inbox.batches:
+        for frame in unpack_batch(each).frames:
             if frame.source != agent.id:
                 agent.receive(frame.source, frame.channel, frame.payload, observation.time_s)
     outbox = agent.step(observation)
