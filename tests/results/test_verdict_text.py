@@ -81,20 +81,31 @@ def test_the_viewer_is_named_where_there_is_a_recording(summary: Summary) -> Non
         ),
         (
             row("reform_within_s", 10.0, 3.25, True),
-            "  met      formation restored within 3.25 s of each team change (limit 10 s)",
+            "  met      formation restored within 3.25 s of each fault (limit 10 s)",
         ),
         (
             row("reform_within_s", 10.0, None, True),
-            "  -        formation after a team change: not tested, the team never changed"
-            " (limit 10 s)",
+            "  -        formation after a fault: not tested, there was none (limit 10 s)",
         ),
         (
             row("attitude_within_deg", 5.0, 41.26, False),
-            "  NOT MET  largest attitude error at the slots: 41.3 degrees (required <= 5)",
+            "  NOT MET  largest attitude error at the slots: 41.3 degrees (required <= 5 degrees)",
         ),
         (
             row("attitude_within_deg", 5.0, None, True),
-            "  -        largest attitude error at the slots: not measured (required <= 5)",
+            "  -        largest attitude error at the slots: not measured (required <= 5 degrees)",
+        ),
+        (
+            row("in_formation_fraction", 0.95, 0.925, False),
+            "  NOT MET  time in formation: 92.5 % (required >= 95 %)",
+        ),
+        (
+            row("max_slot_error_m", 0.12, 0.034, True),
+            "  met      largest slot error in formation: 0.034 m (required <= 0.12 m)",
+        ),
+        (
+            row("max_slot_error_m", 0.12, None, False),
+            "  NOT MET  largest slot error in formation: an agent had no slot (required <= 0.12 m)",
         ),
         (row("added_later", 1, 2, True), "  met      added_later: 2 (required 1)"),
     ],

@@ -1,4 +1,7 @@
-"""Recoveries: the time until a team that changed stands in a complete formation again.
+"""Recoveries: the time until a team that was disturbed stands in a complete formation again.
+
+It is disturbed where agents are lost or come back, where the radio changes, and where a fault of
+the radio ends that parted it.
 
 Complete: the running agents hold exactly the places that the formation has for their number; a
 place in which a dead vehicle hovers is not among them (E18). Standing: each agent is within 0.12 m
@@ -11,26 +14,27 @@ import numpy as np
 from agent.messages import Place
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.phase import Phase
+from worldsim.judge.radio_events import RadioRunEvent
 from worldsim.judge.run_events import LOSS_KINDS, LossEvent, ReturnEvent
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import CONVERGED_S
 
 
 class Recovery(msgspec.Struct):
-    """A change of the team, and its time to re-form."""
+    """A disturbance of the team, and its time to re-form."""
 
     t_s: float
-    """When the team changed [s; simulated time]."""
+    """When it was [s; simulated time]."""
     kind: str
     """The kind of the events."""
     agents: list[int]
-    """The agents that were lost or came back."""
+    """The agents that were lost or came back; none for a change of the radio."""
     reformed_s: float | None = None
     """From the change to the start of the 2 s [s]; None until the team has re-formed."""
 
 
 class Recoveries:
-    """Every change of the team in a run. hovering: sees every tick first."""
+    """Every disturbance of the team in a run. hovering: sees every tick first."""
 
     def __init__(self, hovering: HoveringVehicles) -> None:
         self.all: list[Recovery] = []
@@ -52,6 +56,12 @@ class Recoveries:
             self._open.remove(last)
         else:
             last.agents.append(event.agent)
+
+    def handle_radio(self, event: RadioRunEvent) -> None:
+        """Take a change of the radio, after which the team is not parted, or no more."""
+        self._since_s = None
+        self.all.append(Recovery(event.t_s, event.kind, []))
+        self._open.append(self.all[-1])
 
     def see(self, tick: Tick, phase: Phase, in_place: bool) -> None:
         """Take a tick; in_place: whether every running agent is in its place."""

@@ -5,7 +5,7 @@ of a recording, it reaches the same verdict.
 """
 
 from math import inf, isnan
-from typing import NamedTuple, assert_never, final
+from typing import Final, NamedTuple, assert_never, final
 
 import numpy as np
 
@@ -13,10 +13,12 @@ from agent.guidance.cone import cone_of
 from agent.qstructure.formation import formation_of
 from worldsim.judge.finding import Expectation, InvariantTally
 from worldsim.judge.held_attitudes import HeldAttitudes
+from worldsim.judge.held_formation import HeldFormation
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.invariants import Invariants
 from worldsim.judge.metrics import Separation, conserved, keeps
 from worldsim.judge.obstacle_clearance import ObstacleClearance
+from worldsim.judge.parting_faults import PartingFaults
 from worldsim.judge.phase import Phase
 from worldsim.judge.queue_convergence import QueueConvergence
 from worldsim.judge.radio_events import RadioRunEvent
@@ -29,11 +31,13 @@ from worldsim.judge.run_events import (
     Killed,
     LateStart,
     Left,
+    LossEvent,
     MissionRunEvent,
     Paused,
     QueueChanged,
     Restarted,
     Resumed,
+    ReturnEvent,
     RoleChanged,
     RunEvent,
     SensorChanged,
@@ -45,6 +49,8 @@ from worldsim.scenario.tables import Scenario
 from worldsim.scenario.target_frame import path_of
 from worldsim.truth.vehicle import Floats
 
+DISTURBED_S: Final = 10.0
+"""A fault disturbs the formation for so long [s], unless ``expect.reform_within_s`` is given."""
 TURN_LIMIT_SLACK_DEG = 1e-6
 
 
@@ -105,6 +111,9 @@ class Judge:
         self.clearance = ObstacleClearance(scenario)
         bounded = scenario.expect.attitude_within_deg is not None
         self._attitudes = HeldAttitudes(scenario) if bounded else None
+        self._parting = PartingFaults()
+        window_s = scenario.expect.reform_within_s or DISTURBED_S
+        self._held = HeldFormation(window_s, self._parting)
         self._safety = InvariantTally()
         self._conservation = InvariantTally()
         cones = np.degrees([cone_of(vehicle) for vehicle in scenario.vehicles])
@@ -126,21 +135,34 @@ class Judge:
         if self._allocation is not None:
             self._allocation.handle_event(event)
         if isinstance(event, RadioRunEvent):
+            self._handle_radio(event)
             return
         match event:
             case FormationGiven() | FrameGiven():
                 self._open_phase(event)
-            case Restarted() | Joined():
-                self._recoveries.handle_event(event)
-                if event.refused not in (None, NOBODY_TO_RESTART):
-                    self._without_room.append(event)
-            case Killed() | Left() | Paused() | Resumed():
-                if event.nobody is None:
-                    self._recoveries.handle_event(event)
-            case SensorChanged() | SlotChanged() | QueueChanged() | RoleChanged() | LateStart():
+            case Restarted() | Joined() | Killed() | Left() | Paused() | Resumed():
+                self._change_team(event)
+            case SensorChanged():
+                self._held.open_window(event.t_s)
+            case SlotChanged() | QueueChanged() | RoleChanged() | LateStart():
                 pass
             case _:
                 assert_never(event)
+
+    def _handle_radio(self, event: RadioRunEvent) -> None:
+        self._parting.handle_event(event)
+        self._held.open_window(event.t_s)
+        if not self._parting:
+            self._recoveries.handle_radio(event)
+
+    def _change_team(self, event: LossEvent | ReturnEvent) -> None:
+        if isinstance(event, Restarted | Joined):
+            if event.refused not in (None, NOBODY_TO_RESTART):
+                self._without_room.append(event)
+        elif event.nobody is not None:
+            return
+        self._held.open_window(event.t_s)
+        self._recoveries.handle_event(event)
 
     def see(self, tick: Tick) -> Figures:
         """Judge a tick; ticks come in order."""
@@ -160,6 +182,7 @@ class Judge:
             self._attitudes.see(tick, phase, slot_error)
         self.sub_formations[-1].see(tick)
         self._recoveries.see(tick, phase, in_place)
+        self._held.see(tick, phase, in_place)
         if self._allocation is not None:
             self._allocation.see(tick, phase, in_place)
         return Figures(
@@ -174,6 +197,16 @@ class Judge:
     def recoveries(self) -> list[Recovery]:
         """Every change of the team, and its time to re-form."""
         return self._recoveries.all
+
+    @property
+    def in_formation_fraction(self) -> float | None:
+        """Share of the time in formation, from convergence on and outside the faults' windows."""
+        return self._held.in_place_fraction
+
+    @property
+    def max_slot_error_m(self) -> float | None:
+        """Largest slot error in that time [m]; None where none of it counts."""
+        return self._held.worst_m
 
     @property
     def min_obstacle_distance_m(self) -> float | None:
@@ -200,6 +233,7 @@ class Judge:
             rows += [self._converged(phase) for phase in self.phases]
         if expect.reform_within_s is not None:
             rows.append(self._reformed(expect.reform_within_s))
+        rows += self._held_rows()
         if self._attitudes is not None:
             rows.append(self._oriented(self._attitudes, expect.attitude_within_deg))
         return [*rows, *map(_started, self._without_room)]
@@ -261,6 +295,23 @@ class Judge:
         worst_s = max(known_s) if known_s and complete else None
         held = complete and all(time_s <= within_s for time_s in known_s)
         return Expectation(name="reform_within_s", wanted=within_s, got=worst_s, held=held)
+
+    def _held_rows(self) -> list[Expectation]:
+        """Return what is expected of the formation once it has converged; held where untested."""
+        expect = self._scenario.expect
+        fraction, worst_m = self.in_formation_fraction, self.max_slot_error_m
+        rows = []
+        if expect.in_formation_fraction is not None:
+            wanted = expect.in_formation_fraction
+            held = fraction is None or fraction >= wanted
+            name = "in_formation_fraction"
+            rows.append(Expectation(name=name, wanted=wanted, got=fraction, held=held))
+        if expect.max_slot_error_m is not None:
+            wanted = expect.max_slot_error_m
+            held = worst_m is None or worst_m <= wanted
+            name = "max_slot_error_m"
+            rows.append(Expectation(name=name, wanted=wanted, got=worst_m, held=held))
+        return rows
 
     def _oriented(self, attitudes: HeldAttitudes, within_deg: float | None) -> Expectation:
         worst_deg = attitudes.worst_deg

@@ -32,7 +32,7 @@ HELD, NOT_HELD, UNREADABLE, INCONCLUSIVE = 0, 1, 2, 3
 TIME_SLACK_S = 1e-9
 ABSENT = "no such key"
 """Stands for a value that is not there."""
-ADDED_LATER = ("sub_formations",)
+ADDED_LATER = ("sub_formations", "in_formation_fraction", "max_slot_error_m")
 """Keys that an older summary lacks."""
 MAX_NAMED = 4
 """Of more differences, the first are named."""
@@ -192,6 +192,8 @@ def _figures(readback: Readback, judge: Judge) -> dict[str, Any]:
         "sub_formations": [queues.row for queues in judge.sub_formations],
         "recoveries": [msgspec.structs.asdict(recovery) for recovery in judge.recoveries],
         "encounters": [msgspec.to_builtins(each) for each in judge.clearance.encounters],
+        "in_formation_fraction": judge.in_formation_fraction,
+        "max_slot_error_m": judge.max_slot_error_m,
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "packets": packets,

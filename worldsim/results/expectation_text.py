@@ -112,28 +112,47 @@ def _within(wanted_s: float, span: Span) -> str:
 
 
 def _other(row: ExpectationRow, run: Circumstances) -> str:
-    name, got, wanted = row["name"], row["got"], row["wanted"]
-    match name:
-        case "min_separation_m" | "min_obstacle_distance_m":
-            what = name.removesuffix("_m").replace("min_", "minimum ").replace("_", " ")
-            measured = "not measured" if got is None else figure(got, "m", 3)
-            return f"{what}: {measured} (required >= {wanted:g} m)"
-        case "reform_within_s":
-            return _reform(row, run)
-        case "attitude_within_deg":
-            measured = "not measured" if got is None else figure(got, "degrees", 1)
-            return f"largest attitude error at the slots: {measured} (required <= {wanted:g})"
+    name, wanted = row["name"], row["wanted"]
+    if name == "reform_within_s":
+        return _reform(row, run)
     if wanted is None and name.startswith(STARTS):
         return f"{name}: there was no room, so no agent started"
-    return f"{name}: {got} (required {wanted})"
+    if name in _BOUNDS:
+        what, relation, unit, digits, scale = _BOUNDS[name]
+        got = row["got"]
+        measured = _unmeasured(row) if got is None else figure(scale * got, unit, digits)
+        return f"{what}: {measured} (required {relation} {scale * wanted:g} {unit})"
+    return f"{name}: {row['got']} (required {wanted})"
+
+
+class _Bound(NamedTuple):
+    what: str
+    relation: str
+    unit: str
+    digits: int
+    scale: float = 1.0
+
+
+_BOUNDS = {
+    "min_separation_m": _Bound("minimum separation", ">=", "m", 3),
+    "min_obstacle_distance_m": _Bound("minimum obstacle distance", ">=", "m", 3),
+    "in_formation_fraction": _Bound("time in formation", ">=", "%", 1, 100.0),
+    "max_slot_error_m": _Bound("largest slot error in formation", "<=", "m", 3),
+    "attitude_within_deg": _Bound("largest attitude error at the slots", "<=", "degrees", 1),
+}
+
+
+def _unmeasured(row: ExpectationRow) -> str:
+    endless = row["name"] == "max_slot_error_m" and not row["held"]
+    return "an agent had no slot" if endless else "not measured"
 
 
 def _reform(row: ExpectationRow, run: Circumstances) -> str:
     limit = _limit(row["wanted"])
     if not was_tested(row):
-        return f"formation after a team change: not tested, the team never changed{limit}"
+        return f"formation after a fault: not tested, there was none{limit}"
     if row["held"]:
-        return f"formation restored within {row['got']:.3g} s of each team change{limit}"
+        return f"formation restored within {row['got']:.3g} s of each fault{limit}"
     worst = max(run.recoveries, key=_slowness)
     reformed_s = worst["reformed_s"]
     if reformed_s is not None:
@@ -151,7 +170,9 @@ def _slowness(recovery: RecoveryRow) -> tuple[bool, float]:
 def _change(recovery: RecoveryRow) -> str:
     agents = recovery["agents"]
     names = ", ".join(f"a{agent}" for agent in agents)
-    who = names if 0 < len(agents) <= MAX_NAMED else f"{len(agents)} agents"
+    if not agents:
+        return f"{recovery['kind']} at {recovery['t_s']:.4g} s"
+    who = names if len(agents) <= MAX_NAMED else f"{len(agents)} agents"
     return f"{recovery['kind']} of {who} at {recovery['t_s']:.4g} s"
 
 

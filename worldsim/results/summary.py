@@ -162,6 +162,8 @@ class Summary(Provenance):
     sub_formations: list[SubFormationsRow]  # one for each formation, in order
     recoveries: list[RecoveryRow]
     encounters: list[EncounterRow]
+    in_formation_fraction: float | None  # of the time after convergence, without faults' windows
+    max_slot_error_m: float | None  # in the same time
     attitude_error_deg: float | None  # largest at the last tick
     turns_over_limit_fraction: float | None  # of moving steps
     faults: list[FaultRow]  # in the order in which they began
@@ -206,6 +208,8 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "sub_formations": [queues.row for queues in judge.sub_formations],
         "recoveries": _recovery_rows(judge),
         "encounters": _encounter_rows(judge),
+        "in_formation_fraction": judge.in_formation_fraction,
+        "max_slot_error_m": judge.max_slot_error_m,
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "faults": faults,

@@ -87,8 +87,10 @@ class AgentTable(Table, frozen=True):
 class Expectations(Table, frozen=True):
     """What a run must show to pass.
 
-    converge_within_s: from each formation's start. reform_within_s: from each change of the team
-    until it has re-formed the whole formation. converge: false where no formation is to be formed,
+    converge_within_s: from each formation's start. reform_within_s: from each fault, and from the
+    end of what parts the team, until it has re-formed the whole formation. in_formation_fraction,
+    max_slot_error_m: of the time from convergence on, without reform_within_s, or 10 s, after each
+    beginning and end of a fault. converge: false where no formation is to be formed,
     as with a controller that knows none. min_separation_m: between centres; left out:
     control.separation_m. min_obstacle_distance_m: from a vehicle's centre to a surface; left out:
     control.clearance_m. attitude_within_deg: how far an agent's attitude may be from its queue's
@@ -98,6 +100,8 @@ class Expectations(Table, frozen=True):
 
     converge_within_s: Positive | None = None
     reform_within_s: Positive | None = None
+    in_formation_fraction: Annotated[float, Meta(ge=0, le=1)] | None = None
+    max_slot_error_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
     converge: bool = True
     min_separation_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
     min_obstacle_distance_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
