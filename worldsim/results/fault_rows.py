@@ -5,6 +5,9 @@ from typing import TypedDict
 
 from worldsim.engine.fault_reports import FaultReport
 
+MAX_NAMED = 8
+"""More agents are told by their number."""
+
 
 class FaultRow(TypedDict):
     """A fault of the run and what it struck; None for what a fault of its kind does not strike."""
@@ -68,13 +71,18 @@ def _when(row: FaultRow) -> str:
 def _struck(row: FaultRow) -> str:
     if _is_idle(row):
         return "struck nothing"
-    agents = ", ".join(map(str, row["agents"] or ()))
+    agents = _named(row["agents"] or [])
     if row["readings"] is not None:
-        return f"changed {_counted(row['readings'], 'reading')} of agent {agents}"
+        return f"changed {_counted(row['readings'], 'reading')} of {agents}"
     if row["frames"] is not None:
         done = "changed the links of" if row["kind"] == "netem" else "cut"
         return f"{done} {_counted(row['frames'], 'frame')}"
-    return f"struck agent {agents}" if agents else "not counted"
+    return f"struck {agents}" if row["agents"] else "not counted"
+
+
+def _named(agents: Sequence[int]) -> str:
+    names = ", ".join(f"a{agent}" for agent in agents)
+    return names if len(agents) <= MAX_NAMED else f"{len(agents)} agents"
 
 
 def _counted(number: int, noun: str) -> str:
