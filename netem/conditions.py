@@ -64,6 +64,12 @@ class LinkModels:
         """Return whether no link of a channel has a model of its own."""
         return all(at != channel for at, _, _ in self._links)
 
+    def same(self, other: "LinkModels") -> bool:
+        """Return whether every link has the same model as in another set of models."""
+        own = self._links.keys() | other._links.keys()
+        alike = all(self.of_link(*link) == other.of_link(*link) for link in own)
+        return alike and self._channels == other._channels
+
     def reach_m(self, channel: int, source: int) -> float:
         """Return the distance [m] beyond which no agent receives a source on a channel."""
         return self._reach_m.get((channel, source), self._channels[channel].reach_m)
@@ -149,7 +155,10 @@ class NetworkConditions:
         self.obstructed = False
         """Whether any partition, jam or flap is in force."""
         self.without: dict[int, LinkModels] = {}
-        """For each change of conditions in force, by number: the link models if it were not."""
+        """The link models if a change of conditions were not in force, by its number.
+
+        Of each change that alters some link; one that only repeats what others set has none.
+        """
 
     @property
     def in_force(self) -> Mapping[int, InForce]:
@@ -238,14 +247,26 @@ class NetworkConditions:
                     self._flaps[number] = since_s, fault
                 case _:
                     assert_never(fault)
-        self.without = {
-            number: LinkModels(self._changed(each for n, each in changes.items() if n != number))
-            for number in changes
-        }
         conditions = self._changed(changes.values())
         if conditions != self.conditions:
             self.conditions, self.models = conditions, LinkModels(conditions)
+        self.without = self._without_each(changes)
         self.obstructed = bool(self._partitions or self._jams or self._flaps)
+
+    def _without_each(self, changes: Mapping[int, Conditions]) -> dict[int, LinkModels]:
+        """Return the link models if a change were not in force, for each that alters some.
+
+        Of changes that do the same the first alters the models, the later ones none.
+        """
+        acting = dict(changes)
+        without: dict[int, LinkModels] = {}
+        for number in reversed(list(changes)):
+            models = LinkModels(self._changed(acting[n] for n in acting if n != number))
+            if models.same(self.models):
+                del acting[number]
+            else:
+                without[number] = models
+        return without
 
     def _changed(self, changes: Iterable[Conditions]) -> Conditions:
         """Return the base conditions with some changes, in this order."""

@@ -60,6 +60,15 @@ def test_a_fault_whose_agents_another_fault_still_holds_has_ended() -> None:
     assert [(row["to_s"], row["agents"]) for row in rows] == [(2.0, [1]), (None, [1])]
 
 
+def test_of_changes_of_the_radio_that_do_the_same_the_first_counts() -> None:
+    slow = "at_s = 3.0\nfor_s = 1.0\nnetem = { delay_ms = 20 }"
+    parts = "at_s = 3.0\nfor_s = 1.0\nnetem = { local.delay_ms = 20, multihop.delay_ms = 20 }"
+    for first, second in ((slow, slow), (parts, slow), (slow, parts)):
+        before, after = flown(first, second)["faults"]
+        assert (before["frames"] or 0) > 0
+        assert after["frames"] == 0
+
+
 def test_a_run_whose_fault_strikes_nothing_does_not_pass() -> None:
     missed = flown(f"at_s = 3.0\n{MISS['jam']}", f"at_s = 4.0\n{MISS['netem']}")
     assert missed["outcome"] == "inconclusive"
