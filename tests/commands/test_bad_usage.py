@@ -68,6 +68,7 @@ BAD = [
     (("netem", "check"), "SCENARIO: got 0 scenarios; check takes one"),
     (("netem", "check", "small.toml", "--for", "3"), "--for: check changes nothing; omit it"),
     (("netem", "check", "small.toml", "--name", "x"), "--name: check changes nothing; omit it"),
+    (("netem", "runs/mine", "show", "--for", "3"), "--for: show changes nothing; omit it"),
     (("fault", "x", "end", "a", "b"), "NAME: 'a b'; end takes the name of one fault"),
     (("bench", "--json", "nowhere/x.json"), "nowhere/x.json: cannot be written: no such folder"),
     (("bench", "--save", "nowhere/x.json"), "nowhere/x.json: cannot be written: no such folder"),

@@ -111,6 +111,7 @@ def test_a_fault_ends_early_by_its_name() -> None:
     for event, reason in (
         ({"end": "storm"}, "end: no fault 'storm' is in force; there are jam-3"),
         ({"end": "no"}, "end: no fault 'no' is in force; there are jam-3"),
+        ({"kill": [1], "every_s": 0.01}, "every_s: 0.01; at most 1000 times in a run"),
         ({"kill": [1], "name": "storm"}, "name: 'storm' is the name of another event"),
     ):
         with pytest.raises(RequestError, match=re.escape(reason)):
@@ -121,6 +122,47 @@ def test_the_end_of_a_fault_whose_agents_another_one_holds_changes_nothing() -> 
     fleet = OperatedFleet(event="[{ at_s = 0.5, kill = [4] }, { at_s = 0.6, kill = [4] }]")
     assert fleet.ask(end="kill-0").events == ()
     assert [event.kind for event in fleet.ask(end="kill-1").events] == ["restart"]
+
+
+def test_the_answer_says_by_which_name_a_fault_can_be_ended() -> None:
+    fleet = OperatedFleet()
+    assert fleet.ask(kill=[2]).name == "kill-1"
+    assert fleet.ask(pause=[3], name="freeze").name == "freeze"
+    assert fleet.ask(resume=[3]).name is None
+    assert fleet.ask(end="kill-1").name is None
+
+
+def test_a_fault_that_repeats_ends_for_good_between_two_of_its_times() -> None:
+    fleet = OperatedFleet(event="[{ at_s = 0.5, kill = ['random:1'], for_s = 0.5, every_s = 5 }]")
+    fleet.ask(pause=["random:1"], for_s=0.5, every_s=5, name="freeze")
+    fleet.fly(3.0)
+    assert fleet.ask(end="kill-0").events == ()
+    assert fleet.ask(end="freeze").events == ()
+    fleet.fly(8.0)
+    assert [each.kind for each in fleet.loop.effects.faults.all] == ["kill", "pause"]
+    with pytest.raises(RequestError, match=re.escape("no fault 'freeze' is in force")):
+        fleet.ask(end="freeze")
+
+
+def test_the_end_of_a_fault_that_repeats_undoes_each_of_its_times() -> None:
+    fleet = OperatedFleet()
+    fleet.ask(kill=["random:1"], every_s=1, name="loop")
+    fleet.fly(3.5)
+    assert [event.kind for event in fleet.ask(end="loop").events] == ["restart"] * 3
+    assert [each.to_s for each in fleet.loop.effects.faults.all] == [3.5] * 3
+
+
+def test_a_fault_whose_agents_are_brought_back_has_ended() -> None:
+    fleet = OperatedFleet()
+    fleet.ask(pause=[1])
+    fleet.ask(kill=[2, 3])
+    fleet.fly(2.0)
+    fleet.ask(resume=[1])
+    fleet.ask(restart=[2])
+    assert [each.to_s for each in fleet.loop.effects.faults.all] == [2.0, None]
+    fleet.fly(3.0)
+    fleet.ask(restart=[3])
+    assert [each.to_s for each in fleet.loop.effects.faults.all] == [2.0, 3.0]
 
 
 def test_an_answer_is_equal_after_encoding_and_decoding() -> None:

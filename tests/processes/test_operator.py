@@ -55,7 +55,8 @@ def test_a_running_fleet_carries_out_commands_and_refuses_impossible_ones(
     assert "not partitioned, 1 jam" in shown
     assert "radius_m = 0.5" in shown
     paused = pids(run)["agent-1"]
-    assert command("fault", "pause", "1")[0] == 0
+    status, output = command("fault", "pause", "1")
+    assert (status, "its name, to end it early: pause-" in output) == (0, True)
     eventually(lambda: state(paused) == "T", 5.0, lambda: state(paused))
     assert command("fault", "resume", "all")[0] == 0
     eventually(lambda: state(paused) in "RS", 5.0, lambda: state(paused))

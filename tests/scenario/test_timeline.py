@@ -126,6 +126,14 @@ def test_an_operator_ends_faults_by_their_names() -> None:
     assert timeline.numbers_of("netem-2") == []
 
 
+def test_an_operators_event_gets_a_name_that_no_other_has() -> None:
+    timeline = Timeline(scenario("at_s = 1\npause = [0]\nname = 'pause-2'"))
+    (event,) = scenario("at_s = 2\npause = [1]").event
+    begun = timeline.begin_now(event)
+    timeline.keep(begun)
+    assert timeline.name_of(begun.number) == "pause-3"
+
+
 LOOP = "at_s = 1\nfor_s = 0.5\nevery_s = 20\nkill = ['random:1']"
 
 
@@ -155,5 +163,7 @@ def test_an_operators_event_repeats_until_the_operator_ends_it() -> None:
         *((1.5, True), (21.0, False), (21.5, True)),
     ]
     assert timeline.name_of(begun.number + 1) == "kill-1"
-    timeline.end_now(begun.number + 1, 30.0)
+    assert timeline.names_to_come == {"kill-1"}
+    timeline.cancel("kill-1")
+    assert timeline.names_to_come == set()
     assert [each.at_s for each in timeline.due(60.0) if not each.ends] == []

@@ -131,6 +131,9 @@ def change_radio(run: Path, action: str, words: list[str], more: EventKeys) -> i
     """
     if action in {"show", "heal"} and words:
         raise _bad(" ".join(words), "KEY=VALUE", f"{action} takes no further words")
+    given = [f"--{key.removesuffix('_s')}" for key, value in more.items() if value is not None]
+    if action == "show" and given:
+        raise typer.BadParameter("show changes nothing; omit it", param_hint=given[0])
     match action:
         case "show":
             return _print_radio(run)
@@ -171,7 +174,9 @@ def _request(
     for followed in answer.events:
         print(f"{followed.t_s:.2f} s: {sentence(followed)}")
     if "end" in event and not answer.events:
-        print(f"{answer.t_s:.2f} s: {event['end']} ends; other faults hold down what it struck")
+        print(f"{answer.t_s:.2f} s: {event['end']} ends; there is nothing to undo now")
+    if answer.name is not None and "name" not in event:
+        print(f"its name, to end it early: {answer.name}")
     return PASS
 
 
@@ -193,6 +198,9 @@ def _print_radio(run: Path) -> int:
     counts = [_counted(kind, len(each)) for kind, each in in_force.items() if kind != "partition"]
     parted = "partitioned" if "partition" in in_force else "not partitioned"
     print(f"# at {answer.t_s:.2f} s: {', '.join([parted, *counts])}")
+    changes = [each.name for each in answer.faults if each.fault.netem is not None]
+    if changes:
+        print(f"# [netem] as changed by {', '.join(changes)}")
     tables = msgspec.to_builtins(answer.conditions)
     conditions = {key: value for key, value in tables.items() if value != {}}
     print(as_toml({"netem": conditions, **in_force}), end="")

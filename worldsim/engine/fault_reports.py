@@ -5,10 +5,17 @@ A fault that strikes nothing proves nothing of the fleet, however well the run e
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from netem.faults import FaultOrder, Heal, RadioEvent
-from worldsim.engine.operations import EndProcesses, Operation, PauseProcesses, SetSensorMode
+from worldsim.engine.operations import (
+    EndProcesses,
+    Operation,
+    PauseProcesses,
+    ResumeProcesses,
+    SetSensorMode,
+    StartProcesses,
+)
 from worldsim.judge.event import By
 
 
@@ -25,6 +32,14 @@ class FaultReport:
         self.number, self.kind, self.from_s, self.by = number, kind, from_s, by
         self.agents = sorted(agents)
         self.to_s: float | None = None
+        self._held = set(agents)
+
+    def release(self, agents: Collection[int], t_s: float) -> None:
+        """Note that some agents came back at a time [s]: the fault of the last of them is over."""
+        if self.to_s is None and not self._held.isdisjoint(agents):
+            self._held.difference_update(agents)
+            if not self._held:
+                self.to_s = t_s
 
     @property
     def on_radio(self) -> bool:
@@ -43,8 +58,8 @@ class FaultReports:
         """The numbers of the faults that have not ended, in the order in which they began."""
         return [each.number for each in self.all if each.to_s is None]
 
-    def begin(self, operation: Operation, t_s: float, by: By) -> None:
-        """Take an operation that was carried out at a time [s]; one that begins no fault is none.
+    def take(self, operation: Operation, t_s: float, by: By) -> None:
+        """Take an operation that was carried out at a time [s]: it may begin a fault, or end some.
 
         Agents that an earlier fault holds down are struck too: this one may hold them for longer.
         """
@@ -59,6 +74,12 @@ class FaultReports:
             case FaultOrder(fault=Heal()):
                 self._end([each for each in self.all if each.kind == "partition"], t_s)
                 return
+            case ResumeProcesses():
+                self._release(operation.agents, ("pause",), t_s)
+                return
+            case StartProcesses():
+                self._release(operation.incarnations, ("kill", "leave", "pause"), t_s)
+                return
             case FaultOrder(event=event) if event is not None:
                 kind, agents = event.radio_kind, ()
             case _:
@@ -68,6 +89,11 @@ class FaultReports:
     def end(self, number: int, t_s: float) -> None:
         """Note that the time of a fault is over [s]; its agents may be held down by others."""
         self._end([each for each in self.all if each.number == number], t_s)
+
+    def _release(self, agents: Collection[int], kinds: Sequence[str], t_s: float) -> None:
+        for each in self.all:
+            if each.kind in kinds:
+                each.release(agents, t_s)
 
     def _end(self, faults: Sequence[FaultReport], t_s: float) -> None:
         for each in faults:

@@ -120,7 +120,7 @@ class TimelineEffects:
 
     def apply(self, operation: Operation, by: By = None) -> None:
         """Apply an operation that was carried out, and emit its events."""
-        self.faults.begin(operation, self._t_s, by)
+        self.faults.take(operation, self._t_s, by)
         match operation:
             case EndProcesses():
                 self._end(operation, by)

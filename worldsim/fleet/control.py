@@ -4,7 +4,7 @@ Each request is checked against the present state of the fleet. A rejected reque
 An accepted one is reported in events like the timeline's own, ``by`` the operator.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, assert_never
 
 import msgspec
@@ -76,6 +76,8 @@ class Answer(msgspec.Struct, frozen=True):
     """The link conditions in force afterwards."""
     faults: tuple[ActiveFault, ...]
     """The radio faults in force afterwards, in the order in which they began."""
+    name: str | None = None
+    """By which the fault that the request began can be ended; None: it began none."""
 
 
 class RequestError(ValueError):
@@ -98,17 +100,18 @@ class Control:
         """Carry out an encoded request. Raises RequestError."""
         request = _request(data)
         first = len(self._loop.events)
+        name = None
         if request.event is not None:
             event = self._event(request.event)
             if event.end is not None:
-                operation = self._end(event.end)
-                if operation is not None:
+                for operation in self._ends(event.end):
                     carry_out(operation, "operator")
             else:
                 step = self._timeline.begin_now(event)
                 carry_out(self._operation(step, request), "operator")
                 self._timeline.keep(step)
-        return self._answer(self._loop.events[first:])
+                name = event.called(step.number) if event.is_fault else None
+        return self._answer(self._loop.events[first:], name)
 
     def _event(self, keys: dict[str, Any]) -> EventTable:
         """Return a request's event, checked against the present fleet. Raises RequestError."""
@@ -128,19 +131,34 @@ class Control:
             raise RequestError(f"{event.kind}: this fleet has no launcher; do it by hand")
         return event
 
-    def _end(self, name: str) -> Operation | None:
-        """Return the operation that ends a fault now; None where others hold all that it struck.
+    def _ends(self, name: str) -> Iterator[Operation]:
+        """End a fault now, and all its repetitions; yield what undoes those that are in force.
 
-        Raises RequestError where no such fault is in force.
+        Carry out each before taking the next. Nothing is yielded where other faults hold all that
+        it struck, or between two repetitions. Raises RequestError where there is nothing to end.
         """
         effects, now_s = self._loop.effects, self._loop.world.time_s
+        names = self._names_to_end()
+        if name not in names:
+            there = ", ".join(names) or "none"
+            raise RequestError(f"end: no fault {name!r} is in force; there are {there}")
+        self._timeline.cancel(name)
         known = self._timeline.numbers_of(name)
-        number = next((each for each in effects.faults.in_force if each in known), None)
-        if number is None:
-            names = ", ".join(dict.fromkeys(map(self._timeline.name_of, effects.faults.in_force)))
-            raise RequestError(f"end: no fault {name!r} is in force; there are {names or 'none'}")
-        effects.faults.end(number, round(now_s, 6))
-        return effects.operation(self._timeline.end_now(number, now_s))
+        for number in effects.faults.in_force:
+            if number in known:
+                effects.faults.end(number, round(now_s, 6))
+                operation = effects.operation(self._timeline.end_now(number, now_s))
+                if operation is not None:
+                    yield operation
+
+    def _names_to_end(self) -> list[str]:
+        """Return the names of the faults that are in force, or have begun and will happen again."""
+        to_come = self._timeline.names_to_come
+        begun = [
+            (self._timeline.name_of(each.number), each) for each in self._loop.effects.faults.all
+        ]
+        names = (name for name, each in begun if each.to_s is None or name in to_come)
+        return list(dict.fromkeys(names))
 
     def _fleet_now(self) -> FleetNow:
         effects, members = self._loop.effects, self._loop.members
@@ -192,14 +210,14 @@ class Control:
             detail = f"{request.version}; above {newest} is allowed, up to {last} by now"
             raise RequestError(f"version: {detail}")
 
-    def _answer(self, events: list[RunEvent]) -> Answer:
+    def _answer(self, events: list[RunEvent], name: str | None) -> Answer:
         network = self._loop.network
         faults = tuple(
             ActiveFault(number, self._timeline.name_of(number), since_s, RadioEvent.of(fault))
             for number, (since_s, fault) in network.in_force.items()
         )
         t_s = round(self._loop.world.time_s, 6)
-        return Answer(t_s, tuple(events), network.conditions, faults)
+        return Answer(t_s, tuple(events), network.conditions, faults, name)
 
 
 def _request(data: bytes) -> Request:

@@ -104,14 +104,20 @@ def check_timeline(scenario: Scenario, file: Path, sources: dict[int, FormationS
 def _check_count(scenario: Scenario, file: Path) -> None:
     """Raise ScenarioError where events happen too often."""
     for index, event in enumerate(scenario.event):
-        if event.every_s is not None and scenario.duration_s / event.every_s > MAX_REPETITIONS:
-            detail = f"{event.every_s:g}; at most {MAX_REPETITIONS} times in a run"
-            raise _error(file, index, Problem("every_s", detail))
+        problem = _count_problem(scenario, event)
+        if problem is not None:
+            raise _error(file, index, problem)
+
+
+def _count_problem(scenario: Scenario, event: EventTable) -> Problem | None:
+    if event.every_s is None or scenario.duration_s / event.every_s <= MAX_REPETITIONS:
+        return None
+    return Problem("every_s", f"{event.every_s:g}; at most {MAX_REPETITIONS} times in a run")
 
 
 def problem_now(scenario: Scenario, event: EventTable, now: FleetNow) -> Problem | None:
     """Return what makes an event invalid that happens now, or None."""
-    problem = _one_action(event)
+    problem = _one_action(event) or _count_problem(scenario, event)
     if problem is not None:
         return problem
     if event.joiners > now.room:

@@ -113,8 +113,13 @@ class Timeline:
         return self._steps[first : self._next]
 
     def begin_now(self, event: EventTable) -> Step:
-        """Return the step of an operator's event, which begins now, at its ``at_s``."""
+        """Return the step of an operator's event, which begins now, at its ``at_s``.
+
+        Its number is the next one by which it has a name of its own.
+        """
         self._number += 1
+        while event.name is None and self.numbers_of(event.called(self._number)):
+            self._number += 1
         return Step(event.at_s, self._number, event, False)
 
     def keep(self, begun: Step) -> None:
@@ -135,14 +140,21 @@ class Timeline:
         """Return the numbers of all events of a name: one, and its repetitions."""
         return [number for number, event in self._events.items() if event.called(number) == name]
 
-    def end_now(self, number: int, at_s: float) -> Step:
-        """Return the step that ends an event at a time [s], which then repeats no more."""
-        event = self._events[number]
-        waiting = set(self.numbers_of(event.called(number))) - {number}
+    @property
+    def names_to_come(self) -> set[str]:
+        """The names of the events that are still to begin."""
+        return {self.name_of(step.number) for step in self._steps[self._next :] if not step.ends}
+
+    def cancel(self, name: str) -> None:
+        """Let the events of a name begin no more; what has begun ends as before."""
+        cancelled = set(self.numbers_of(name))
         self._steps[self._next :] = [
-            step for step in self._steps[self._next :] if step.number not in waiting or step.ends
+            step for step in self._steps[self._next :] if step.ends or step.number not in cancelled
         ]
-        return Step(at_s, number, event, True)
+
+    def end_now(self, number: int, at_s: float) -> Step:
+        """Return the step that ends an event at a time [s]."""
+        return Step(at_s, number, self._events[number], True)
 
     def name_of(self, number: int) -> str:
         """Return the name of the event of a number."""
