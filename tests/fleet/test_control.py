@@ -152,6 +152,17 @@ def test_the_end_of_a_fault_that_repeats_undoes_each_of_its_times() -> None:
     assert [each.to_s for each in fleet.loop.effects.faults.all] == [3.5] * 3
 
 
+def test_each_time_of_a_fault_that_repeats_is_by_who_asked_for_it() -> None:
+    fleet = OperatedFleet(event="[{ at_s = 0.5, pause = [1], for_s = 0.1, every_s = 1 }]")
+    fleet.ask(kill=[4], for_s=0.1, every_s=1.5)
+    fleet.fly(3.0)
+    rows = fleet.loop.effects.faults.all
+    assert [(each.kind, each.by) for each in rows if each.kind == "kill"] == [
+        ("kill", "operator")
+    ] * 2
+    assert {each.by for each in rows if each.kind == "pause"} == {None}
+
+
 def test_a_fault_whose_agents_are_brought_back_has_ended() -> None:
     fleet = OperatedFleet()
     fleet.ask(pause=[1])

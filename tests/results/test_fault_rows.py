@@ -78,6 +78,15 @@ def test_a_run_whose_fault_strikes_nothing_does_not_pass() -> None:
     assert fault_texts(allowed["faults"]) == ["jam, 3 s to the end: struck nothing"]
 
 
+def test_of_many_faults_the_first_are_told_and_the_others_counted() -> None:
+    rows = flown(f"at_s = 1.0\nfor_s = 0.05\nevery_s = 0.1\n{MISS['jam']}")["faults"]
+    reason = "the jam at 1 s and the jam at 1.1 s and the jam at 1.2 s and"
+    assert idle_text(rows) == f"{reason} {len(rows) - 3} more struck nothing"
+    texts = fault_texts(rows)
+    assert len(texts) == 21
+    assert texts[-1] == f"{len(rows) - 20} more faults: see summary.json"
+
+
 @pytest.mark.parametrize("kind", MISS)
 def test_a_fault_that_misses_is_found(kind: str) -> None:
     assert (

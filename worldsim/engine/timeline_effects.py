@@ -120,6 +120,7 @@ class TimelineEffects:
 
     def apply(self, operation: Operation, by: By = None) -> None:
         """Apply an operation that was carried out, and emit its events."""
+        by = by or self._repeated_by(operation)
         self.faults.take(operation, self._t_s, by)
         match operation:
             case EndProcesses():
@@ -142,6 +143,19 @@ class TimelineEffects:
                 self._give(operation, by)
             case _:
                 assert_never(operation)
+
+    def _repeated_by(self, operation: Operation) -> By:
+        """Return by whom a fault of the timeline happens again; None for the scenario and ends."""
+        match operation:
+            case EndProcesses() | PauseProcesses():
+                begins = True
+            case SetSensorMode(mode=mode):
+                begins = mode is not None
+            case FaultOrder(event=event):
+                begins = event is not None
+            case _:
+                return None
+        return "operator" if begins and self.timeline.is_operators(operation.number) else None
 
     def record_exit(self, agent: int, signal: int | None, status: int | None) -> None:
         """Record that an agent's process ended unplanned, by a signal or with a status."""

@@ -5,8 +5,12 @@ from typing import TypedDict
 
 from worldsim.engine.fault_reports import FaultReport
 
-MAX_NAMED = 8
+MAX_AGENTS_NAMED = 8
 """More agents are told by their number."""
+MAX_IDLE_NAMED = 3
+"""So many idle faults are named in the reason of an outcome."""
+MAX_TOLD = 20
+"""So many faults have a line of their own in the verdict."""
 
 
 class FaultRow(TypedDict):
@@ -47,7 +51,9 @@ def fault_rows(
 def idle_text(rows: Sequence[FaultRow]) -> str | None:
     """Return which faults struck nothing, in words; None where each struck something."""
     idle = [f"the {row['kind']} at {_rounded(row['from_s'])} s" for row in rows if _is_idle(row)]
-    return f"{' and '.join(idle)} struck nothing" if idle else None
+    left = len(idle) - MAX_IDLE_NAMED
+    named = idle if left <= 0 else [*idle[:MAX_IDLE_NAMED], f"{left} more"]
+    return f"{' and '.join(named)} struck nothing" if idle else None
 
 
 def _is_idle(row: FaultRow) -> bool:
@@ -58,8 +64,10 @@ def _is_idle(row: FaultRow) -> bool:
 
 
 def fault_texts(rows: Sequence[FaultRow]) -> list[str]:
-    """Return a line for each fault: what it was, when it was in force, and what it struck."""
-    return [f"{_when(row)}: {_struck(row)}" for row in rows]
+    """Return a line for each of the first faults: what it was, when, and what it struck."""
+    left = len(rows) - MAX_TOLD
+    more = [f"{_counted(left, 'more fault')}: see summary.json"] if left > 0 else []
+    return [f"{_when(row)}: {_struck(row)}" for row in rows[:MAX_TOLD]] + more
 
 
 def _when(row: FaultRow) -> str:
@@ -82,7 +90,7 @@ def _struck(row: FaultRow) -> str:
 
 def _named(agents: Sequence[int]) -> str:
     names = ", ".join(f"a{agent}" for agent in agents)
-    return names if len(agents) <= MAX_NAMED else f"{len(agents)} agents"
+    return names if len(agents) <= MAX_AGENTS_NAMED else f"{len(agents)} agents"
 
 
 def _counted(number: int, noun: str) -> str:

@@ -93,7 +93,7 @@ class Timeline:
         self._duration_s = scenario.duration_s
         self._events = {n: event for n, (_, event) in occurrences(scenario).items()}
         """All events, the operator's so far too, by number."""
-        self._number = len(self._events)
+        self._number = self._first_of_operator = len(self._events)
 
     @property
     def next_s(self) -> float:
@@ -155,6 +155,10 @@ class Timeline:
     def end_now(self, number: int, at_s: float) -> Step:
         """Return the step that ends an event at a time [s]."""
         return Step(at_s, number, self._events[number], True)
+
+    def is_operators(self, number: int) -> bool:
+        """Return whether the event of a number is an operator's, or a repetition of one."""
+        return number >= self._first_of_operator
 
     def name_of(self, number: int) -> str:
         """Return the name of the event of a number."""
