@@ -72,7 +72,8 @@ class Proximity(Table, frozen=True):
 class Laser(Table, frozen=True):
     """A scanner: ``rays`` over ``field_deg`` ahead, in ``rings`` spread over +-elevation_deg.
 
-    The defaults see all round; a sonar upwards and one downwards close the gaps at the poles.
+    At most 30 000 rays in all. The defaults see all round; a sonar upwards and one downwards close
+    the gaps at the poles.
 
     noise_m: normal, along the ray; dropout_percent: share of the echoes that are lost.
     """

@@ -161,11 +161,15 @@ PROXIMITY_RANGE_M: Final = 2.0
 """Reach of the proximity sensor [m]."""
 
 
+MAX_SCAN_B: Final = 60_000
+"""Most bytes of one scan, two for each ray."""
+
+
 class Scan(Message, frozen=True):
     """One scan of a scanning sensor: the range of each ray or beam, in the order of its pattern."""
 
     kind: Annotated[int, Meta(ge=0, lt=8)]  # index of agent.config.SCANNERS
-    ranges: Annotated[bytes, Meta(max_length=60_000)]
+    ranges: Annotated[bytes, Meta(max_length=MAX_SCAN_B)]
     """Unsigned 16-bit little-endian [mm]; NO_ECHO_MM: nothing within the sensor's range."""
 
 

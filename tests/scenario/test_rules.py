@@ -128,6 +128,14 @@ def test_a_box_without_room_is_refused_quickly(tmp_path: Path, agents: str) -> N
     assert refusal(tmp_path, scenario).startswith("/s.toml: fleet.start: no room for ")
 
 
+def test_a_laser_has_no_more_rays_than_a_scan_holds() -> None:
+    many = {"sensor__laser__rays": "600", "sensor__laser__elevation_deg": "80"}
+    assert wedge(**many, sensor__laser__rings="50").sensor.laser.rays == 600
+    with pytest.raises(ScenarioError, match=r"sensor\.laser\.rays: 600 in each of 51 rings"):
+        wedge(**many, sensor__laser__rings="51")
+    assert wedge(**many, sensor__laser__rings="51", sensor__coverage="'planar'")
+
+
 def test_a_level_laser_has_one_ring() -> None:
     with pytest.raises(ScenarioError, match=r"sensor\.laser\.rings: 9 rings need elevation_deg"):
         wedge(sensor__laser__rings="9", sensor__laser__elevation_deg="0")

@@ -11,7 +11,7 @@ from typing import assert_never
 
 from agent.config import LEAST
 from agent.guidance.bobber import MIN_CAST_RATIO
-from agent.messages import FLIGHT_M, Position
+from agent.messages import FLIGHT_M, MAX_SCAN_B, Position
 from agent.qstructure.formation import Formation, formation_of
 from agent.qstructure.frame_path import tip_speed
 from worldsim.scenario.events import EventTable
@@ -367,6 +367,14 @@ def _laser_rings_apart(scenario: Scenario) -> Problem | None:
     return Problem("sensor.laser.rings", detail)
 
 
+def _laser_fits_a_scan(scenario: Scenario) -> Problem | None:
+    laser, most = scenario.sensor.laser, MAX_SCAN_B // 2
+    if scenario.sensor.coverage == "planar" or laser.rays * laser.rings <= most:
+        return None
+    detail = f"{laser.rays} in each of {laser.rings} rings; at most {most} in all"
+    return Problem("sensor.laser.rays", detail)
+
+
 RULES = (
     _enough_agents,
     _at_least_one_tick,
@@ -381,6 +389,7 @@ RULES = (
     _gathers_in_the_structure,
     _rates_up_to_tick_rate,
     _laser_rings_apart,
+    _laser_fits_a_scan,
     _frame_consistent,
     _obstacles_consistent,
 )
