@@ -13,12 +13,20 @@ from msgspec import Meta
 
 from netem.faults import FaultOrder, Position
 from netem.link_parameters import Conditions
-from netem.wire.frame import AgentId, Count, EncodedObservation, unpack_typed
+from netem.wire.frame import (
+    MAX_OBSERVATION_B,
+    AgentId,
+    Count,
+    EncodedObservation,
+    unpack_typed,
+)
 
 MAX_TRUTH_B = 256 * 1024
 MAX_CONDITIONS_B = 1024 * 1024
 MAX_ORDERS_B = 1024 * 1024
-MAX_SLOT_INPUT_B = 4 * 1024 * 1024
+MAX_PARTICIPANTS = 256
+"""A quarter of the most agents that a team has: agents step in turn, in four slots of a tick."""
+MAX_SLOT_INPUT_B = MAX_TRUTH_B + MAX_ORDERS_B + MAX_PARTICIPANTS * (MAX_OBSERVATION_B + 5)
 MAX_SLOT_RESULT_B = 4 * 1024 * 1024
 
 
