@@ -41,9 +41,13 @@ IDLE = {
     },
     "expect.converge_within_s": {"expect.converge": "false", "expect.converge_within_s": "2"},
     "expect.attitude_within_deg": {"expect.attitude_within_deg": "5"},
+    "event[0].at_s": {"event": "[{ at_s = 4.99, kill = [0] }]"},
+    "event[0].every_s": {"event": "[{ at_s = 1, kill = [0], every_s = 3.99 }]"},
     "expect.min_obstacle_distance_m": {"expect.min_obstacle_distance_m": "0.5"},
 }
 USED = {
+    "an event in the last slot": {"event": "[{ at_s = 4.9875, kill = [0] }]"},
+    "an event that happens twice": {"event": "[{ at_s = 1, kill = [0], every_s = 3.9875 }]"},
     "reorder with a delay": {"netem.reorder_percent": "50", "netem.delay_ms": "20"},
     "reorder with a later delay": {
         "netem.reorder_percent": "50",

@@ -65,6 +65,7 @@ def idle_keys(scenario: Scenario) -> Iterator[Problem]:
     yield from _of_frame(scenario)
     yield from _of_obstacles(scenario)
     yield from _of_expectations(scenario)
+    yield from _of_times(scenario)
 
 
 def _of_links(scenario: Scenario) -> Iterator[Problem]:
@@ -161,6 +162,17 @@ def _of_expectations(scenario: Scenario) -> Iterator[Problem]:
         yield Problem("expect.attitude_within_deg", "no effect: no queue has an orientation")
     if expect.idle_faults and not any(each.is_fault for each in scenario.event):
         yield Problem("expect.idle_faults", "no effect: no event is a fault")
+
+
+def _of_times(scenario: Scenario) -> Iterator[Problem]:
+    last_s = (scenario.slots - 1) / scenario.slot_hz
+    for index, event in enumerate(scenario.event):
+        if round(event.at_s - last_s, 9) > 0.0:
+            detail = f"no effect: the last slot begins at {last_s:g} s"
+            yield Problem(f"event[{index}].at_s", detail)
+        if event.every_s is not None and round(event.at_s + event.every_s - last_s, 9) > 0.0:
+            detail = "no effect: the run is over before it happens again"
+            yield Problem(f"event[{index}].every_s", detail)
 
 
 def _specs(scenario: Scenario) -> Iterator[FormationSpec]:
