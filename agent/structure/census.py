@@ -34,11 +34,10 @@ MAX_QUANTA: Final = 254
 WORTH_QUANTA: Final = 2
 """A repeated label is taken if it is so much later: to take each would cost time for nothing."""
 LAG_SMOOTHING: Final = 0.25
-SLOWER_THAN_NEWS: Final = 12.0
-"""How many times as long as news a repeated label takes: each agent on its way keeps it for up to
-two rounds."""
-SLOWER_UNDER_LOSS: Final = 6.0
-"""The same where beacons are lost: labels go out in each round, and news takes longer."""
+SLOWER_THAN_NEWS: Final = 6.0
+"""How many times as long as news a repeated label is taken to need at first: each agent on its way
+keeps it for a round or two. Over a clean radio it is up to twice as much; but whether frames are
+lost is not known yet, and where they are, a team that asks too late counts itself wrongly."""
 LAGS: Final = 2.0
 """A label is late after so many of its usual lags, and T_lost."""
 MAX_LAG_S = MAX_QUANTA * QUANTUM_S / LAGS
@@ -148,8 +147,7 @@ class Census:
     def _expect_later(self, member: int, age_s: float) -> None:
         """Estimate a new member's lag by the age of its first label, which came as news [s]."""
         if self._labels[member] == 0:
-            slower = SLOWER_THAN_NEWS if self._news.enough == 1 else SLOWER_UNDER_LOSS
-            self._lag_s[member] = min(MAX_LAG_S, slower * age_s)
+            self._lag_s[member] = min(MAX_LAG_S, SLOWER_THAN_NEWS * age_s)
 
     def ask(self, now_s: float, lost_s: float) -> None:
         """Ask for members whose labels are late. lost_s: T_lost of a neighbour [s]."""

@@ -276,28 +276,3 @@ def test_nobody_asks_for_members_whose_labels_take_long_as_usual(seed):
             counts = [mine.population(now_s, LOST_S + ANSWER_S, QUEUES, 0) for mine in known]
             assert {each.total for each in counts} == {line}
     assert asked == 0
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_nobody_is_asked_for_before_its_label_could_come_again(seed):
-    """A new member's label comes as news, far sooner than it is repeated on the same way."""
-    random, line = Random(seed), 24
-    known = [census(own=each, ids=line) for each in range(line)]
-    begin = [random.random() for _ in range(line)]
-    asked = 0
-    for tick in range(160):
-        now_s, said = NOW_S + 0.05 * tick, {}
-        for each, mine in enumerate(known):
-            mine.hear(each, now_s, FIRST_QUEUE)
-            before = mine.news_number
-            mine.ask(now_s, LOST_S)
-            asked += mine.news_number - before
-            regular = (now_s - begin[each]) % 1.0 < 0.05
-            if regular or mine.has_news:
-                said[each] = told(mine, now_s, regular)
-        for each, summary in said.items():
-            for near in (each - 1, each + 1):
-                if 0 <= near < line:
-                    known[near].hear(each, now_s, FIRST_QUEUE)
-                    known[near].merge(summary, now_s, now_s, sender=each)
-    assert asked == 0
