@@ -26,7 +26,7 @@ from tests.random_flights.fleets import (
 from tests.random_flights.formations import formation
 from tests.random_flights.radios import conditions
 from tests.random_flights.surroundings import field, frame, obstacles
-from tests.random_flights.timelines import Timeline
+from tests.random_flights.timelines import Timeline, repeated_and_ended
 from worldsim.commands.app import command
 from worldsim.scenario.file import as_toml
 
@@ -102,6 +102,11 @@ def draft(draw: Draw, steps: int) -> Tables:
         made["expect"]["attitude_within_deg"] = draw.number(1.0, 180.0, 0)
     if draw.chance(0.25):
         made["control"]["gather"] = may_gather(made["control"])
+    if draw.chance(0.1):
+        made["expect"]["in_formation_fraction"] = draw.number(0.0, 1.0)
+        made["expect"]["max_slot_error_m"] = draw.number(0.0, 2.0)
+        made["expect"]["idle_faults"] = draw.chance(0.5)
+    made["event"] = repeated_and_ended(draw, made["event"], made["duration_s"])
     return made
 
 

@@ -9,6 +9,8 @@ from tests.random_flights.radios import fault
 from tests.random_flights.surroundings import moving
 
 MODES = ("stuck", "silent", "wrong")
+ONCE = {"join", "formation", "frame", "heal", "restart", "resume"}
+"""Actions that nothing undoes."""
 
 
 class Timeline:
@@ -109,3 +111,19 @@ class Timeline:
         if self._sensors and self._draw.chance(0.5):
             table["kind"] = self._draw.among(self._sensors)
         return table
+
+
+def repeated_and_ended(draw: Draw, events: list[Tables], duration_s: float) -> list[Tables]:
+    """Return events of which some happen again, and some are ended before their time."""
+    found = [dict(each) for each in events]
+    for number, event in enumerate(events):
+        at_s, for_s = event["at_s"], event.get("for_s", 0.0)
+        if event.keys() & ONCE or not draw.chance(0.2):
+            continue
+        found[number]["name"] = name = f"fault-{number}"
+        if draw.chance(0.5):
+            found[number]["every_s"] = round(for_s + draw.number(0.5, 5.0, 1), 1)
+        end_s = round(at_s + draw.number(0.1, for_s or 3.0, 1), 1)
+        if at_s < end_s < min(duration_s, at_s + (for_s or duration_s)):
+            found.append({"at_s": end_s, "end": name})
+    return found
