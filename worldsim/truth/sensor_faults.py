@@ -36,6 +36,11 @@ class SensorFaults:
     def __bool__(self) -> bool:
         return bool(self._acting)
 
+    @property
+    def agents(self) -> set[int]:
+        """The agents that have a failed sensor."""
+        return {agent for agent, _ in self._acting}
+
     def begin(self, number: int, agent: int, sensor: str | None, mode: FailureMode) -> None:
         """Begin a fault of an agent's sensor (None: of all its sensors)."""
         for name in SENSORS if sensor is None else (sensor,):
