@@ -71,6 +71,8 @@ class Model:
     held: dict[int, set[int]] = field(default_factory=dict)
     """The agents that each process or sensor fault in force holds, by its number."""
     kinds: dict[int, str] = field(default_factory=dict)
+    struck: dict[int, set[int]] = field(default_factory=dict)
+    """Those that it held at first."""
     up_from: dict[int, int] = field(default_factory=dict)
     """When a restarted agent has booted."""
 
@@ -94,7 +96,8 @@ class Model:
                 if kind == "pause":  # it strikes no agent that is down or booting
                     up = {a for a in agents if now > self.up_from.get(a, -1)}
                     agents = {a for a in up if not self.holding(a, *DOWN)}
-                self.held[number], self.kinds[number] = agents, kind
+                self.held[number] = self.struck[number] = agents
+                self.kinds[number] = kind
 
     def end(self, number: int, now: int) -> None:
         self.radio.pop(number, None)
@@ -111,9 +114,10 @@ class Model:
         """Undo what holds some agents; a fault that holds none any more is over."""
         for number, held in list(self.held.items()):
             if self.kinds[number] in kinds and held & agents:
-                held -= agents
-                if not held:
-                    del self.held[number]
+                self.held[number] = held - agents
+        freed = [n for n, held in self.held.items() if not held and self.struck[n]]
+        for number in freed:
+            del self.held[number]
 
     def state(self, agent: int, now: int) -> str:
         """Return whether an agent is down, booting, paused or up."""
