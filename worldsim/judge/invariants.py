@@ -127,8 +127,8 @@ class Invariants:
             case _:
                 assert_never(event)
 
-    def see(self, tick: Tick, phase: Phase, in_place: bool) -> None:
-        """Evaluate a tick; in_place: whether every running agent is in its place."""
+    def see(self, tick: Tick, phase: Phase) -> None:
+        """Evaluate a tick, which the phase has seen."""
         if tick.time_s >= self._components_due_s:
             self._find_components(tick)
         parted = len(self._members) > 1 or False in tick.alive.tolist()
@@ -150,7 +150,7 @@ class Invariants:
             self.tallies["I3"].count(self._breaches.shares)
         if self._quiet_since_s is not None and self._looks_again(tick, phase, last_claims):
             self._restart_premises(tick.time_s)
-        self._evaluate_quiet(tick, last_claims, in_place)
+        self._evaluate_quiet(tick, last_claims, phase.at_slots)
 
     @property
     def _settled_s(self) -> float:
@@ -290,12 +290,12 @@ class Invariants:
         wrong = sum(abs(own[queue] - share) > 1 for queue, share in enumerate(shares))
         return Breaches(vertices, wrong)
 
-    def _evaluate_quiet(self, tick: Tick, last_claims: Claims, in_place: bool) -> None:
+    def _evaluate_quiet(self, tick: Tick, last_claims: Claims, at_slots: bool) -> None:
         """Evaluate I7 once every agent of a settled team has been in its place for 2 s."""
         since_s = self._quiet_since_s
         if since_s is not None and tick.time_s - since_s >= CONVERGED_S:
             self.tallies["I7"].count(self._count_moves(tick.alive, last_claims))
-        elif not in_place or tick.time_s < self._settled_s:
+        elif not at_slots or tick.time_s < self._settled_s:
             self._quiet_since_s = None
         elif since_s is None:
             self._quiet_since_s = tick.time_s

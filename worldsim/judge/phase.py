@@ -1,7 +1,8 @@
 """A phase of a run: one formation and frame, from the mission that asked for it to the next one.
 
 The frame may rest or move on its path. Of an agent's telemetry, only the place that it claims and
-the mission that it flies are used; the position of that place is computed here.
+the mission that it flies are used; the position of that place is computed here. Together, the
+team's places must be those that ``expected_places`` finds by itself.
 """
 
 from collections import Counter
@@ -15,6 +16,7 @@ from agent.messages import AT_HOME, FramePath, Place, Vector
 from agent.qstructure.formation import NO_PLACES, Formation, Slot
 from agent.qstructure.frame_path import Track
 from agent.qstructure.target_frame import Frame
+from worldsim.judge.expected_places import ExpectedPlaces
 from worldsim.judge.tick import Tick, same_claims
 from worldsim.scenario.tables import CONVERGED_M, CONVERGED_S
 
@@ -54,17 +56,25 @@ class _SlotPositions(NamedTuple):
 class Phase:
     """One formation in one frame, and how the team converges into it.
 
-    mission: its key; an agent that flies an older mission has no slot in this phase.
+    mission: its key; an agent that flies an older mission has no slot in this phase. expected: the
+    places that the team must fill; None: any slots will do.
     """
 
     def __init__(
-        self, formation: Formation, from_s: float, path: FramePath = AT_HOME, mission: int = 0
+        self,
+        formation: Formation,
+        from_s: float,
+        path: FramePath = AT_HOME,
+        mission: int = 0,
+        expected: ExpectedPlaces | None = None,
     ) -> None:
         self.formation = formation
         self.from_s = from_s
         self.mission = mission
         self.residual_m: float | None = None
         """The largest slot error at the last tick [m]; None where an agent has no valid slot."""
+        self.at_slots = False
+        """Whether each running agent is near its own slot, as sides of a partition may be too."""
         self._track = Track(path)
         self._timer = ConvergenceTimer()
         self._known_slots: dict[tuple[int, int, int], Slot | None] = {}
@@ -72,6 +82,9 @@ class Phase:
         self._own_of: Tick | None = None
         """The tick that they were found in, with ``_own_blocked``."""
         self._own_blocked = self._blocked = NO_PLACES
+        self._expected = expected
+        self._filled = expected is None
+        """Whether the running agents' own slots are exactly the expected places."""
         self._positions = _SlotPositions(slots={}, frame=None, position=[])
 
     @property
@@ -134,12 +147,16 @@ class Phase:
         ]
 
     def see(self, time_s: float, error: Sequence[float]) -> bool:
-        """Take the running agents' slot errors [m] at a tick; return whether all are in place."""
+        """Take the running agents' slot errors [m] at a tick; return whether all are in place.
+
+        All are where each is near its slot, and their slots are exactly the expected places.
+        """
         worst = -inf
         for error_m in error:
             worst = max(worst, error_m)
         self.residual_m = worst if isfinite(worst) else None
-        in_place = 0.0 <= worst <= CONVERGED_M
+        self.at_slots = 0.0 <= worst <= CONVERGED_M
+        in_place = self.at_slots and self._filled
         self._timer.see(time_s, in_place)
         return in_place
 
@@ -174,7 +191,12 @@ class Phase:
             for row, claim in enumerate(claims)
             if holders[claim] <= 1
         }
-        return {row: slot for row, slot in found.items() if slot is not None}
+        slots = {row: slot for row, slot in found.items() if slot is not None}
+        if self._expected is not None:
+            alive = tick.alive.tolist()
+            held = [slot.point for row, slot in slots.items() if alive[row]]
+            self._filled = len(held) == team and self._expected.are(held, self._blocked)
+        return slots
 
     def _slot(self, queue: int, rank: int, team: int) -> Slot | None:
         key = (queue, rank, team)

@@ -9,11 +9,7 @@ of its own slot for 2 s.
 """
 
 import msgspec
-import numpy as np
 
-from agent.messages import Place
-from worldsim.judge.hovering_vehicles import HoveringVehicles
-from worldsim.judge.phase import Phase
 from worldsim.judge.radio_events import RadioRunEvent
 from worldsim.judge.run_events import LOSS_KINDS, LossEvent, ReturnEvent
 from worldsim.judge.tick import Tick
@@ -34,15 +30,12 @@ class Recovery(msgspec.Struct):
 
 
 class Recoveries:
-    """Every disturbance of the team in a run. hovering: sees every tick first."""
+    """Every disturbance of the team in a run."""
 
-    def __init__(self, hovering: HoveringVehicles) -> None:
+    def __init__(self) -> None:
         self.all: list[Recovery] = []
         self._open: list[Recovery] = []
         self._since_s: float | None = None
-        self._hovering = hovering
-        self._seen: tuple[bytes, ...] = ()
-        self._complete = False
 
     def handle_event(self, event: LossEvent | ReturnEvent) -> None:
         """Take the loss or return of an agent; without an agent, a start that was refused."""
@@ -63,11 +56,11 @@ class Recoveries:
         self.all.append(Recovery(event.t_s, event.kind, []))
         self._open.append(self.all[-1])
 
-    def see(self, tick: Tick, phase: Phase, in_place: bool) -> None:
+    def see(self, tick: Tick, in_place: bool) -> None:
         """Take a tick; in_place: whether every running agent is in its place."""
         if not self._open:
             return
-        if not (in_place and self._all_back(tick) and self._is_complete(tick, phase)):
+        if not (in_place and self._all_back(tick)):
             self._since_s = None
             return
         if self._since_s is None:
@@ -86,17 +79,3 @@ class Recoveries:
             elif any(not tick.alive[agent] for agent in recovery.agents if agent not in lost_again):
                 return False
         return True
-
-    def _is_complete(self, tick: Tick, phase: Phase) -> bool:
-        rows = (tick.place, tick.alive, tick.mission, self._hovering.hovering(tick))
-        seen = tuple(each.tobytes() for each in rows)
-        if seen != self._seen:
-            self._seen = seen
-            held = [claim for claim in phase.claims(tick) if claim[0] >= 0]
-            self._complete = set(held) == self._places(tick, phase)
-        return self._complete
-
-    def _places(self, tick: Tick, phase: Phase) -> set[Place]:
-        """Return the places that the running agents must hold."""
-        team = np.flatnonzero(tick.alive).tolist()
-        return set(self._hovering.layout(tick, phase, team).places)

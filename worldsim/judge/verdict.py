@@ -10,7 +10,9 @@ from typing import Final, NamedTuple, assert_never, final
 import numpy as np
 
 from agent.guidance.cone import cone_of
-from agent.qstructure.formation import formation_of
+from agent.messages import FramePath
+from agent.qstructure.formation import FormationSpec, formation_of
+from worldsim.judge.expected_places import ExpectedPlaces
 from worldsim.judge.finding import Expectation, InvariantTally
 from worldsim.judge.held_attitudes import HeldAttitudes
 from worldsim.judge.held_formation import HeldFormation
@@ -97,12 +99,11 @@ class Judge:
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        formation = formation_of(scenario.formation, scenario.control.spacing_m)
-        self.phases = [Phase(formation, 0.0, path_of(scenario.frame))]
+        self.phases = [self._phase(scenario.formation, 0.0, path_of(scenario.frame))]
         self.queues = [QueueConvergence(self.phases[0])]
         self.sub_formations = [SubFormations(self.phases[0])]
         self._hovering = HoveringVehicles(scenario.control.spacing_m)
-        self._recoveries = Recoveries(self._hovering)
+        self._recoveries = Recoveries()
         self._without_room: list[Restarted | Joined] = []
         converges = scenario.expect.converge
         self._allocation = Invariants(scenario, self._hovering) if converges else None
@@ -181,10 +182,10 @@ class Judge:
         if self._attitudes is not None:
             self._attitudes.see(tick, phase, slot_error)
         self.sub_formations[-1].see(tick)
-        self._recoveries.see(tick, phase, in_place)
+        self._recoveries.see(tick, in_place)
         self._held.see(tick, phase, in_place)
         if self._allocation is not None:
-            self._allocation.see(tick, phase, in_place)
+            self._allocation.see(tick, phase)
         return Figures(
             separation=separation,
             slot_error=slot_error,
@@ -260,12 +261,18 @@ class Judge:
         )
 
     def _open_phase(self, event: MissionRunEvent) -> None:
-        formation = formation_of(event.tables, self._scenario.control.spacing_m)
-        self.phases.append(Phase(formation, event.t_s, event.path, event.mission))
+        self.phases.append(self._phase(event.tables, event.t_s, event.path, event.mission))
         self.queues.append(QueueConvergence(self.phases[-1]))
         self.sub_formations.append(SubFormations(self.phases[-1]))
         if self._attitudes is not None:
             self._attitudes.open_phase()
+
+    def _phase(
+        self, spec: FormationSpec, from_s: float, path: FramePath, mission: int = 0
+    ) -> Phase:
+        spacing_m = self._scenario.control.spacing_m
+        expected = ExpectedPlaces(spec, spacing_m)
+        return Phase(formation_of(spec, spacing_m), from_s, path, mission, expected)
 
     def _separated(self) -> Expectation:
         wanted_m = self._scenario.separation_bound_m
