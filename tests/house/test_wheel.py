@@ -14,9 +14,8 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("netem", "agent", "worldsim")
-NOT_CONVERGED = (
-    "pyramidal-wedge did not converge: the run ended after 3 s, before the limit of 12 s"
-)
+TOO_SHORT = "the run ended after 3 s, before the limit of 12 s"
+NOT_JUDGED = f"not judged: pyramidal-wedge did not converge: {TOO_SHORT}"
 SHA = "0123456789abcdef0123456789abcdef01234567"
 SOURCES = (*PACKAGES, "deploy", "pyproject.toml", "setup.py", "MANIFEST.in", "README.md", "LICENSE")
 PIP = (sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check")
@@ -94,11 +93,11 @@ def test_installed_it_runs_the_library_in_an_empty_folder(target: Path, tmp_path
         )
 
     made = qswarm("sim", "wedge-9", "--no-recording", "--duration", "3", "--out", "run")
-    assert (made.returncode, made.stderr.count("\n")) == (1, 1), made.stderr
+    assert (made.returncode, made.stderr.count("\n")) == (3, 1), made.stderr
     assert made.stderr.startswith("wedge-9: expect.converge_within_s: warning: ")
     assert "wedge-9, seed 1, virtual time: 9 agents, 3 s simulated" in made.stdout
     summary = json.loads((tmp_path / "run/summary.json").read_text())
-    assert (summary["reason"], summary["commit"]) == (NOT_CONVERGED, SHA)
+    assert (summary["reason"], summary["commit"]) == (NOT_JUDGED, SHA)
     assert all(summary["packages"].values())
 
     error = qswarm("check", "wedge-9", "--agents", "0").stderr

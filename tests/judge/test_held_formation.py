@@ -115,7 +115,7 @@ def test_while_a_fault_parts_the_team_nothing_counts_and_without_a_tick_nothing_
     judge = judged(away(10.0, 19.0), events)
     found = rows(judge)
     assert [found[name].got for name in ("in_formation_fraction", "max_slot_error_m")] == [None] * 2
-    assert found["in_formation_fraction"].held
+    assert found["in_formation_fraction"].held is None
     assert judge.recoveries == []
 
 

@@ -179,7 +179,25 @@ def test_an_expectation_that_is_not_met_fails() -> None:
     assert made["outcome"] == "fail"
     assert made["reason"] is not None
     assert made["reason"].startswith("line: converged in ")
-    assert made["reason"].endswith(" s (limit 0.01 s)")
+    assert " s (limit 0.01 s; margin -" in made["reason"]
+
+
+def test_what_a_run_is_too_short_for_is_not_judged() -> None:
+    short = parse(SMALL, overrides={"duration_s": "0.5", "expect.converge_within_s": "3"})
+    made = summarise(short, finished(fly(short), short))
+    reason = "line did not converge: the run ended after 0.5 s, before the limit of 3 s"
+    assert (made["outcome"], made["reason"]) == ("inconclusive", f"not judged: {reason}")
+    assert made["expectations"][1]["held"] is None
+
+
+def test_what_is_expected_of_a_formation_that_no_time_shows_is_not_judged() -> None:
+    """The run ends within the window of its fault, so nothing of it counts."""
+    override = {"expect.in_formation_fraction": "0.9", "expect.idle_faults": "true"}
+    override["event"] = "[{ at_s = 0.1, for_s = 4.8, netem = { loss_percent = 1 } }]"
+    scenario = parse(SMALL, overrides=override)
+    made = summarise(scenario, finished(fly(scenario), scenario))
+    reason = "not judged: time in formation: no time counted (required >= 90 %)"
+    assert (made["outcome"], made["reason"]) == ("inconclusive", reason)
 
 
 def test_rejected_messages_are_counted_by_component_and_cause(run: FinishedRun) -> None:

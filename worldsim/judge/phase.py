@@ -30,19 +30,20 @@ class ConvergenceTimer:
     """Finds the first CONVERGED_S seconds that agents are in place without interruption."""
 
     def __init__(self) -> None:
-        self._since_s: float | None = None
+        self.since_s: float | None = None
+        """Since when they have been in place [s]; None where they are not."""
         self.converged_s: float | None = None
         """The start of those seconds, in simulated time [s]; None before they are over."""
 
     def see(self, time_s: float, in_place: bool) -> None:
         """Take a tick; ticks come in order."""
         if not in_place:
-            self._since_s = None
+            self.since_s = None
             return
-        if self._since_s is None:
-            self._since_s = time_s
-        if self.converged_s is None and time_s - self._since_s >= CONVERGED_S - TIME_SLACK_S:
-            self.converged_s = self._since_s
+        if self.since_s is None:
+            self.since_s = time_s
+        if self.converged_s is None and time_s - self.since_s >= CONVERGED_S - TIME_SLACK_S:
+            self.converged_s = self.since_s
 
 
 class _SlotPositions(NamedTuple):
@@ -92,6 +93,14 @@ class Phase:
         """Time from the phase's start until all were in place for 2 s, less those 2 s [s]."""
         at_s = self._timer.converged_s
         return None if at_s is None else at_s - self.from_s
+
+    def may_converge(self, within_s: float, until_s: float) -> bool:
+        """Return whether a phase that ends at a time [s] could have converged in time had it not.
+
+        It could where the limit was not over, and where the team stood, but for less than 2 s.
+        """
+        since_s = until_s if self._timer.since_s is None else self._timer.since_s
+        return since_s - self.from_s < within_s
 
     def frame(self, time_s: float) -> Frame:
         """Return the target's frame at a time [s]."""

@@ -35,11 +35,12 @@ class Recoveries:
     def __init__(self) -> None:
         self.all: list[Recovery] = []
         self._open: list[Recovery] = []
-        self._since_s: float | None = None
+        self.standing_since_s: float | None = None
+        """Since when the team has stood again [s]; None where it does not."""
 
     def handle_event(self, event: LossEvent | ReturnEvent) -> None:
         """Take the loss or return of an agent; without an agent, a start that was refused."""
-        self._since_s = None
+        self.standing_since_s = None
         last = self.all[-1] if self.all else None
         if last is None or (last.t_s, last.kind) != (event.t_s, event.kind):
             last = Recovery(event.t_s, event.kind, [])
@@ -52,7 +53,7 @@ class Recoveries:
 
     def handle_radio(self, event: RadioRunEvent) -> None:
         """Take a change of the radio, after which the team is not parted, or no more."""
-        self._since_s = None
+        self.standing_since_s = None
         self.all.append(Recovery(event.t_s, event.kind, []))
         self._open.append(self.all[-1])
 
@@ -61,13 +62,13 @@ class Recoveries:
         if not self._open:
             return
         if not (in_place and self._all_back(tick)):
-            self._since_s = None
+            self.standing_since_s = None
             return
-        if self._since_s is None:
-            self._since_s = tick.time_s
-        if tick.time_s - self._since_s >= CONVERGED_S - 1e-9:
+        if self.standing_since_s is None:
+            self.standing_since_s = tick.time_s
+        if tick.time_s - self.standing_since_s >= CONVERGED_S - 1e-9:
             for recovery in self._open:
-                recovery.reformed_s = max(0.0, self._since_s - recovery.t_s)
+                recovery.reformed_s = max(0.0, self.standing_since_s - recovery.t_s)
             self._open = []
 
     def _all_back(self, tick: Tick) -> bool:

@@ -92,6 +92,8 @@ class Shortcomings(NamedTuple):
     """Invariants that were never evaluated, and have to be."""
     missed: list[str]
     """Names of expectations that were not met."""
+    unjudged: list[str]
+    """Names of expectations that the run was too short for."""
 
 
 class Judge:
@@ -257,7 +259,8 @@ class Judge:
         return Shortcomings(
             violated=[name for name, tally in tallies.items() if tally.violations],
             unseen=[name for name, tally in tallies.items() if not tally.ticks],
-            missed=[row.name for row in self.expectations() if not row.held],
+            missed=[row.name for row in self.expectations() if row.held is False],
+            unjudged=[row.name for row in self.expectations() if row.held is None],
         )
 
     def _open_phase(self, event: MissionRunEvent) -> None:
@@ -278,7 +281,8 @@ class Judge:
         wanted_m = self._scenario.separation_bound_m
         least_m = self.min_separation_m
         held = keeps(least_m, wanted_m) if least_m is not None else self._scenario.fleet.agents == 1
-        return Expectation(name="min_separation_m", wanted=wanted_m, got=least_m, held=held)
+        name = "min_separation_m"
+        return Expectation(name=name, wanted=wanted_m, got=least_m, held=held, at_least=True)
 
     def _cleared(self) -> Expectation:
         clearance = self.clearance
@@ -287,35 +291,53 @@ class Judge:
             wanted=clearance.bound_m,
             got=clearance.answerable_m,
             held=clearance.held,
+            at_least=True,
         )
 
     def _converged(self, phase: Phase) -> Expectation:
         within_s, got_s = self._scenario.expect.converge_within_s, phase.converge_s
-        held = got_s is not None and (within_s is None or got_s <= within_s)
+        held: bool | None = got_s is not None and (within_s is None or got_s <= within_s)
+        if got_s is None and within_s is not None:
+            held = None if phase.may_converge(within_s, self._end_s(phase)) else False
         name = f"converge {phase.formation.name}"
         return Expectation(name=name, wanted=within_s, got=got_s, held=held)
 
+    def _end_s(self, phase: Phase) -> float:
+        """Return until when a formation was asked for, so far [s]."""
+        later = self.phases[self.phases.index(phase) + 1 :]
+        return later[0].from_s if later else self._until_s
+
+    @property
+    def _until_s(self) -> float:
+        """The time of the last tick [s]."""
+        return 0.0 if self._last is None else self._last.time_s
+
     def _reformed(self, within_s: float) -> Expectation:
-        times_s = [recovery.reformed_s for recovery in self.recoveries]
-        known_s = [time_s for time_s in times_s if time_s is not None]
-        complete = len(known_s) == len(times_s)
-        worst_s = max(known_s) if known_s and complete else None
-        held = complete and all(time_s <= within_s for time_s in known_s)
+        known_s = [each.reformed_s for each in self.recoveries if each.reformed_s is not None]
+        standing_s = self._recoveries.standing_since_s
+        so_far_s = self._until_s if standing_s is None else standing_s
+        open_s = [so_far_s - each.t_s for each in self.recoveries if each.reformed_s is None]
+        worst_s = max(known_s) if known_s and not open_s else None
+        held: bool | None = not any(time_s > within_s for time_s in known_s)
+        if open_s and held:
+            held = None if max(open_s) < within_s else False
         return Expectation(name="reform_within_s", wanted=within_s, got=worst_s, held=held)
 
     def _held_rows(self) -> list[Expectation]:
-        """Return what is expected of the formation once it has converged; held where untested."""
+        """Return what is expected of the formation once it has converged."""
         expect = self._scenario.expect
         fraction, worst_m = self.in_formation_fraction, self.max_slot_error_m
         rows = []
         if expect.in_formation_fraction is not None:
             wanted = expect.in_formation_fraction
-            held = fraction is None or fraction >= wanted
+            held = None if fraction is None else fraction >= wanted
             name = "in_formation_fraction"
-            rows.append(Expectation(name=name, wanted=wanted, got=fraction, held=held))
+            rows.append(
+                Expectation(name=name, wanted=wanted, got=fraction, held=held, at_least=True)
+            )
         if expect.max_slot_error_m is not None:
             wanted = expect.max_slot_error_m
-            held = worst_m is None or worst_m <= wanted
+            held = None if worst_m is None else worst_m <= wanted
             name = "max_slot_error_m"
             rows.append(Expectation(name=name, wanted=wanted, got=worst_m, held=held))
         return rows

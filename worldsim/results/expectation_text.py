@@ -1,7 +1,9 @@
 """Expectations in words: what a run showed of each, beside what was required."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple, TypedDict
+from typing import NamedTuple, TypedDict
+
+from worldsim.judge.finding import ExpectationRow
 
 CONVERGE = "converge "
 """An expectation's name begins so where it is about a formation; the formation's name follows."""
@@ -14,15 +16,6 @@ HINDRANCE_WORDS = {
     "outrun": "the obstacle is faster than the vehicle, which came no nearer by itself",
 }
 """Why a vehicle could not give way, in words."""
-
-
-class ExpectationRow(TypedDict):
-    """One expectation, in the unit of its name."""
-
-    name: str
-    wanted: Any
-    got: Any
-    held: bool
 
 
 class RecoveryRow(TypedDict):
@@ -80,7 +73,7 @@ def encounter_texts(rows: Sequence[EncounterRow]) -> list[str]:
 
 def was_tested(row: ExpectationRow) -> bool:
     """Return whether a run could show anything of an expectation; without a test it is held."""
-    return row["got"] is not None or not row["held"]
+    return row["got"] is not None or row["held"] is not True
 
 
 def figure(value: float | None, unit: str, digits: int) -> str:
@@ -99,7 +92,7 @@ def _spans(run: Circumstances) -> Iterator[Span]:
 def _convergence(row: ExpectationRow, span: Span) -> str:
     name, got, wanted = row["name"].removeprefix(CONVERGE), row["got"], row["wanted"]
     if got is not None:
-        return f"{name}: converged in {got:.3g} s{_limit(wanted)}"
+        return f"{name}: converged in {got:.3g} s{_limit(row)}"
     if wanted is None:
         return f"{name} did not converge in {span.length_s:.4g} s"
     return f"{name} did not converge{_within(wanted, span)}"
@@ -118,10 +111,11 @@ def _other(row: ExpectationRow, run: Circumstances) -> str:
     if wanted is None and name.startswith(STARTS):
         return f"{name}: there was no room, so no agent started"
     if name in _BOUNDS:
-        what, relation, unit, digits, scale = _BOUNDS[name]
+        what, relation, unit, digits, scale = bound = _BOUNDS[name]
         got = row["got"]
         measured = _unmeasured(row) if got is None else figure(scale * got, unit, digits)
-        return f"{what}: {measured} (required {relation} {scale * wanted:g} {unit})"
+        required = f"required {relation} {scale * wanted:g} {unit}"
+        return f"{what}: {measured} ({required}{_margin(row, bound)})"
     return f"{name}: {row['got']} (required {wanted})"
 
 
@@ -142,18 +136,27 @@ _BOUNDS = {
 }
 
 
+def _margin(row: ExpectationRow, bound: _Bound) -> str:
+    margin = row["margin"]
+    if margin is None:
+        return ""
+    return f"; margin {figure(bound.scale * margin, bound.unit, bound.digits)}"
+
+
 def _unmeasured(row: ExpectationRow) -> str:
+    if row["held"] is None:
+        return "no time counted"
     endless = row["name"] == "max_slot_error_m" and not row["held"]
     return "an agent had no slot" if endless else "not measured"
 
 
 def _reform(row: ExpectationRow, run: Circumstances) -> str:
-    limit = _limit(row["wanted"])
+    limit = _limit(row)
     if not was_tested(row):
         return f"formation after a fault: not tested, there was none{limit}"
     if row["held"]:
         return f"formation restored within {row['got']:.3g} s of each fault{limit}"
-    worst = max(run.recoveries, key=_slowness)
+    worst = _slowest(row, run)
     reformed_s = worst["reformed_s"]
     if reformed_s is not None:
         return f"{_change(worst)}: re-formed after {reformed_s:.3g} s{limit}"
@@ -161,10 +164,15 @@ def _reform(row: ExpectationRow, run: Circumstances) -> str:
     return f"{_change(worst)}: not re-formed{_within(row['wanted'], left)}"
 
 
-def _slowness(recovery: RecoveryRow) -> tuple[bool, float]:
-    """Return a key that is largest for the slowest recovery: the earliest that never ended."""
-    reformed_s = recovery["reformed_s"]
-    return (True, -recovery["t_s"]) if reformed_s is None else (False, reformed_s)
+def _slowest(row: ExpectationRow, run: Circumstances) -> RecoveryRow:
+    """Return the recovery that took longest so far; of those without an end, where none is late."""
+
+    def lasted_s(recovery: RecoveryRow) -> float:
+        reformed_s = recovery["reformed_s"]
+        return run.ended_s - recovery["t_s"] if reformed_s is None else reformed_s
+
+    unended = [each for each in run.recoveries if each["reformed_s"] is None]
+    return max(unended if row["held"] is None else run.recoveries, key=lasted_s)
 
 
 def _change(recovery: RecoveryRow) -> str:
@@ -176,5 +184,7 @@ def _change(recovery: RecoveryRow) -> str:
     return f"{recovery['kind']} of {who} at {recovery['t_s']:.4g} s"
 
 
-def _limit(wanted_s: float | None) -> str:
-    return f" (limit {wanted_s:g} s)" if wanted_s is not None else ""
+def _limit(row: ExpectationRow) -> str:
+    wanted_s, margin_s = row["wanted"], row["margin"]
+    margin = f"; margin {margin_s:.3g} s" if margin_s is not None else ""
+    return f" (limit {wanted_s:g} s{margin})" if wanted_s is not None else ""

@@ -13,13 +13,12 @@ import msgspec
 from netem.messages import MediumCounters
 from worldsim.engine.counters import Links
 from worldsim.engine.step import SlotLoop
-from worldsim.judge.finding import Expectation
+from worldsim.judge.finding import ExpectationRow
 from worldsim.judge.sub_formations import SubFormationsRow
 from worldsim.judge.verdict import Judge
 from worldsim.results.expectation_text import (
     Circumstances,
     EncounterRow,
-    ExpectationRow,
     RecoveryRow,
     expectation_texts,
 )
@@ -186,7 +185,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
     """Return the content of summary.json as plain JSON values."""
     judge, counters = run.loop.judge, run.medium_counters
     rejected = _rejected(run)
-    expectations = [_expectation_row(expectation) for expectation in judge.expectations()]
+    expectations = [expectation.row for expectation in judge.expectations()]
     invariants = judge.invariants()
     use = run.loop.radio_use
     faults = _fault_rows(run)
@@ -267,10 +266,26 @@ def _outcome(
         return "inconclusive", f"{doubt}{meanwhile}"
     if found.unseen:
         return "fail", f"never evaluated: {', '.join(found.unseen)}"
+    return _of_expectations(run, expectations) or _of_faults(idle)
+
+
+def _of_expectations(
+    run: FinishedRun, expectations: list[ExpectationRow]
+) -> tuple[Outcome, str] | None:
+    """Return the outcome where an expectation was not met, or the run was too short for it."""
     texts = expectation_texts(expectations, _circumstances(run))
-    missed = [text for text, row in zip(texts, expectations, strict=True) if not row["held"]]
+    rows = list(zip(texts, expectations, strict=True))
+    missed = [text for text, row in rows if row["held"] is False]
     if missed:
         return "fail", "; ".join(missed)
+    unjudged = [text for text, row in rows if row["held"] is None]
+    if unjudged:
+        return "inconclusive", f"not judged: {'; '.join(unjudged)}"
+    return None
+
+
+def _of_faults(idle: str | None) -> tuple[Outcome, str | None]:
+    """Return the outcome of a run that meets everything. idle: which faults struck nothing."""
     return ("inconclusive", idle) if idle is not None else ("pass", None)
 
 
@@ -370,15 +385,6 @@ def _encounter_rows(judge: Judge) -> list[EncounterRow]:
         }
         for encounter in judge.clearance.encounters
     ]
-
-
-def _expectation_row(expectation: Expectation) -> ExpectationRow:
-    return {
-        "name": expectation.name,
-        "wanted": expectation.wanted,
-        "got": expectation.got,
-        "held": expectation.held,
-    }
 
 
 def _finite(value: Any) -> Any:

@@ -3,12 +3,12 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from worldsim.judge.finding import ExpectationRow
 from worldsim.judge.sub_formations import SubFormationsRow
 from worldsim.recording.layout import SUMMARY_FILE
 from worldsim.results.expectation_text import (
     Circumstances,
     EncounterRow,
-    ExpectationRow,
     RecoveryRow,
     encounter_texts,
     expectation_texts,
@@ -65,10 +65,7 @@ def table(overall: Overall, folder: Path) -> str:
 
 def verified(verification: "Verification") -> str:
     """Return what a recording shows by itself, and whether summary.json says the same."""
-    rows: list[ExpectationRow] = [
-        {"name": row.name, "wanted": row.wanted, "got": row.got, "held": row.held}
-        for row in verification.expectations
-    ]
+    rows: list[ExpectationRow] = [row.row for row in verification.expectations]
     expectations = _expectations(rows, _recorded_circumstances(verification))
     cut = "" if verification.whole else f" of {verification.duration_s:g} s"
     none = f"  no {SUMMARY_FILE} to compare with"
@@ -136,6 +133,8 @@ def _encounters(rows: list[EncounterRow]) -> list[str]:
 
 
 def _mark(row: ExpectationRow) -> str:
+    if row["held"] is None:
+        return "open"
     if not was_tested(row):
         return "-"
     return "met" if row["held"] else "NOT MET"
