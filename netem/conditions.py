@@ -12,7 +12,7 @@ from typing import Final, NamedTuple, TypeVar, assert_never
 
 import msgspec
 
-from netem.faults import FaultOrder, Flap, Heal, Jam, LastingFault, Partition, Position
+from netem.faults import FaultOrder, Flap, Heal, Jam, LastingFault, Partition, Position, Sabotage
 from netem.link_model import LinkModel
 from netem.link_parameters import RATE_KEYS, Conditions, LinkKeys
 from netem.range_index import InRange
@@ -245,6 +245,8 @@ class NetworkConditions:
                     self._jams[number] = fault
                 case Flap():
                     self._flaps[number] = since_s, fault
+                case Sabotage():
+                    pass  # it sends frames of its own, and changes no link
                 case _:
                     assert_never(fault)
         conditions = self._changed(changes.values())

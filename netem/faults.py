@@ -5,7 +5,7 @@ apply it (``netem.conditions``), and events.jsonl reports it. A new kind is a ty
 :class:`RadioEvent`, and its effect in ``NetworkConditions``.
 """
 
-from typing import Annotated, Literal, assert_never
+from typing import Annotated, Generic, Literal, TypeVar, assert_never
 
 import msgspec
 from msgspec import Meta
@@ -54,20 +54,51 @@ class Flap(Table, frozen=True):
     """Directed, as [from, to]; empty: all links."""
 
 
+SabotageKind = Literal["replay", "spoof", "garbage", "flood"]
+"""replay: the victim's frames again; spoof: frames in other agents' names; garbage: frames that are
+no messages; flood: the victim's newest frames, many times."""
+Victims = Annotated[tuple[AgentId, ...], Meta(max_length=1000)]
+Who = TypeVar("Who")
+
+
+class SabotageKeys(Table, Generic[Who], frozen=True):
+    """Frames that a saboteur sends by the radios of agents, its victims, beside their own."""
+
+    kind: SabotageKind
+    agents: Who
+    """The victims."""
+    per_s: Annotated[float, Meta(ge=0.1, le=2000)] = 200.0
+    """Frames that it sends by each of their radios [1/s]; a replay sends each frame once more."""
+    delay_s: Annotated[float, Meta(ge=LEAST, le=60)] = 2.0
+    """How much later a replay sends a frame again [s]."""
+
+
+class Sabotage(SabotageKeys[Victims], frozen=True):
+    """Sabotage of the radios of given agents."""
+
+
 class Heal(msgspec.Struct, frozen=True):
     """The end of every partition in force."""
 
 
-LastingFault = Conditions | Partition | Jam | Flap
+LastingFault = Conditions | Partition | Jam | Flap | Sabotage
 """A fault that stays in force until it ends. Conditions are the link keys that change."""
 RadioFault = LastingFault | Heal
 """The effect of one event on the radio."""
 
 
-class RadioEvent(
-    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True
+SabotageTable = TypeVar("SabotageTable")
+
+
+class RadioKeys(
+    msgspec.Struct,
+    Generic[SabotageTable],
+    frozen=True,
+    kw_only=True,
+    forbid_unknown_fields=True,
+    omit_defaults=True,
 ):
-    """One radio fault under its key, as in a scenario's event; exactly one key is set."""
+    """The keys of radio faults. A scenario's event selects victims that are not known yet."""
 
     partition: Groups | Partition | None = None
     """Groups alone are a clean partition."""
@@ -77,6 +108,20 @@ class RadioEvent(
     flap: Flap | None = None
     netem: Conditions | None = None
     """The keys of [netem] that change."""
+    sabotage: SabotageTable | None = None
+
+    @property
+    def radio_fault(self) -> RadioFault | None:
+        """The fault whose key is set; None where there is none, or one of unknown victims."""
+        if self.partition is not None and not isinstance(self.partition, Partition):
+            return Partition(groups=self.partition)
+        if self.heal:
+            return Heal()
+        return self.partition or self.jam or self.flap or self.netem
+
+
+class RadioEvent(RadioKeys[Sabotage], frozen=True, kw_only=True):
+    """One radio fault under its key; exactly one key is set."""
 
     @staticmethod
     def of(fault: RadioFault) -> "RadioEvent":
@@ -92,6 +137,8 @@ class RadioEvent(
                 return RadioEvent(flap=fault)
             case Conditions():
                 return RadioEvent(netem=fault)
+            case Sabotage():
+                return RadioEvent(sabotage=fault)
         assert_never(fault)
 
     @property
@@ -103,11 +150,12 @@ class RadioEvent(
     @property
     def radio_fault(self) -> RadioFault | None:
         """The fault whose key is set; None where there is none."""
-        if self.partition is not None and not isinstance(self.partition, Partition):
-            return Partition(groups=self.partition)
-        if self.heal:
-            return Heal()
-        return self.partition or self.jam or self.flap or self.netem
+        return self.sabotage or super().radio_fault
+
+    @property
+    def victims(self) -> tuple[int, ...]:
+        """The agents that the fault strikes, whatever frames it strikes."""
+        return self.sabotage.agents if self.sabotage is not None else ()
 
 
 class FaultOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):

@@ -159,6 +159,7 @@ class FreeRunningMedium:
         self._intake.incarnations = truth.incarnations
         self._medium.place(truth.positions)
         self._take_transmissions(truth.slot)
+        self._medium.sabotage(truth.slot / self._setup.slot_hz)
         self._send_batches(truth.slot + 1, newest_s, read_at)
         self._slot = truth.slot + 1
         if self._slot % self._report_every == 0:

@@ -68,6 +68,7 @@ class LockstepMedium:
         self._send_inboxes(slot_input)
         for sender in slot_input.participants:
             self._transmit(sender, slot_input)
+        self._medium.sabotage(slot_input.truth.time_s)
         self._queue_batches(slot_input)
         pages = tuple(self._medium.pages().items())
         self._slot += 1

@@ -15,12 +15,13 @@ import msgspec
 
 from netem.conditions import NetworkConditions, differing
 from netem.delivery_log import FATE, HEAD, DeliveryLog
-from netem.faults import FaultOrder, Position
+from netem.faults import FaultOrder, Position, Sabotage
 from netem.link import LOST_TO_PARTITION, LOST_TO_QUEUE, Cause, Links, Sending, Verdict
 from netem.link_model import LinkModel
 from netem.messages import MediumCounters, MediumSetup
 from netem.range_index import InRange, RangeIndex
 from netem.rate_queue import RateQueue
+from netem.saboteur import Saboteur
 from netem.wire.channels import CHANNELS, MAX_PAYLOAD_B
 from netem.wire.frame import (
     BATCH_HEAD_B,
@@ -35,6 +36,8 @@ DELIVERED = Cause.DELIVERED
 FATES = tuple(cause.name.lower() for cause in Cause)
 SURELY_FIT = (MAX_BATCH_B - BATCH_HEAD_B) // (FRAME_HEAD_B + MAX_PAYLOAD_B)
 """This many frames fit one batch, whatever their payloads."""
+FIRST_FORGED = 2**52
+"""From here on saboteurs' frames are counted: agents' own keep numbers and fates."""
 _InFlight = tuple[float, int, int, int, int, int, Frame]
 """A frame in a receiver's queue: due time [s], source, incarnation, channel, count, copy, frame."""
 
@@ -54,7 +57,8 @@ class Medium:
     def __init__(self, setup: MediumSetup, receivers: Iterable[int] | None = None) -> None:
         own = tuple(sorted(range(setup.agents) if receivers is None else receivers))
         self._own = frozenset(own)
-        self._links = Links(sha256(b"qswarm medium %d" % setup.seed).digest())
+        self._seed = sha256(b"qswarm medium %d" % setup.seed).digest()
+        self._links = Links(self._seed)
         self._conditions = NetworkConditions(setup.conditions)
         self._range_index = RangeIndex(setup.agents, own)
         self._others = [len(own) - (agent in self._own) for agent in range(setup.agents)]
@@ -63,7 +67,10 @@ class Medium:
         self._rate_queues: dict[tuple[int, int], RateQueue] = {}
         self._fates = [0] * len(Cause)
         self._struck: dict[int, int] = {}
-        """Frames, times the links that a radio fault cut or altered, by the fault's number."""
+        """Frames, times the links on which a fault cut, altered or sent them, by its number."""
+        self._saboteurs: dict[int, Saboteur] = {}
+        """By the number of the fault in force."""
+        self._next_forged = FIRST_FORGED
         self._delivery_log = DeliveryLog(setup.agents)
         self._sent_b = [0] * (len(CHANNELS) * setup.agents)
         self.sent = self.addressed = self.in_flight = self.duplicated = self.corrupted = 0
@@ -79,20 +86,40 @@ class Medium:
     def apply(self, order: FaultOrder) -> None:
         """Begin or end a fault, between slots; frames that are in flight are not affected."""
         self._conditions.apply(order)
+        number, fault = order.number, order.fault
+        if isinstance(fault, Sabotage):
+            self._saboteurs[number] = Saboteur(self._seed, number, order.at_s, fault)
+        elif fault is None:
+            self._saboteurs.pop(number, None)
 
     def transmit(self, source: int, sent_s: float, transmission: Transmission) -> None:
         """Send one agent's frames of one slot at ``sent_s`` [s]: decide their fate on each link."""
+        incarnation = transmission.incarnation
         for outgoing in transmission.frames:
-            count_key = (source, transmission.incarnation, outgoing.channel)
+            count_key = (source, incarnation, outgoing.channel)
             count = self._counts.get(count_key, 0)
             self._counts[count_key] = count + 1
-            self.sent += 1
-            self._sent_b[len(CHANNELS) * source + outgoing.channel] += len(outgoing.payload)
-            self.addressed += self._others[source]
             self._send(
-                Frame(source, transmission.incarnation, outgoing.channel, count, outgoing.payload),
-                sent_s,
+                Frame(source, incarnation, outgoing.channel, count, outgoing.payload), sent_s
             )
+        for saboteur in self._saboteurs.values():
+            saboteur.overhear(source, sent_s, transmission)
+
+    def sabotage(self, now_s: float) -> None:
+        """Send the saboteurs' frames of the slot that began at ``now_s`` [s], after all agents'."""
+        for number, saboteur in self._saboteurs.items():
+            for forged in saboteur.due(now_s):
+                if self._range_index.positions[forged.victim] is None:
+                    continue  # its radio is off, for a saboteur too
+                before = self.in_flight
+                count = self._next_forged
+                self._next_forged += 1
+                self._send(
+                    Frame(forged.victim, forged.incarnation, forged.channel, count, forged.payload),
+                    now_s,
+                )
+                received = self.in_flight - before
+                self._struck[number] = self._struck.get(number, 0) + received
 
     def collect(
         self, receiver: int, now_s: float, due_s: list[float] | None = None
@@ -156,8 +183,11 @@ class Medium:
         )
 
     def _send(self, frame: Frame, sent_s: float) -> None:
-        """Decide the fate of one frame on its link to every other agent, in ascending order."""
+        """Count a frame; decide its fate on its link to every other agent, in ascending order."""
         source, channel, models = frame.source, frame.channel, self._conditions.models
+        self.sent += 1
+        self._sent_b[len(CHANNELS) * source + channel] += len(frame.payload)
+        self.addressed += self._others[source]
         if self._conditions.without:
             self._count_altered(source, channel)
         key = (source, frame.incarnation, channel, frame.count)

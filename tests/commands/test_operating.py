@@ -19,7 +19,7 @@ from tests.commands.conftest import Command
         (("fault", "run", "join", "some"), "SELECTOR: 'some'; a whole number from 0"),
         (
             ("netem", "run", "explode"),
-            "ACTION: 'explode'; allowed: show, set, partition, heal, jam, flap",
+            "ACTION: 'explode'; allowed: show, set, partition, heal, jam, flap, sabotage",
         ),
         (("netem", "run", "partition"), "partition: write groups, e.g. 0,1/2,3 (see qswarm netem"),
         (("netem", "run", "partition", "a,b"), "'a'; a whole number from 0"),

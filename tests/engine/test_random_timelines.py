@@ -22,7 +22,7 @@ UNTIL = 80
 """The end of a timeline [0.1 s]."""
 BOOT = 10
 """How long an agent boots by default [0.1 s]."""
-RADIO = ("partition", "jam", "flap", "netem")
+RADIO = ("partition", "jam", "flap", "netem", "sabotage")
 DOWN = ("kill", "leave")
 
 
@@ -54,6 +54,8 @@ class Fault:
                 action = f"netem = {{ loss_percent = {self.value} }}"
             case "sensor":
                 action = f"sensor = {{ agents = {agents}, mode = 'silent' }}"
+            case "sabotage":
+                action = f"sabotage = {{ kind = 'spoof', agents = {agents} }}"
             case "heal":
                 action = "heal = true"
             case "end":

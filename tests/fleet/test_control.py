@@ -94,6 +94,22 @@ def test_a_radio_fault_is_reported_while_it_is_in_force() -> None:
     assert remaining == [RadioEvent(flap=Flap(3.0))]
 
 
+def test_a_saboteur_works_until_it_is_ended() -> None:
+    fleet = OperatedFleet()
+    answer = fleet.ask(sabotage={"kind": "flood", "agents": ["vertex:V1", 2]})
+    (active,) = answer.faults
+    assert answer.name == active.name == "sabotage-1"
+    assert 2 in active.fault.victims
+    fleet.fly(2.0)
+    sent = fleet.virtual.medium_counters.sent
+    assert fleet.ask(end="sabotage-1").faults == ()
+    fleet.fly(3.0)
+    assert fleet.virtual.medium_counters.sent - sent < 0.7 * sent
+    fleet.ask(kill=[2])
+    with pytest.raises(RequestError, match="no such agent has a radio"):
+        fleet.ask(sabotage={"kind": "flood", "agents": [2]})
+
+
 def test_a_fault_ends_early_by_its_name() -> None:
     fleet = OperatedFleet(event="[{ at_s = 0.5, kill = [4] }]")
     fleet.ask(jam={"centre_m": [0, 0, 0], "radius_m": 2}, for_s=9, name="storm")

@@ -136,6 +136,24 @@ SENTENCES: list[tuple[dict[str, Any], str]] = [
         },
         "links flap with a period of 1 s: all links (scheduled)",
     ),
+    *(
+        (
+            {"kind": "sabotage", **NO_AGENT, "number": 4, "sabotage": sabotage, **SCHEDULED},
+            f"{words} (scheduled)",
+        )
+        for sabotage, words in (
+            (
+                {"kind": "replay", "agents": [2, 5], "delay_s": 0.5},
+                "sabotage (replay) by the radio of a2, a5: each frame again after 0.5 s",
+            ),
+            (
+                {"kind": "garbage", "agents": [2]},
+                "sabotage (garbage) by the radio of a2: 200 frames a second",
+            ),
+            ({"kind": "spoof", "agents": []}, "sabotage (spoof): no agent matches"),
+            (None, "sabotage ended"),
+        )
+    ),
     (
         {"kind": "flap", **NO_AGENT, "number": 3, "flap": None, **SCHEDULED},
         "flapping links restored (scheduled)",

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netem.conditions import NetworkConditions
-from netem.faults import FaultOrder, Flap, Heal, Jam, Partition, RadioEvent
+from netem.faults import FaultOrder, Flap, Heal, Jam, Partition, RadioEvent, Sabotage
 from netem.link_parameters import Conditions, LinkKeys
 from worldsim.judge.radio_events import applied, order_of
 from worldsim.judge.run_events import (
@@ -32,6 +32,7 @@ FAULTS = [
     Jam((1.0, 2.0, 3.0), 2.0),
     Flap(0.5, ((0, 1),)),
     Conditions(loss_percent=50.0, multihop=LinkKeys(delay_ms=9.0)),
+    Sabotage("replay", (2, 5), delay_s=0.5),
 ]
 EVENTS: list[RunEvent] = [
     Killed(t_s=1.0, agent=2, planned=True),

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netem.delivery_log import Digest, joined_pages
-from netem.faults import Flap, Heal, Jam, Partition
+from netem.faults import Flap, Heal, Jam, Partition, Sabotage
 from netem.link_parameters import Conditions, DirectedLink, GilbertElliott, LinkKeys, PathLoss
 from netem.medium import Medium
 from netem.messages import MediumSetup
@@ -39,6 +39,8 @@ ORDERS = (
     begin(1, Jam((1.0, 1.0, 0.0), 1.5)),
     begin(2, Flap(0.3), at_s=0.1),
     begin(3, Heal()),
+    begin(4, Sabotage("replay", (0, 2), delay_s=0.03)),
+    begin(5, Sabotage("spoof", (1,), per_s=300.0)),
     end(1),
     end(2),
 )
@@ -69,6 +71,7 @@ def played(mediums, seed, shuffled=None, slots=60):
                     Outgoing(at % 2, bytes(size)) for at, size in enumerate(sizes[agent])
                 )
                 medium.transmit(agent, slot * SLOT_S, Transmission(slot, 0, frames))
+            medium.sabotage(slot * SLOT_S)
         yield (slot + 1) * SLOT_S
 
 

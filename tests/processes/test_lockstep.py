@@ -49,6 +49,16 @@ netem = { loss_percent = 60 }
 [[event]]
 at_s = 4.5
 leave = [2]
+[[event]]
+at_s = 0.5
+sabotage = { kind = "garbage", agents = ["random:1", 3] }
+for_s = 3.0
+[[event]]
+at_s = 1.0
+sabotage = { kind = "replay", agents = [0], delay_s = 0.7 }
+[[event]]
+at_s = 3.5
+sabotage = { kind = "spoof", agents = ["vertex:V1"] }
 """
 
 

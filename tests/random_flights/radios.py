@@ -87,6 +87,7 @@ def fault(draw: Draw, agents: int, spacing: float) -> Tables:
         lambda: {"flap": flap(draw, agents)},
         lambda: {"netem": {"loss_percent": 100.0, **conditions(draw, agents, spacing)}},
         lambda: {"heal": True},
+        lambda: {"sabotage": sabotage(draw, agents)},
     ]
     return draw.among(kinds)()
 
@@ -110,4 +111,17 @@ def flap(draw: Draw, agents: int) -> Tables:
     pairs = [[a, b] for a in range(agents) for b in range(agents) if a != b]
     if pairs and draw.chance(0.5):
         table["links"] = draw.some(pairs, draw.whole(1, 6))
+    return table
+
+
+def sabotage(draw: Draw, agents: int) -> Tables:
+    victims: list[int | str] = draw.some(range(agents), draw.whole(1, max(1, agents // 2)))
+    table: Tables = {
+        "kind": draw.among(("replay", "spoof", "garbage", "flood")),
+        "agents": draw.among((victims, ["random:1"], ["vertex:V1"], ["all"])),
+    }
+    if table["kind"] == "replay":
+        table["delay_s"] = draw.scale(0.01, 10.0)
+    else:
+        table["per_s"] = draw.scale(0.5, 100.0)
     return table

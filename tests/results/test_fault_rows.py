@@ -14,6 +14,7 @@ STRIKE = {
     "jam": ("jam = { centre_m = [0, 0, 0], radius_m = 20 }", "frames"),
     "flap": ("flap = { period_s = 0.2 }", "frames"),
     "netem": ("netem = { delay_ms = 20 }", "frames"),
+    "sabotage": ("sabotage = { kind = 'flood', agents = [1] }", "frames"),
     "sensor": ('sensor = { agents = [1], mode = "silent" }', "readings"),
     "pause": ("pause = [1]", "agents"),
     "kill": ("kill = [1]", "agents"),

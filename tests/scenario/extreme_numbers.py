@@ -94,6 +94,8 @@ EVENTS: tuple[Data, ...] = (
     {"join": {"count": 1}},
     {"jam": {"centre_m": [0.0, 0.0, 0.0], "radius_m": 2.0}, "for_s": 0.2},
     {"flap": {"period_s": 0.2}, "for_s": 0.2},
+    {"sabotage": {"kind": "garbage", "agents": [1], "per_s": 20.0}, "for_s": 0.2},
+    {"sabotage": {"kind": "replay", "agents": [1], "delay_s": 0.1}, "for_s": 0.2},
     {"netem": {"loss_percent": 50.0, "delay_ms": 100.0}, "for_s": 0.2},
     {"frame": {"waypoints_m": [[1.0, 0.0, 0.0]], "yaw_deg": 90.0}},
     {"frame": {"waypoints_m": [[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]], "speed_mps": 0.3}},

@@ -28,6 +28,12 @@ IDLE = {
     "event[0].sensor.kind": {
         "event": "[{ at_s = 1, sensor = { agents = [0], mode = 'stuck', kind = 'sonar' } }]"
     },
+    "event[0].sabotage.per_s": {
+        "event": "[{ at_s = 1, sabotage = { kind = 'replay', agents = [0], per_s = 9 } }]"
+    },
+    "event[0].sabotage.delay_s": {
+        "event": "[{ at_s = 1, sabotage = { kind = 'spoof', agents = [0], delay_s = 9 } }]"
+    },
     "vehicle.max_accel_mps2": {"vehicle.max_accel_mps2": "3"},
     "vehicle.max_turn_deg": {
         "vehicle.max_turn_deg": "30",

@@ -23,6 +23,7 @@ commands = typer.Typer()
         "qswarm netem runs/mine partition 0,1/2,3",
         "qswarm netem runs/mine partition groups=[[0,1]] kind=one_way --for 5",
         "qswarm netem runs/mine jam centre_m=[0,0,0] radius_m=2",
+        "qswarm netem runs/mine sabotage kind=spoof agents=[2] --for 5",
         "qswarm netem runs/mine show",
         "qswarm netem runs/mine end jam-2",
     )
@@ -32,7 +33,7 @@ def netem(
         list[str],
         typer.Argument(
             metavar="check SCENARIO | RUN ACTION [KEY=VALUE]",
-            help="ACTION: show, set, partition, heal, jam, flap or end.",
+            help="ACTION: show, set, partition, heal, jam, flap, sabotage or end.",
         ),
     ],
     seed: Seed = None,

@@ -14,7 +14,7 @@ from worldsim.commands.options import RunFolder, examples
 from worldsim.results.exit_status import PASS
 
 FAULTS = ("kill", "leave", "restart", "pause", "resume", "join", "end")
-RADIO_ACTIONS = ("show", "set", "partition", "heal", "jam", "flap", "end")
+RADIO_ACTIONS = ("show", "set", "partition", "heal", "jam", "flap", "sabotage", "end")
 ForSeconds = Annotated[
     float | None, typer.Option("--for", metavar="S", help="Undo it after S simulated seconds.")
 ]
@@ -145,7 +145,7 @@ def change_radio(run: Path, action: str, words: list[str], more: EventKeys) -> i
             event = _end(words)
         case "partition" if not any("=" in word for word in words):
             event = {"partition": _groups(words)}
-        case "partition" | "jam" | "flap":
+        case "partition" | "jam" | "flap" | "sabotage":
             event = {action: _table(words)}
         case _:
             raise _bad(action, "ACTION", f"allowed: {', '.join(RADIO_ACTIONS)}")

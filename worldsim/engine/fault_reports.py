@@ -81,7 +81,7 @@ class FaultReports:
                 self._release(operation.incarnations, ("kill", "leave", "pause"), t_s)
                 return
             case FaultOrder(event=event) if event is not None:
-                kind, agents = event.radio_kind, ()
+                kind, agents = event.radio_kind, event.victims
             case _:
                 return
         self.all.append(FaultReport(operation.number, kind, t_s, by, agents))

@@ -150,6 +150,10 @@ class Membership:
         self._sensors_of[number] = agents
         return SetSensorMode(number, agents, fault.kind, fault.mode)
 
+    def victims(self, number: int, selectors: Selectors, claims: Claims) -> tuple[int, ...]:
+        """Return the agents whose radios an event's saboteur uses: those with a process."""
+        return self._selected(number, selectors, STARTED, claims)
+
     def apply(self, operation: ProcessOperation, time_s: float) -> None:
         """Apply an operation that was carried out at a time [s] to the states."""
         match operation:

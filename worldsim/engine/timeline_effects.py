@@ -10,7 +10,7 @@ from typing import Literal, assert_never
 from agent.messages import NO_MISSION
 from agent.qstructure.formation import FormationSpec, formation_of
 from netem.conditions import NetworkConditions
-from netem.faults import FaultOrder, RadioEvent, RadioFault
+from netem.faults import FaultOrder, RadioEvent, RadioFault, Sabotage
 from worldsim.engine.fault_reports import FaultReports
 from worldsim.engine.membership import Membership
 from worldsim.engine.missions import Missions
@@ -49,6 +49,7 @@ from worldsim.scenario.faults import (
     ProcessFault,
     Restart,
     Resume,
+    SabotageFault,
     SensorFault,
 )
 from worldsim.scenario.tables import Scenario
@@ -108,6 +109,8 @@ class TimelineEffects:
         if isinstance(action, RadioFault):
             return self._fault_order(step, action)
         match action:
+            case SabotageFault():
+                return self._fault_order(step, self._sabotage(number, action))
             case Kill() | Leave() | Restart() | Pause() | Resume() | Join():
                 return self._process_operation(step, action)
             case SensorFault():
@@ -175,6 +178,15 @@ class TimelineEffects:
         event = None if step.ends else RadioEvent.of(fault)
         order = FaultOrder(number=step.number, at_s=step.at_s, event=event)
         return None if step.ends and not self.network.ends(order) else order
+
+    def _sabotage(self, number: int, fault: SabotageFault) -> Sabotage:
+        """Return sabotage of the agents that its selectors select now."""
+        return Sabotage(
+            kind=fault.kind,
+            agents=self.members.victims(number, fault.agents, self._claims),
+            per_s=fault.per_s,
+            delay_s=fault.delay_s,
+        )
 
     def _process_operation(self, step: Step, fault: ProcessFault) -> Operation | None:
         position, time_s = self._world.vehicles.position, self._world.time_s

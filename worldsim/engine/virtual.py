@@ -116,6 +116,7 @@ class VirtualFleet:
         self._medium.place(open_slot.positions)
         for agent, observation in open_slot.observations:
             self._step(agent, observation, open_slot)
+        self._medium.sabotage(open_slot.time_s)
         self._deliver(open_slot.slot + 1)
         self.loop.close(self._medium.digest())
 

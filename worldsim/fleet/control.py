@@ -12,7 +12,7 @@ import numpy as np
 import zenoh
 
 from agent.comms.mission import last_version
-from netem.faults import FaultOrder, RadioEvent
+from netem.faults import FaultOrder, RadioEvent, Sabotage
 from netem.link_parameters import Conditions
 from netem.wire.bus import Bus, Handler, drain
 from worldsim.engine.operations import (
@@ -189,6 +189,8 @@ class Control:
                 return operation
             case GiveMission():
                 return operation._replace(to=request.to, version=request.version)
+            case FaultOrder(event=RadioEvent(sabotage=Sabotage(agents=()))):
+                raise RequestError(f"{kind}: no such agent has a radio now")
             case FaultOrder() | SetSensorMode() | AdmitAgents():
                 return operation
         assert_never(operation)

@@ -9,6 +9,7 @@ from worldsim.judge.radio_events import (
     Jammed,
     Partitioned,
     RadioRunEvent,
+    Sabotaged,
     radio_sentence,
 )
 from worldsim.judge.run_events import (
@@ -32,7 +33,7 @@ from worldsim.judge.run_events import (
 )
 
 Queues = Sequence[str]
-WARNINGS = (Killed, Left, Paused, Partitioned, Jammed, LateStart)
+WARNINGS = (Killed, Left, Paused, Partitioned, Jammed, Sabotaged, LateStart)
 """Events that a list of them shows as warnings."""
 
 

@@ -30,7 +30,7 @@ from worldsim.judge.connectivity import Components, Connectivity
 from worldsim.judge.finding import InvariantTally
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.phase import Phase
-from worldsim.judge.radio_events import RadioRunEvent
+from worldsim.judge.radio_events import RadioRunEvent, Sabotaged
 from worldsim.judge.radio_load import RadioLoad
 from worldsim.judge.run_events import (
     FormationGiven,
@@ -109,6 +109,8 @@ class Invariants:
 
     def handle_event(self, event: RunEvent) -> None:
         """Take an event; events come in order."""
+        if isinstance(event, Sabotaged):
+            return  # whatever somebody sends, it excuses nobody
         if isinstance(event, RadioRunEvent):
             self._connectivity.handle_event(event)
             self._fault(event.t_s, event.t_s)

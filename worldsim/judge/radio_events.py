@@ -21,6 +21,7 @@ from netem.faults import (
     PartitionKind,
     RadioEvent,
     RadioFault,
+    Sabotage,
 )
 from netem.link_parameters import Conditions
 from worldsim.judge.event import By, PlannedEvent
@@ -72,6 +73,13 @@ class Flapped(RadioFaultEvent, frozen=True, kw_only=True, tag="flap"):
     """None: the flap ended."""
 
 
+class Sabotaged(RadioFaultEvent, frozen=True, kw_only=True, tag="sabotage"):
+    """A saboteur began or ended to send frames by agents' radios."""
+
+    sabotage: Sabotage | None
+    """None: it ended."""
+
+
 class ConditionsChanged(
     Conditions, frozen=True, kw_only=True, omit_defaults=True, tag_field="kind", tag="netem"
 ):
@@ -95,7 +103,7 @@ class ConditionsChanged(
         return "netem"
 
 
-RadioRunEvent = Partitioned | Healed | Jammed | Flapped | ConditionsChanged
+RadioRunEvent = Partitioned | Healed | Jammed | Flapped | ConditionsChanged | Sabotaged
 _CONDITION_KEYS = Conditions.__struct_fields__
 
 
@@ -136,13 +144,30 @@ def radio_sentence(event: RadioRunEvent) -> str:
             words = f"links flap with a period of {flap.period_s:g} s: {links}"
         case Flapped():
             words = "flapping links restored"
-        case ConditionsChanged(undone=Conditions() as undone):
-            words = f"link conditions restored: end of {_settings(undone)}"
         case ConditionsChanged():
-            words = f"link conditions changed: {_settings(event)}"
+            words = _changed(event)
+        case Sabotaged():
+            words = _sabotaged(event.sabotage)
         case _:
             assert_never(event)
     return words
+
+
+def _changed(event: ConditionsChanged) -> str:
+    if event.undone is not None:
+        return f"link conditions restored: end of {_settings(event.undone)}"
+    return f"link conditions changed: {_settings(event)}"
+
+
+def _sabotaged(sabotage: Sabotage | None) -> str:
+    if sabotage is None:
+        return "sabotage ended"
+    agents = ", ".join(f"a{agent}" for agent in sabotage.agents)
+    if not agents:
+        return f"sabotage ({sabotage.kind}): no agent matches"
+    rate = f"{sabotage.per_s:g} frames a second"
+    how = f"each frame again after {sabotage.delay_s:g} s" if sabotage.kind == "replay" else rate
+    return f"sabotage ({sabotage.kind}) by the radio of {agents}: {how}"
 
 
 def _begin_event(
@@ -178,6 +203,10 @@ def _begin_event(
                 conditions=network.conditions,
                 **{key: getattr(fault, key) for key in _CONDITION_KEYS},
             )
+        case Sabotage():
+            return Sabotaged(
+                t_s=t_s, agent=None, planned=True, by=by, number=number, sabotage=fault
+            )
     assert_never(fault)
 
 
@@ -201,6 +230,8 @@ def _end_event(
                 conditions=network.conditions,
                 undone=fault,
             )
+        case Sabotage():
+            return Sabotaged(t_s=t_s, agent=None, planned=True, by=by, number=number, sabotage=None)
     assert_never(fault)
 
 
@@ -225,6 +256,8 @@ def _begun(event: RadioRunEvent) -> RadioFault | None:
         case ConditionsChanged(undone=undone):
             keys = {key: getattr(event, key) for key in _CONDITION_KEYS}
             return Conditions(**keys) if undone is None else None
+        case Sabotaged(sabotage=sabotage):
+            return sabotage
     assert_never(event)
 
 

@@ -23,7 +23,7 @@ from worldsim.judge.obstacle_clearance import ObstacleClearance
 from worldsim.judge.parting_faults import PartingFaults
 from worldsim.judge.phase import Phase
 from worldsim.judge.queue_convergence import QueueConvergence
-from worldsim.judge.radio_events import RadioRunEvent
+from worldsim.judge.radio_events import RadioRunEvent, Sabotaged
 from worldsim.judge.recovery import Recoveries, Recovery
 from worldsim.judge.run_events import (
     NOBODY_TO_RESTART,
@@ -137,6 +137,8 @@ class Judge:
         """Take an event; events come in order."""
         if self._allocation is not None:
             self._allocation.handle_event(event)
+        if isinstance(event, Sabotaged):
+            return  # whatever somebody sends, it excuses nobody
         if isinstance(event, RadioRunEvent):
             self._handle_radio(event)
             return

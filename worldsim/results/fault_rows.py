@@ -21,8 +21,8 @@ class FaultRow(TypedDict):
     from_s: float
     to_s: float | None  # None: in force to the end
     by: str | None  # "operator", or None for the timeline
-    agents: list[int] | None  # ended, paused, or with a sensor that failed
-    frames: int | None  # times the links on which the fault cut or altered them
+    agents: list[int] | None  # ended, paused, with a sensor that failed, or with a saboteur
+    frames: int | None  # times the links on which the fault cut, altered or sent them
     readings: int | None  # of sensors, that differ from the true ones
 
 
@@ -40,7 +40,7 @@ def fault_rows(
             "from_s": each.from_s,
             "to_s": each.to_s,
             "by": each.by,
-            "agents": None if each.on_radio else each.agents,
+            "agents": None if each.on_radio and each.kind != "sabotage" else each.agents,
             "frames": frames.get(each.number, 0) if each.on_radio and frames is not None else None,
             "readings": readings.get(each.number, 0) if each.kind == "sensor" else None,
         }
@@ -82,6 +82,8 @@ def _struck(row: FaultRow) -> str:
     agents = _named(row["agents"] or [])
     if row["readings"] is not None:
         return f"changed {_counted(row['readings'], 'reading')} of {agents}"
+    if row["kind"] == "sabotage" and row["frames"] is not None:
+        return f"sent others {_counted(row['frames'], 'frame')} by the radio of {agents}"
     if row["frames"] is not None:
         done = "changed the links of" if row["kind"] == "netem" else "cut"
         return f"{done} {_counted(row['frames'], 'frame')}"

@@ -23,6 +23,7 @@ from worldsim.scenario.faults import (
     Pause,
     Restart,
     Resume,
+    SabotageFault,
     SensorFault,
 )
 from worldsim.scenario.foreseen_fleet import FleetNow, ForeseenFleet
@@ -211,7 +212,9 @@ class EventChecks:
         if isinstance(action, RadioFault):
             return self._radio(event)
         match action:
-            case Kill() | Leave() | Pause() | Restart() | Resume() | SensorFault():
+            case (
+                Kill() | Leave() | Pause() | Restart() | Resume() | SensorFault() | SabotageFault()
+            ):
                 return self._selection(event.kind, action)
             case Join():
                 return self._join(action)
@@ -224,15 +227,17 @@ class EventChecks:
         assert_never(action)
 
     def _selection(
-        self, kind: str, action: Kill | Leave | Pause | Restart | Resume | SensorFault
+        self,
+        kind: str,
+        action: Kill | Leave | Pause | Restart | Resume | SensorFault | SabotageFault,
     ) -> Iterator[Problem]:
         match action:
             case Kill() | Leave() | Pause():
                 return self._selectors(kind, action.selectors, hold_places=True)
             case Restart() | Resume():
                 return self._selectors(kind, action.selectors, hold_places=False)
-            case SensorFault():
-                return self._selectors("sensor.agents", action.agents, hold_places=True)
+            case SensorFault() | SabotageFault():
+                return self._selectors(f"{kind}.agents", action.agents, hold_places=True)
         assert_never(action)
 
     def _radio(self, event: EventTable) -> Iterator[Problem]:

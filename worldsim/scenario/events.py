@@ -9,7 +9,7 @@ from msgspec import Meta
 
 from agent.config import Positive
 from agent.qstructure.formation import FormationSpec
-from netem.faults import RadioEvent
+from netem.faults import RadioKeys
 from worldsim.scenario.faults import (
     Action,
     EndFault,
@@ -21,6 +21,7 @@ from worldsim.scenario.faults import (
     ProcessFault,
     Restart,
     Resume,
+    SabotageFault,
     SensorFault,
 )
 from worldsim.scenario.selectors import Selectors
@@ -37,7 +38,7 @@ Name = Annotated[
 """A name of a run or of an event."""
 
 
-class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
+class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defaults=False):
     """One action at ``at_s``; ``for_s`` undoes it after that time, where it can be undone.
 
     every_s: what can be undone happens again after this time, to the end of the run.
@@ -46,7 +47,8 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
     processes, the vehicles hover when the last command has expired; resume: continues them.
     partition: cuts the links between groups, unnamed agents form one more; a table for other kinds;
     heal: ends all partitions. jam: a sphere in which no radio works; flap: links that go down and
-    up. netem: changes keys of [netem]. sensor: lets sensors fail. end: ends a fault by its name,
+    up. netem: changes keys of [netem]. sabotage: somebody sends frames by agents' radios.
+    sensor: lets sensors fail. end: ends a fault by its name,
     which is its kind and the event's index, as in "jam-2", unless ``name`` gives another one.
     formation, frame: a mission for the team.
     """
@@ -84,7 +86,7 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
     @property
     def action(self) -> Action:
         """The action whose key is set. Raises LookupError without one."""
-        fault = self.radio_fault or self._process_fault or self.sensor
+        fault = self.radio_fault or self._process_fault or self.sensor or self.sabotage
         action = fault or self.formation or self.frame or self._end
         if action is None:
             raise LookupError("the event has no action")
@@ -118,7 +120,7 @@ class EventTable(RadioEvent, frozen=True, kw_only=True, omit_defaults=False):
 
 
 _NO_ACTIONS = ("at_s", "for_s", "every_s", "name")
-_RADIO = RadioEvent.__struct_fields__
+_RADIO = RadioKeys.__struct_fields__
 _OTHERS = (key for key in EventTable.__struct_fields__ if key not in (*_NO_ACTIONS, *_RADIO))
 ACTIONS = (*_OTHERS, *_RADIO)
 """The keys of all actions."""

@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from agent.config import SensorKind, Table
 from agent.qstructure.formation import FormationSpec
-from netem.faults import RadioFault
+from netem.faults import RadioFault, SabotageKeys
 from worldsim.scenario.selectors import Selectors
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.target_frame import FrameChange
@@ -61,6 +61,10 @@ class SensorFault(Table, frozen=True):
     kind: SensorKind | None = None
 
 
+class SabotageFault(SabotageKeys[Selectors], frozen=True):
+    """Let a saboteur send frames by the radios of the selected agents."""
+
+
 class EndFault(msgspec.Struct, frozen=True):
     """End a fault before its time, or one that has no end."""
 
@@ -70,5 +74,5 @@ class EndFault(msgspec.Struct, frozen=True):
 
 ProcessFault = Kill | Leave | Restart | Pause | Resume | Join
 MissionChange = FormationSpec | FrameChange
-Action = RadioFault | ProcessFault | SensorFault | MissionChange | EndFault
+Action = RadioFault | ProcessFault | SensorFault | SabotageFault | MissionChange | EndFault
 """The action of one event."""

@@ -16,6 +16,7 @@ from worldsim.scenario.faults import (
     Pause,
     Restart,
     Resume,
+    SabotageFault,
     SensorFault,
 )
 from worldsim.scenario.selectors import (
@@ -99,7 +100,7 @@ class ForeseenFleet:
                 self.frame = changed_frame(self.frame, action, step.at_s)
             case FormationSpec():
                 self.spec, self.formation = action, self.made(action)
-            case SensorFault() | EndFault():
+            case SensorFault() | SabotageFault() | EndFault():
                 pass  # an event that ends a fault puts the fault's end into the timeline
             case _:
                 assert_never(action)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from agent.config import SCANNERS, Control, Sensors, Vehicle
 from agent.qstructure.formation import FormationSpec
 from netem.link_parameters import Conditions, LinkKeys
+from worldsim.scenario.faults import SabotageFault
 from worldsim.scenario.obstacle_tables import Movable
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.tables import Expectations, Scenario
@@ -60,6 +61,7 @@ def idle_keys(scenario: Scenario) -> Iterator[Problem]:
     """Yield a problem for each key that is set and has no effect."""
     yield from _of_links(scenario)
     yield from _of_sensors(scenario)
+    yield from _of_saboteurs(scenario)
     yield from _of_vehicles(scenario)
     yield from _of_control(scenario)
     yield from _of_frame(scenario)
@@ -114,6 +116,19 @@ def _of_sensors(scenario: Scenario) -> Iterator[Problem]:
         if kind_given is not None and kind_given not in carried:
             detail = f"no effect: no vehicle's sensors have {kind_given!r}"
             yield Problem(f"event[{index}].sensor.kind", detail)
+
+
+def _of_saboteurs(scenario: Scenario) -> Iterator[Problem]:
+    for index, event in enumerate(scenario.event):
+        table = event.sabotage
+        if table is None:
+            continue
+        replays = table.kind == "replay"
+        default = SabotageFault(kind=table.kind, agents=table.agents)
+        key = "per_s" if replays else "delay_s"
+        if _is_set(table, default, key):
+            detail = "a replay sends each frame once more" if replays else "only a replay is late"
+            yield Problem(f"event[{index}].sabotage.{key}", f"no effect: {detail}")
 
 
 def _of_vehicles(scenario: Scenario) -> Iterator[Problem]:

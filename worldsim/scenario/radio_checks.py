@@ -1,14 +1,14 @@
 """Checks of a single radio fault, in a fleet of a given size."""
 
 from collections.abc import Iterator
-from typing import assert_never
+from typing import Any, assert_never
 
-from netem.faults import Flap, Heal, Jam, Partition, RadioEvent
+from netem.faults import Flap, Heal, Jam, Partition, RadioKeys, Sabotage
 from netem.link_parameters import Conditions
 from worldsim.scenario.problem import Problem
 
 
-def radio_problems(event: RadioEvent, agents: int) -> Iterator[Problem]:
+def radio_problems(event: RadioKeys[Any], agents: int) -> Iterator[Problem]:
     """Yield what makes the radio fault of an event invalid; nothing for other events."""
     fault = event.radio_fault
     match fault:
@@ -19,7 +19,7 @@ def radio_problems(event: RadioEvent, agents: int) -> Iterator[Problem]:
             yield from _flap(fault, agents)
         case Conditions():
             yield from _links(fault, agents)
-        case Jam() | Heal() | None:
+        case Jam() | Heal() | Sabotage() | None:
             pass
         case _:
             assert_never(fault)
