@@ -102,8 +102,9 @@ class Medium:
             self._send(
                 Frame(source, incarnation, outgoing.channel, count, outgoing.payload), sent_s
             )
-        for saboteur in self._saboteurs.values():
-            saboteur.overhear(source, sent_s, transmission)
+        if self._saboteurs:
+            for saboteur in self._saboteurs.values():
+                saboteur.overhear(source, sent_s, transmission)
 
     def sabotage(self, now_s: float) -> None:
         """Send the saboteurs' frames of the slot that began at ``now_s`` [s], after all agents'."""
