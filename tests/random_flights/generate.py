@@ -103,9 +103,12 @@ def draft(draw: Draw, steps: int) -> Tables:
     if draw.chance(0.25):
         made["control"]["gather"] = may_gather(made["control"])
     if draw.chance(0.1):
-        made["expect"]["in_formation_fraction"] = draw.number(0.0, 1.0)
-        made["expect"]["max_slot_error_m"] = draw.number(0.0, 2.0)
-        made["expect"]["idle_faults"] = draw.chance(0.5)
+        made["expect"] |= {
+            "in_formation_fraction": draw.number(0.0, 1.0),
+            "max_slot_error_m": draw.number(0.0, 2.0),
+            "idle_faults": draw.chance(0.5),
+            "min_lambda2": draw.number(0.0, 9.0),
+        }
     made["event"] = repeated_and_ended(draw, made["event"], made["duration_s"])
     return made
 

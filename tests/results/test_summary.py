@@ -165,7 +165,7 @@ def test_news_that_comes_late_on_a_slow_host_is_no_failure_of_the_team(
 def test_every_invariant_has_words() -> None:
     nine = load(SCENARIOS / "wedge-9.toml")
     tallies = Invariants(nine, HoveringVehicles(nine.control.spacing_m)).tallies
-    assert {"I1", *tallies, "I8"} == set(INVARIANT_WORDS)
+    assert {"I1", "I5", *tallies, "I8"} == set(INVARIANT_WORDS)
 
 
 def test_an_error_during_the_run_is_a_failure(run: FinishedRun) -> None:

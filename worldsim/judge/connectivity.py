@@ -96,6 +96,12 @@ class Connectivity:
             self._found, self._found_of = _found(lost, heard, tick.alive), of
         return self._found
 
+    def heard(self, tick: Tick) -> NDArray[np.bool_]:
+        """Return over which links beacons get through at a tick (N, N), from row to column."""
+        distance, usable = self._links(tick.position, tick.alive)
+        heard: NDArray[np.bool_] = usable & (self._lost_over(LOCAL, distance) < 1.0)
+        return heard
+
     def groups(self, position: Floats, alive: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return the group of agents (N,) in which beacons of each come to each; -1 for the others.
 

@@ -28,14 +28,18 @@ class HeldFormation:
         """Take the beginning or the end of a fault at a time [s]."""
         self._from_s = t_s + self._window_s
 
-    def see(self, tick: Tick, phase: Phase, in_place: bool) -> None:
-        """Take a tick; in_place: whether every running agent is in its slot."""
+    def see(self, tick: Tick, phase: Phase, in_place: bool) -> bool:
+        """Take a tick, and return whether it counts.
+
+        in_place: whether every running agent is in its slot.
+        """
         if phase.converge_s is None or self._parting or tick.time_s < self._from_s:
-            return
+            return False
         self._ticks += 1
         self._in_place += in_place
         worst_m = phase.residual_m if phase.residual_m is not None else inf
         self._worst_m = max(self._worst_m, worst_m)
+        return True
 
     @property
     def in_place_fraction(self) -> float | None:

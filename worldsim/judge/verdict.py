@@ -19,6 +19,8 @@ from worldsim.judge.held_formation import HeldFormation
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.invariants import Invariants
 from worldsim.judge.metrics import Separation, conserved, keeps
+from worldsim.judge.mission_order import MissionOrder
+from worldsim.judge.network_strength import NetworkStrength
 from worldsim.judge.obstacle_clearance import ObstacleClearance
 from worldsim.judge.parting_faults import PartingFaults
 from worldsim.judge.phase import Phase
@@ -117,6 +119,9 @@ class Judge:
         self._parting = PartingFaults()
         window_s = scenario.expect.reform_within_s or DISTURBED_S
         self._held = HeldFormation(window_s, self._parting)
+        strength = scenario.expect.min_lambda2 is not None
+        self._strength = NetworkStrength(scenario) if strength else None
+        self._missions = MissionOrder()
         self._safety = InvariantTally()
         self._conservation = InvariantTally()
         cones = np.degrees([cone_of(vehicle) for vehicle in scenario.vehicles])
@@ -155,6 +160,8 @@ class Judge:
                 assert_never(event)
 
     def _handle_radio(self, event: RadioRunEvent) -> None:
+        if self._strength is not None:
+            self._strength.handle_event(event)
         self._parting.handle_event(event)
         self._held.open_window(event.t_s)
         if not self._parting:
@@ -164,6 +171,8 @@ class Judge:
         if isinstance(event, Restarted | Joined):
             if event.refused not in (None, NOBODY_TO_RESTART):
                 self._without_room.append(event)
+            if event.agent is not None:
+                self._missions.forget(event.agent)
         elif event.nobody is not None:
             return
         self._held.open_window(event.t_s)
@@ -178,6 +187,7 @@ class Judge:
         distance, too_near = self.clearance.see(last, tick) if self.clearance else (None, False)
         self._safety.count(self._is_too_near(separation) or too_near)
         self._check_packets(tick.packets)
+        self._missions.see(tick)
         self._count_turns(tick)
         phase, team = self.phases[-1], np.flatnonzero(tick.alive).tolist()
         error = phase.slot_error(tick, self._hovering.occupied_places(tick, phase, team))
@@ -187,7 +197,9 @@ class Judge:
             self._attitudes.see(tick, phase, slot_error)
         self.sub_formations[-1].see(tick)
         self._recoveries.see(tick, in_place)
-        self._held.see(tick, phase, in_place)
+        counts = self._held.see(tick, phase, in_place)
+        if self._strength is not None and counts:
+            self._strength.see(tick)
         if self._allocation is not None:
             self._allocation.see(tick, phase)
         return Figures(
@@ -212,6 +224,11 @@ class Judge:
     def max_slot_error_m(self) -> float | None:
         """Largest slot error in that time [m]; None where none of it counts."""
         return self._held.worst_m
+
+    @property
+    def min_lambda2(self) -> float | None:
+        """Least algebraic connectivity in that time; None where it is not expected."""
+        return None if self._strength is None else self._strength.least
 
     @property
     def min_obstacle_distance_m(self) -> float | None:
@@ -246,14 +263,16 @@ class Judge:
     def invariants(self) -> dict[str, InvariantTally]:
         """Return the tally of each invariant.
 
-        I1: no two vehicles are too near, and none is too near to an obstacle. I8: conservation of
+        I1: no two vehicles are too near, and none is too near to an obstacle. I5: no agent goes
+        back to an older mission while its process lives. I8: conservation of
         packets, evaluated where the medium's counters are known: in virtual time at every tick, in
         processes from netem's first report on. An allocation invariant whose premise never held is
         absent; all are absent where the run need not converge.
         """
         tallies = self._allocation.tallies if self._allocation is not None else {}
         allocation = {name: tally for name, tally in tallies.items() if tally.ticks}
-        return {"I1": self._safety, **allocation, "I8": self._conservation}
+        others = {"I1": self._safety, "I5": self._missions.tally, "I8": self._conservation}
+        return dict(sorted((allocation | others).items()))
 
     def shortcomings(self) -> Shortcomings:
         """Return what speaks against the run."""
@@ -342,7 +361,14 @@ class Judge:
             held = None if worst_m is None else worst_m <= wanted
             name = "max_slot_error_m"
             rows.append(Expectation(name=name, wanted=wanted, got=worst_m, held=held))
+        if expect.min_lambda2 is not None:
+            rows.append(self._connected(expect.min_lambda2))
         return rows
+
+    def _connected(self, wanted: float) -> Expectation:
+        least = self.min_lambda2
+        held = None if least is None else least >= wanted
+        return Expectation(name="min_lambda2", wanted=wanted, got=least, held=held, at_least=True)
 
     def _oriented(self, attitudes: HeldAttitudes, within_deg: float | None) -> Expectation:
         worst_deg = attitudes.worst_deg

@@ -32,7 +32,14 @@ HELD, NOT_HELD, UNREADABLE, INCONCLUSIVE = 0, 1, 2, 3
 TIME_SLACK_S = 1e-9
 ABSENT = "no such key"
 """Stands for a value that is not there."""
-ADDED_LATER = ("sub_formations", "in_formation_fraction", "max_slot_error_m", "margin")
+ADDED_LATER = (
+    "sub_formations",
+    "in_formation_fraction",
+    "max_slot_error_m",
+    "margin",
+    "min_lambda2",
+    "I5",
+)
 """Keys that an older summary lacks."""
 MAX_NAMED = 4
 """Of more differences, the first are named."""
@@ -194,6 +201,7 @@ def _figures(readback: Readback, judge: Judge) -> dict[str, Any]:
         "encounters": [msgspec.to_builtins(each) for each in judge.clearance.encounters],
         "in_formation_fraction": judge.in_formation_fraction,
         "max_slot_error_m": judge.max_slot_error_m,
+        "min_lambda2": judge.min_lambda2,
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "packets": packets,

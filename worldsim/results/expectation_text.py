@@ -78,7 +78,7 @@ def was_tested(row: ExpectationRow) -> bool:
 
 def figure(value: float | None, unit: str, digits: int) -> str:
     """Return a figure with its unit; "-" where it was not measured."""
-    return f"{value:.{digits}f} {unit}" if value is not None else "-"
+    return f"{value:.{digits}f} {unit}".rstrip() if value is not None else "-"
 
 
 def _spans(run: Circumstances) -> Iterator[Span]:
@@ -114,7 +114,7 @@ def _other(row: ExpectationRow, run: Circumstances) -> str:
         what, relation, unit, digits, scale = bound = _BOUNDS[name]
         got = row["got"]
         measured = _unmeasured(row) if got is None else figure(scale * got, unit, digits)
-        required = f"required {relation} {scale * wanted:g} {unit}"
+        required = f"required {relation} {scale * wanted:g} {unit}".rstrip()
         return f"{what}: {measured} ({required}{_margin(row, bound)})"
     return f"{name}: {row['got']} (required {wanted})"
 
@@ -132,6 +132,7 @@ _BOUNDS = {
     "min_obstacle_distance_m": _Bound("minimum obstacle distance", ">=", "m", 3),
     "in_formation_fraction": _Bound("time in formation", ">=", "%", 1, 100.0),
     "max_slot_error_m": _Bound("largest slot error in formation", "<=", "m", 3),
+    "min_lambda2": _Bound("algebraic connectivity of the network", ">=", "", 3),
     "attitude_within_deg": _Bound("largest attitude error at the slots", "<=", "degrees", 1),
 }
 

@@ -40,14 +40,15 @@ FATES = (
 TOO_LATE_FRACTION = 0.01
 """From this share of late ticks on, the host is too slow for a verdict."""
 
-TIMELESS = ("I1", "I8")
-"""Invariants that hold however late messages come: safety, and the counters of packets."""
+TIMELESS = ("I1", "I5", "I8")
+"""Invariants that hold however late messages come."""
 
 INVARIANT_WORDS = {
     "I1": "two vehicles, or a vehicle and an obstacle, were too near",
     "I2": "a vertex of the formation did not have exactly one agent",
     "I3": "a queue's number of agents was not its share",
     "I4": "two agents claimed one place for too long",
+    "I5": "an agent went back to an older mission",
     "I6": "an agent changed its role too often",
     "I7": "an agent of a settled team changed its place",
     "I8": "the radio's counters of packets do not add up",
@@ -163,6 +164,7 @@ class Summary(Provenance):
     encounters: list[EncounterRow]
     in_formation_fraction: float | None  # of the time after convergence, without faults' windows
     max_slot_error_m: float | None  # in the same time
+    min_lambda2: float | None  # in the same time; measured where [expect] has it
     attitude_error_deg: float | None  # largest at the last tick
     turns_over_limit_fraction: float | None  # of moving steps
     faults: list[FaultRow]  # in the order in which they began
@@ -209,6 +211,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "encounters": _encounter_rows(judge),
         "in_formation_fraction": judge.in_formation_fraction,
         "max_slot_error_m": judge.max_slot_error_m,
+        "min_lambda2": judge.min_lambda2,
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "faults": faults,

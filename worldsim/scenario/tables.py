@@ -90,7 +90,8 @@ class Expectations(Table, frozen=True):
     converge_within_s: from each formation's start. reform_within_s: from each fault, and from the
     end of what parts the team, until it has re-formed the whole formation. in_formation_fraction,
     max_slot_error_m: of the time from convergence on, without reform_within_s, or 10 s, after each
-    beginning and end of a fault. converge: false where no formation is to be formed,
+    beginning and end of a fault. min_lambda2: the algebraic connectivity of the team's network in
+    that time, 0 where it is parted. converge: false where no formation is to be formed,
     as with a controller that knows none. min_separation_m: between centres; left out:
     control.separation_m. min_obstacle_distance_m: from a vehicle's centre to a surface; left out:
     control.clearance_m. attitude_within_deg: how far an agent's attitude may be from its queue's
@@ -102,6 +103,7 @@ class Expectations(Table, frozen=True):
     reform_within_s: Positive | None = None
     in_formation_fraction: Annotated[float, Meta(ge=0, le=1)] | None = None
     max_slot_error_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
+    min_lambda2: Annotated[float, Meta(ge=0, le=1e4)] | None = None
     converge: bool = True
     min_separation_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
     min_obstacle_distance_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None

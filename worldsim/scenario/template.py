@@ -54,6 +54,7 @@ EXAMPLES: Given = {
     "expect.reform_within_s": 10.0,
     "expect.in_formation_fraction": 0.95,
     "expect.max_slot_error_m": 0.12,
+    "expect.min_lambda2": 0.5,
     "expect.min_separation_m": 0.25,
     "expect.min_obstacle_distance_m": 0.4,
     "expect.attitude_within_deg": 10.0,
