@@ -1,7 +1,8 @@
 """One agent's core: it receives frames, checks them, decides, commands and broadcasts.
 
 A pure state machine: the time comes with each observation. The shells around it (a process on
-Zenoh, or virtual time) only carry bytes.
+Zenoh, or virtual time) only carry bytes. Where that time jumps, the agent begins anew: all that it
+kept with a time counts no longer, its controller included. Its mission stays.
 """
 
 from collections import Counter, deque
@@ -16,7 +17,8 @@ from agent.codec import decode_beacon, decode_gossip
 from agent.comms.broadcast import Broadcast, OwnState
 from agent.comms.gossip import RecordTable
 from agent.comms.mission import Missions
-from agent.comms.neighbours import Neighbours
+from agent.comms.neighbours import MAX_AGE_S, Neighbours
+from agent.comms.own_clock import OwnClock
 from agent.comms.unidentified_vehicles import (
     SAME_VEHICLE_M,
     ReportsVehicle,
@@ -84,20 +86,16 @@ class Agent:
         comms = setup.comms
         self.id = setup.id
         self.rejected: Counter[str] = Counter()
+        self._setup = setup
         self._incarnation = setup.incarnation
         self._decode_beacon, self._decode_gossip = decoders.beacon, decoders.gossip
         self._slack_s = 2.0 * tick_s
         self._implausible2 = (IMPLAUSIBLE_SPEEDS * setup.fleet_max_speed_mps) ** 2
         self._command_slots = setup.command_ticks * setup.slots_per_tick
-        self._controller = CheckedController(setup)
-        self._neighbours = Neighbours(setup.id, comms.local_hz, self._slack_s)
-        self._table = RecordTable(setup.id, comms.multihop_hz, setup.ids)
         round_s = 1.0 / comms.multihop_hz if comms.multihop_hz > 0.0 else inf
         self._broadcast = Broadcast(
             setup.id, setup.incarnation, 1.0 / comms.local_hz, round_s, setup.relays
         )
-        self._safety_monitor = SafetyMonitor(setup)
-        self._perception = ObstaclePerception(setup)
         self._missions = Missions(
             setup.id,
             setup.formation,
@@ -106,6 +104,22 @@ class Agent:
             setup.ids,
             setup.control.allocation,
         )
+        self._points = PlacePoints(setup.control.spacing_m)
+        self._blocks_within_m = 0.5 * setup.control.spacing_m + SAME_VEHICLE_M
+        self._clock = OwnClock(tick_s / setup.slots_per_tick, self._slack_s)
+        self._begin(setup.incarnation > 0)
+
+    def _begin(self, restarted: bool) -> None:
+        """Know nothing of others, and of no time before now: at the start and after a clock's jump.
+
+        restarted: whether the agent may have made promises before.
+        """
+        setup, comms = self._setup, self._setup.comms
+        self._controller = CheckedController(setup)
+        self._neighbours = Neighbours(setup.id, comms.local_hz, self._slack_s)
+        self._table = RecordTable(setup.id, comms.multihop_hz, setup.ids)
+        self._safety_monitor = SafetyMonitor(setup, restarted)
+        self._perception = ObstaclePerception(setup)
         self._summaries: dict[int, deque[HeardSummary]] = {}
         self._unidentified_vehicles = UnidentifiedVehicles(setup.fleet_max_speed_mps)
         self._unidentified: tuple[Vector, ...] = ()
@@ -113,8 +127,6 @@ class Agent:
         self._blocked_in = NO_MISSION  # key of the mission whose places these are
         self._intent: Intent | None = None
         self._neighbour_lacks_mission = False
-        self._points = PlacePoints(setup.control.spacing_m)
-        self._blocks_within_m = 0.5 * setup.control.spacing_m + SAME_VEHICLE_M
         self._housekeeping_at_s = 0.0
         self._record_age_s = 0.0
         self._link = UNHEARD
@@ -130,17 +142,29 @@ class Agent:
                 assert_never(channel)
         except RejectedError as error:
             self.rejected[error.cause] += 1
+            if error.cause == "future":
+                self._clock.contradict(source, now_s)
 
     def step(self, observation: Observation) -> Outbox:
-        """Decide one tick from the observation and the frames received so far."""
+        """Decide one tick from the observation and the frames received so far.
+
+        An agent that knows its clock to be wrong stands still and says nothing.
+        """
+        if self._clock.jumps(observation.slot, observation.time_s):
+            self._missions.forget_times()
+            self._broadcast.forget_times()
+            self._begin(restarted=True)
         for mission in observation.orders:
             self._accept_order(mission)
         senses = self._senses(observation)
         intent = self._intent = self._decide(senses)
         velocity = self._safety_monitor.safe_velocity(intent.velocity, senses)
-        if not self._perception.sensor_health.update(observation):
+        wrong_clock = self._clock.is_behind(senses.now_s)
+        if not self._perception.sensor_health.update(observation) or wrong_clock:
             velocity = ZERO
         command = self._command(observation.slot, intent, velocity)
+        if wrong_clock:
+            return Outbox(command, ())
         own = self._own_state(senses, velocity, intent)
         pieces = self._missions.pieces() if self._neighbour_lacks_mission else ()
         echoes = self._neighbours.echoes()
@@ -187,6 +211,7 @@ class Agent:
         if u * u + v * v + w * w > self._implausible2:
             raise RejectedError("speed", f"agent {source} reports {hypot(u, v, w):.1f} m/s")
         version = self._neighbours.receive(beacon, now_s, self._broadcast.sent_s)
+        self._clock.confirm(now_s)
         self._table.adopt_beacon(beacon, version)
         self._safety_monitor.hear(beacon)
         if beacon.drift is not None or beacon.frame_key != self._missions.frame_key:
@@ -198,6 +223,8 @@ class Agent:
             raise RejectedError("spoofed", f"gossip of agent {source} with the id {gossip.id}")
         if gossip.stamp_s > now_s + self._slack_s:
             raise RejectedError("future", f"the stamp is {gossip.stamp_s - now_s:.3f} s ahead")
+        if now_s - gossip.stamp_s > MAX_AGE_S:
+            raise RejectedError("old", f"the stamp is {now_s - gossip.stamp_s:.3f} s old")
         self._table.adopt(gossip, now_s, self._slack_s)
         if gossip.summary is not None:
             heard = self._summaries.setdefault(source, deque(maxlen=MAX_SUMMARIES))

@@ -96,11 +96,15 @@ class Broadcast:
         self._incarnation = incarnation
         self._beacon_period_s = beacon_period_s
         self._round_period_s = round_period_s
+        self.sequence = 0
+        self.forget_times()
+
+    def forget_times(self) -> None:
+        """Begin anew after a jump of the own clock; the beacons' numbers go on."""
         self._next_beacon_s = 0.0
-        self._next_round_s = 0.0 if round_period_s < inf else inf
+        self._next_round_s = 0.0 if self._round_period_s < inf else inf
         self._pieces_key: int | None = None
         self._pieces_sent, self._next_pieces_s = 0, inf
-        self.sequence = 0
         self.sent_s: dict[int, float] = {}
 
     def frames(

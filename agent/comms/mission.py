@@ -121,6 +121,12 @@ class Missions:
             self.frame_key = 0
             self.flown = Flown(0, formation_of(formation, spacing), self._frame.at(0.0))
 
+    def forget_times(self) -> None:
+        """Begin anew after a jump of the own clock; the mission flown stays."""
+        self._deaf_until_s = {}
+        self._pieces = {}
+        self._from_tiers = FrameFromTiers()
+
     @property
     def key(self) -> int:
         """The key of the mission flown; NO_MISSION for none."""

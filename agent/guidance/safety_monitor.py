@@ -46,10 +46,11 @@ CREEP: Final = 0.3
 class SafetyMonitor:
     """Keeps one agent's velocity within the bounds of all vehicles and obstacles it knows of.
 
-    speed_cap: the speed that the agent promises to its neighbours [m/s].
+    speed_cap: the speed that the agent promises to its neighbours [m/s]. restarted: whether it may
+    have made promises before.
     """
 
-    def __init__(self, setup: AgentSetup) -> None:
+    def __init__(self, setup: AgentSetup, restarted: bool = False) -> None:
         limits, control, sensor = setup.vehicle, setup.control, setup.sensor
         self._latency_s = setup.command_ticks / setup.tick_hz
         self._braking = braking_of(limits, self._latency_s)
@@ -88,7 +89,7 @@ class SafetyMonitor:
                 control.separation_m,
                 setup.fleet_max_speed_mps,
                 self._braking,
-                restarted=setup.incarnation > 0,
+                restarted=restarted,
             )
         self.speed_cap = limits.max_speed_mps
 

@@ -39,6 +39,14 @@ SENTENCES: list[tuple[dict[str, Any], str]] = [
     ({"kind": "queue", "agent": 3, "queue": 0}, "a3 enters queue Q1"),
     ({"kind": "queue", "agent": 3, "queue": None}, "a3 leaves its queue"),
     ({"kind": "role", "agent": 3, "role": "vertex"}, "a3 becomes a vertex agent"),
+    (
+        {"kind": "clock", "agent": 3, "number": 1, "offset_s": -3.0, "drift_ppm": 9.0, **SCHEDULED},
+        "the clock of a3 goes wrong by -3 s, +9 ppm (scheduled)",
+    ),
+    (
+        {"kind": "clock", "agent": 3, "number": 1, "offset_s": 3.0, "ends": True, **BY_OPERATOR},
+        "the clock of a3 is set right: +3 s no more (by the operator)",
+    ),
     ({"kind": "kill", "agent": 3, **SCHEDULED}, "a3 is killed; its vehicle hovers (scheduled)"),
     (
         {"kind": "kill", "agent": 3, "signal": 9, "planned": False},

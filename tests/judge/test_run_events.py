@@ -13,6 +13,7 @@ from netem.faults import FaultOrder, Flap, Heal, Jam, Partition, RadioEvent, Sab
 from netem.link_parameters import Conditions, LinkKeys
 from worldsim.judge.radio_events import applied, order_of
 from worldsim.judge.run_events import (
+    ClockChanged,
     Joined,
     Killed,
     LateStart,
@@ -41,6 +42,8 @@ EVENTS: list[RunEvent] = [
     Paused(t_s=1.0, agent=3, planned=True, by="operator"),
     Joined(t_s=1.0, agent=None, planned=True, refused="no room"),
     SensorChanged(t_s=2.0, agent=1, planned=True, sensor="all", mode="stuck"),
+    ClockChanged(t_s=2.0, agent=1, planned=True, number=3, offset_s=-3.0, drift_ppm=10.0),
+    ClockChanged(t_s=2.0, agent=1, planned=True, number=3, offset_s=-3.0, ends=True),
     SlotChanged(t_s=0.5, agent=1, place=(2, 1), before=None),
     QueueChanged(t_s=0.5, agent=1, queue=2),
     RoleChanged(t_s=0.5, agent=1, role="vertex"),

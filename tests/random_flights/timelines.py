@@ -37,10 +37,13 @@ class Timeline:
             (2, lambda: {"formation": self._formation()}),
             (2, lambda: {"frame": self._frame()}),
             (2, lambda: {"sensor": self._sensor()}),
+            (2, self._agent_fault),
         ]
         makers = [maker for weight, maker in kinds for _ in range(weight)]
         made = draw.among(makers)()
         event: Tables = {"at_s": self._time(), **made}
+        if "clock" in event:  # no clock may show less than 0 s
+            event["clock"]["offset_s"] = max(event["clock"]["offset_s"], -event["at_s"])
         if draw.chance(0.6) and not event.keys() & {"join", "formation", "frame", "heal"}:
             event["for_s"] = self._lasting(event["at_s"])
         return event
@@ -105,6 +108,22 @@ class Timeline:
         table = moving(draw, self._slowest, here)
         table.pop("start_s", None)
         return table
+
+    def _agent_fault(self) -> Tables:
+        draw = self._draw
+        kinds: list[Callable[[], Tables]] = [
+            lambda: {"clock": self._clock()},
+        ]
+        made = draw.among(kinds)()
+        for table in made.values():
+            table["agents"] = self._selectors(by_place=True)
+        return made
+
+    def _clock(self) -> Tables:
+        draw = self._draw
+        offset_s = draw.among((0.05, -0.05, 0.3, -0.3, 3.0, -3.0, 100.0, -100.0))
+        drift_ppm = draw.among((10.0, -500.0, 10_000.0, -10_000.0))
+        return {"offset_s": offset_s, "drift_ppm": drift_ppm}
 
     def _sensor(self) -> Tables:
         table: Tables = {"agents": self._selectors(by_place=True), "mode": self._draw.among(MODES)}

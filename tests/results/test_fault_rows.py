@@ -16,11 +16,13 @@ STRIKE = {
     "netem": ("netem = { delay_ms = 20 }", "frames"),
     "sabotage": ("sabotage = { kind = 'flood', agents = [1] }", "frames"),
     "sensor": ('sensor = { agents = [1], mode = "silent" }', "readings"),
+    "clock": ("clock = { agents = [1], offset_s = 1 }", "readings"),
     "pause": ("pause = [1]", "agents"),
     "kill": ("kill = [1]", "agents"),
     "leave": ("leave = [1]", "agents"),
 }
 MISS = {
+    "clock": "clock = { agents = [1], offset_s = 1 }\n[[event]]\nat_s = 2.0\nleave = [1]",
     "partition": "partition = [[0, 1]]",
     "jam": "jam = { centre_m = [500, 0, 0], radius_m = 1 }",
     "netem": "netem = { loss_percent = 0 }",

@@ -13,7 +13,8 @@ import typer
 from worldsim.commands.options import RunFolder, examples
 from worldsim.results.exit_status import PASS
 
-FAULTS = ("kill", "leave", "restart", "pause", "resume", "join", "end")
+AGENT_FAULTS = ("clock",)
+FAULTS = ("kill", "leave", "restart", "pause", "resume", "join", *AGENT_FAULTS, "end")
 RADIO_ACTIONS = ("show", "set", "partition", "heal", "jam", "flap", "sabotage", "end")
 ForSeconds = Annotated[
     float | None, typer.Option("--for", metavar="S", help="Undo it after S simulated seconds.")
@@ -86,6 +87,7 @@ def mission(
         "qswarm fault runs/mine pause random:2",
         "qswarm fault runs/mine join 2",
         "qswarm fault runs/mine kill random:1 --for 2 --every 10 --name outage",
+        "qswarm fault runs/mine clock 3 offset_s=3 --for 10",
         "qswarm fault runs/mine end outage",
     )
 )
@@ -99,17 +101,18 @@ def fault(
         typer.Argument(
             metavar="SELECTOR",
             help="Agents: ids, vertex:V1, queue:Q1, random:2 or all. With join: how many."
-            " With end: a fault's name.",
+            f" With end: a fault's name. With {', '.join(AGENT_FAULTS)}: KEY=VALUE too.",
         ),
     ],
     for_s: ForSeconds = None,
     every_s: EverySeconds = None,
     name: EventName = None,
 ) -> int:
-    """Inject a process fault into a running fleet.
+    """Inject a fault of processes or agents into a running fleet.
 
     kill ends processes, leave removes the vehicles too, restart brings them back; pause stops
-    processes until resume; join adds new agents. end ends a fault of any kind before its time, by
+    processes until resume; join adds new agents. clock lets agents' clocks be wrong (offset_s,
+    drift_ppm). end ends a fault of any kind before its time, by
     its name: its kind and number, as in "kill-2", unless --name gave it another one.
     """
     if action not in FAULTS:
@@ -119,8 +122,12 @@ def fault(
             event: dict[str, Any] = {"join": _number(" ".join(selectors), "SELECTOR")}
         case "end":
             event = _end(selectors)
+        case _ if action in AGENT_FAULTS:
+            keys = [word for word in selectors if "=" in word]
+            agents = [word for word in selectors if "=" not in word]
+            event = {action: {"agents": _selectors(agents), **_table(keys)}}
         case _:
-            event = {action: [int(each) if each.isdecimal() else each for each in selectors]}
+            event = {action: _selectors(selectors)}
     return _request(run, event, {"for_s": for_s, "every_s": every_s, "name": name})
 
 
@@ -150,6 +157,10 @@ def change_radio(run: Path, action: str, words: list[str], more: EventKeys) -> i
         case _:
             raise _bad(action, "ACTION", f"allowed: {', '.join(RADIO_ACTIONS)}")
     return _request(run, event, more)
+
+
+def _selectors(words: list[str]) -> list[int | str]:
+    return [int(each) if each.isdecimal() else each for each in words]
 
 
 def _end(words: list[str]) -> dict[str, Any]:

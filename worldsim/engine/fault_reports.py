@@ -9,6 +9,7 @@ from collections.abc import Collection, Sequence
 
 from netem.faults import FaultOrder, Heal, RadioEvent
 from worldsim.engine.operations import (
+    DisturbAgents,
     EndProcesses,
     Operation,
     PauseProcesses,
@@ -71,6 +72,8 @@ class FaultReports:
                 kind, agents = "pause", operation.agents + operation.paused_before
             case SetSensorMode() if operation.mode is not None:
                 kind, agents = "sensor", operation.agents
+            case DisturbAgents(ends=False):
+                kind, agents = operation.fault.kind, operation.agents
             case FaultOrder(fault=Heal()):
                 self._end([each for each in self.all if each.kind == "partition"], t_s)
                 return

@@ -12,6 +12,7 @@ import numpy as np
 from worldsim.engine.fault_holds import FaultHolds
 from worldsim.engine.operations import (
     AdmitAgents,
+    DisturbAgents,
     EndProcesses,
     PauseProcesses,
     ProcessOperation,
@@ -31,6 +32,7 @@ from worldsim.engine.process_life import (
 )
 from worldsim.engine.selection import Candidates, Claims, selected
 from worldsim.scenario.faults import (
+    AgentFault,
     Join,
     Kill,
     Leave,
@@ -58,8 +60,8 @@ class Membership:
         self._boots_s: dict[int, float] = {}
         """When each booting agent has booted [s; simulated time]."""
         self._ended_by, self._paused_by = FaultHolds(), FaultHolds()
-        self._sensors_of: dict[int, tuple[int, ...]] = {}
-        """The agents whose sensors a fault struck, by its number."""
+        self._struck_by: dict[int, tuple[int, ...]] = {}
+        """The agents that a fault of sensors, or of agents, struck, by its number."""
         self.alive = np.arange(rows) < agents
         """(N,): whether the process is running or paused."""
         self.running = self.alive.copy()
@@ -145,14 +147,24 @@ class Membership:
     ) -> SetSensorMode:
         """Return the operation that begins or ends a sensor fault now."""
         if ends:
-            return SetSensorMode(number, self._sensors_of.pop(number, ()), fault.kind, None)
+            return SetSensorMode(number, self._struck_by.pop(number, ()), fault.kind, None)
         agents = self._selected(number, fault.agents, KNOWN, claims)
-        self._sensors_of[number] = agents
+        self._struck_by[number] = agents
         return SetSensorMode(number, agents, fault.kind, fault.mode)
 
     def victims(self, number: int, selectors: Selectors, claims: Claims) -> tuple[int, ...]:
         """Return the agents whose radios an event's saboteur uses: those with a process."""
         return self._selected(number, selectors, STARTED, claims)
+
+    def agent_fault(
+        self, number: int, fault: AgentFault, ends: bool, claims: Claims
+    ) -> DisturbAgents:
+        """Return the operation that begins or ends a fault of agents now."""
+        if ends:
+            return DisturbAgents(number, self._struck_by.pop(number, ()), fault, ends=True)
+        agents = self._selected(number, fault.agents, KNOWN, claims)
+        self._struck_by[number] = agents
+        return DisturbAgents(number, agents, fault, ends=False)
 
     def apply(self, operation: ProcessOperation, time_s: float) -> None:
         """Apply an operation that was carried out at a time [s] to the states."""

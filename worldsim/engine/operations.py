@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 from agent.messages import FramePath, Vector
 from agent.qstructure.formation import FormationSpec
 from netem.faults import FaultOrder
-from worldsim.scenario.faults import FailureMode
+from worldsim.scenario.faults import AgentFault, FailureMode
 from worldsim.scenario.selectors import Selectors
 
 
@@ -95,6 +95,22 @@ class SetSensorMode(NamedTuple):
     """None: the sensor works again."""
 
 
+class DisturbAgents(NamedTuple):
+    """Begin or end a fault of agents whose processes go on."""
+
+    number: int
+    """The event's number."""
+    agents: tuple[int, ...]
+    """In ascending order."""
+    fault: AgentFault
+    ends: bool
+
+    @property
+    def selectors(self) -> Selectors:
+        """The event's own, for its report."""
+        return self.fault.agents
+
+
 class GiveMission(NamedTuple):
     """Give the team a mission, by way of one agent."""
 
@@ -110,4 +126,4 @@ class GiveMission(NamedTuple):
 
 
 ProcessOperation = EndProcesses | PauseProcesses | ResumeProcesses | StartProcesses | AdmitAgents
-Operation = ProcessOperation | SetSensorMode | FaultOrder | GiveMission
+Operation = ProcessOperation | SetSensorMode | DisturbAgents | FaultOrder | GiveMission

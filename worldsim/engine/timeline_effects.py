@@ -11,11 +11,13 @@ from agent.messages import NO_MISSION
 from agent.qstructure.formation import FormationSpec, formation_of
 from netem.conditions import NetworkConditions
 from netem.faults import FaultOrder, RadioEvent, RadioFault, Sabotage
+from worldsim.engine.agent_fault_effects import AgentFaultEffects
 from worldsim.engine.fault_reports import FaultReports
 from worldsim.engine.membership import Membership
 from worldsim.engine.missions import Missions
 from worldsim.engine.operations import (
     AdmitAgents,
+    DisturbAgents,
     EndProcesses,
     GiveMission,
     Operation,
@@ -41,6 +43,7 @@ from worldsim.judge.run_events import (
     SensorChanged,
 )
 from worldsim.scenario.faults import (
+    AgentFault,
     EndFault,
     Join,
     Kill,
@@ -73,6 +76,7 @@ class TimelineEffects:
         """The place (queue, rank) that each agent claims, as last reported; row i = agent i."""
         self._spacing_m = scenario.control.spacing_m
         self._formation = formation_of(scenario.formation, self._spacing_m)
+        self._agent_faults = AgentFaultEffects(world)
         self._world = world
         self._emit = emit
 
@@ -106,19 +110,21 @@ class TimelineEffects:
     def operation(self, step: Step) -> Operation | None:
         """Return the operation of a step now; None where there is nothing to do or to undo."""
         action, number = step.event.action, step.number
+        if isinstance(action, SabotageFault):
+            action = self._sabotage(number, action)
         if isinstance(action, RadioFault):
             return self._fault_order(step, action)
+        if isinstance(action, AgentFault):
+            return self.members.agent_fault(number, action, step.ends, self._claims)
         match action:
-            case SabotageFault():
-                return self._fault_order(step, self._sabotage(number, action))
             case Kill() | Leave() | Restart() | Pause() | Resume() | Join():
                 return self._process_operation(step, action)
             case SensorFault():
                 return self.members.sensor_fault(number, action, step.ends, self._claims)
-            case FormationSpec() | FrameChange():
-                return None if step.ends else self.missions.changed(action, step.at_s)
-            case EndFault():
-                return None  # it put the fault's end into the timeline
+            case FormationSpec() | FrameChange() if not step.ends:
+                return self.missions.changed(action, step.at_s)
+            case FormationSpec() | FrameChange() | EndFault():
+                return None  # an event that ends a fault put the fault's end into the timeline
         assert_never(action)
 
     def apply(self, operation: Operation, by: By = None) -> None:
@@ -128,18 +134,18 @@ class TimelineEffects:
         match operation:
             case EndProcesses():
                 self._end(operation, by)
-            case PauseProcesses():
+            case PauseProcesses() | ResumeProcesses():
                 self.members.apply(operation, self._world.time_s)
-                self._report(Paused, operation, by)
-            case ResumeProcesses():
-                self.members.apply(operation, self._world.time_s)
-                self._report(Resumed, operation, by)
+                paused = isinstance(operation, PauseProcesses)
+                self._report(Paused if paused else Resumed, operation, by)
             case StartProcesses():
                 self._start(operation, by)
             case AdmitAgents():
                 self.members.apply(operation, self._world.time_s)
             case SetSensorMode():
                 self._set_sensors(operation, by)
+            case DisturbAgents():
+                self._disturb(operation, by)
             case FaultOrder():
                 self._emit(applied(operation, self.network, self._t_s, by))
             case GiveMission():
@@ -154,6 +160,8 @@ class TimelineEffects:
                 begins = True
             case SetSensorMode(mode=mode):
                 begins = mode is not None
+            case DisturbAgents(ends=ends):
+                begins = not ends
             case FaultOrder(event=event):
                 begins = event is not None
             case _:
@@ -243,6 +251,10 @@ class TimelineEffects:
                     t_s=self._t_s, agent=agent, planned=True, by=by, sensor=sensor, mode=mode
                 )
             )
+
+    def _disturb(self, operation: DisturbAgents, by: By) -> None:
+        for event in self._agent_faults.apply(operation, self._t_s, by):
+            self._emit(event)
 
     def _give(self, mission: GiveMission, by: By) -> None:
         key = self.missions.issue(mission)

@@ -31,6 +31,7 @@ from netem.wire.frame import (
 )
 from worldsim.engine.operations import (
     AdmitAgents,
+    DisturbAgents,
     EndProcesses,
     GiveMission,
     Operation,
@@ -135,8 +136,8 @@ class VirtualFleet:
                 self._medium.apply(operation)
             case PauseProcesses() | ResumeProcesses() | AdmitAgents():
                 pass  # the slot loop decides which agents step
-            case SetSensorMode() | GiveMission():
-                pass  # the slot loop applies sensor modes and missions
+            case SetSensorMode() | DisturbAgents() | GiveMission():
+                pass  # the slot loop applies what the world shows, and missions
             case _:
                 assert_never(operation)
 
@@ -157,7 +158,7 @@ class VirtualFleet:
         inbox = self._inboxes[agent]
         while inbox:
             for frame in inbox.popleft():
-                core.receive(frame.source, frame.channel, frame.payload, now_s)
+                core.receive(frame.source, frame.channel, frame.payload, observation.time_s)
         if self._watch is not None:
             self._watch.enter(agent, open_slot.slot)
         outbox = core.step(observation)

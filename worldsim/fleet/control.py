@@ -17,6 +17,7 @@ from netem.link_parameters import Conditions
 from netem.wire.bus import Bus, Handler, drain
 from worldsim.engine.operations import (
     AdmitAgents,
+    DisturbAgents,
     EndProcesses,
     GiveMission,
     Operation,
@@ -178,7 +179,7 @@ class Control:
         match operation:
             case None:
                 raise RequestError(f"{kind}: nothing to do")
-            case EndProcesses() | PauseProcesses() | ResumeProcesses():
+            case EndProcesses() | PauseProcesses() | ResumeProcesses() | DisturbAgents():
                 if not operation.agents:
                     selectors = list(operation.selectors)
                     raise RequestError(f"{kind}: no agent in {selectors} can do that now")

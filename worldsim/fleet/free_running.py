@@ -20,6 +20,7 @@ from netem.wire.bus import Bus
 from netem.wire.frame import WireError, pack, unpack
 from worldsim.engine.operations import (
     AdmitAgents,
+    DisturbAgents,
     EndProcesses,
     GiveMission,
     Operation,
@@ -319,8 +320,8 @@ class ProcessActions:
                 return self._startup.absent(agents)
             case FaultOrder():
                 self._orders(msgspec.json.encode(FaultOrders(slot, (operation,))))
-            case SetSensorMode() | GiveMission():
-                pass  # sensors and missions are the world's own
+            case SetSensorMode() | DisturbAgents() | GiveMission():
+                pass  # what the world shows, and missions, are its own
             case _:
                 assert_never(operation)
         return []

@@ -36,6 +36,7 @@ from netem.wire.frame import WireError, pack
 from netem.wire.keys import medium_name
 from worldsim.engine.operations import (
     AdmitAgents,
+    DisturbAgents,
     EndProcesses,
     GiveMission,
     Operation,
@@ -268,8 +269,8 @@ class AwaitedActions:
                 self._begin(agents, incarnations)
             case FaultOrder():
                 self._orders.append(operation)
-            case StartProcesses() | SetSensorMode() | GiveMission():
-                pass  # nothing is to be done before the agents have booted
+            case StartProcesses() | SetSensorMode() | DisturbAgents() | GiveMission():
+                pass  # nothing is to be done in other processes, or before they have booted
             case _:
                 assert_never(operation)
 

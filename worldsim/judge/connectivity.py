@@ -18,7 +18,9 @@ from netem.link import burst_variance_factor, unusable_share
 from netem.link_model import LinkModel
 from netem.random_draws import MAX_QUANTILE
 from netem.wire.channels import CHANNELS, LOCAL, MAX_PAYLOAD_B, MULTIHOP
+from worldsim.judge.clock_links import ClockLinks
 from worldsim.judge.radio_events import RadioRunEvent, order_of
+from worldsim.judge.run_events import ClockChanged
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
 from worldsim.truth.vehicle import Floats
@@ -76,6 +78,7 @@ class Connectivity:
         self._round_s = 1.0 / scenario.comms.multihop_hz if scenario.comms.multihop_hz else inf
         self._rows = range(scenario.rows)
         self._network = NetworkConditions(scenario.netem)
+        self._clocks = ClockLinks(scenario.rows, self._slack_s)
         self._found: Components | None = None
         """The newest components, and below what they were computed from."""
         self._found_of: tuple[bytes, ...] = ()
@@ -86,11 +89,18 @@ class Connectivity:
         self._network.apply(order_of(event))
         self._refresh()
 
+    def handle_clock(self, event: ClockChanged) -> None:
+        """Take the beginning or the end of a fault of an agent's clock."""
+        self._clocks.handle_event(event)
+
     def components(self, tick: Tick) -> Components:
         """Return the connected components at a tick; the same object while no link changes."""
         distance, usable = self._links(tick.position, tick.alive)
-        lost = np.where(usable, self._lost_over(MULTIHOP, distance), 1.0)
         heard = usable & (self._lost_over(LOCAL, distance) < 1.0)
+        if self._clocks:
+            passing = self._clocks.passing(heard, tick.time_s, self._in_flight_s)
+            usable, heard = usable & passing, heard & passing
+        lost = np.where(usable, self._lost_over(MULTIHOP, distance), 1.0)
         of = lost.tobytes(), heard.tobytes(), tick.alive.tobytes()
         if self._found is None or of != self._found_of:
             self._found, self._found_of = _found(lost, heard, tick.alive), of
@@ -115,9 +125,9 @@ class Connectivity:
         """Return B [s]: a record reaches every agent in this time, with probability 1 - 1e-6.
 
         loss: of the worst link; None: of a link without values of its own, within range. Infinite
-        while links flap: there is no bound.
+        while links flap, or delays decide whether stamps are accepted: there is no bound.
         """
-        if self._network.flapping:
+        if self._network.flapping or self._clocks.unclear:
             return inf
         lost = self.loss if loss is None else loss
         rounds = rounds_to_all(agents, hops, lost) * self._burst_factor if hops else 0.0
@@ -139,11 +149,12 @@ class Connectivity:
         self._delay_s = max(map(_longest_delay_s, multihop))
         links = [link for at in range(len(CHANNELS)) for link in models.of_any_link(at)]
         queued_s = max(map(_longest_queued_s, links))
+        self._in_flight_s = max(map(_longest_delay_s, links)) + queued_s + self._slack_s
+        """The longest time that a frame is in flight where no queue grows [s]."""
         self.longest_s = inf
-        """The longest time that a frame is in flight where no queue grows [s]; infinite for a radio
-        without queues."""
+        """The same; infinite for a radio without queues [s]."""
         if queued_s > 0.0:
-            self.longest_s = max(map(_longest_delay_s, links)) + queued_s + self._slack_s
+            self.longest_s = self._in_flight_s
         rows = self._rows
         cut = [[self._network.partitions(a, b) for b in rows] for a in rows]
         self._cut = np.array(cut, dtype=np.bool_)

@@ -13,6 +13,8 @@ from worldsim.judge.radio_events import (
     radio_sentence,
 )
 from worldsim.judge.run_events import (
+    AgentFaultRunEvent,
+    ClockChanged,
     FormationGiven,
     FrameGiven,
     Joined,
@@ -55,6 +57,8 @@ def _words(event: RunEvent, queues: Queues) -> str:
             words = _returned(event)
         case SensorChanged(agent=agent, sensor=sensor, mode=mode):
             words = f"sensors of a{agent} ({sensor}): {mode}"
+        case ClockChanged():
+            words = _agent_fault(event)
         case FormationGiven() | FrameGiven():
             words = _mission(event)
         case SlotChanged() | QueueChanged() | RoleChanged():
@@ -101,6 +105,22 @@ def _returned(event: ReturnEvent) -> str:
         case Restarted() | Joined():
             return f"{event.kind} refused: {event.refused}"
     assert_never(event)
+
+
+def _agent_fault(event: AgentFaultRunEvent) -> str:
+    agent = f"a{event.agent}"
+    match event:
+        case ClockChanged(ends=True):
+            return f"the clock of {agent} is set right: {_error(event)} no more"
+        case ClockChanged():
+            return f"the clock of {agent} goes wrong by {_error(event)}"
+    assert_never(event)
+
+
+def _error(event: ClockChanged) -> str:
+    offset = [f"{event.offset_s:+g} s"] if event.offset_s else []
+    drift = [f"{event.drift_ppm:+g} ppm"] if event.drift_ppm else []
+    return ", ".join(offset + drift)
 
 
 def _mission(event: MissionRunEvent) -> str:

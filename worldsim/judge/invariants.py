@@ -33,6 +33,7 @@ from worldsim.judge.phase import Phase
 from worldsim.judge.radio_events import RadioRunEvent, Sabotaged
 from worldsim.judge.radio_load import RadioLoad
 from worldsim.judge.run_events import (
+    ClockChanged,
     FormationGiven,
     FrameGiven,
     Joined,
@@ -116,6 +117,9 @@ class Invariants:
             self._fault(event.t_s, event.t_s)
             return
         match event:
+            case ClockChanged():
+                self._connectivity.handle_clock(event)
+                self._fault(event.t_s, event.t_s)
             case RoleChanged():
                 self._count_role_change(event)
             case Restarted() | Joined():

@@ -1,12 +1,17 @@
-"""The radio's faults in force that part the team: while there are any, it cannot be one."""
+"""The faults in force that part the team: while there are any, it cannot be one."""
 
 from worldsim.judge.radio_events import Flapped, Healed, Jammed, Partitioned, RadioRunEvent
+from worldsim.judge.run_events import AgentFaultRunEvent
 
 
 class PartingFaults:
-    """The numbers of the partitions, jams and flaps in force."""
+    """The numbers of the partitions, jams, flaps and wrong clocks in force.
 
-    def __init__(self) -> None:
+    slack_s: clocks that differ by no more part nobody [s].
+    """
+
+    def __init__(self, slack_s: float) -> None:
+        self._slack_s = slack_s
         self._partitions: set[int] = set()
         self._others: set[int] = set()
 
@@ -27,6 +32,11 @@ class PartingFaults:
                 self._mark(event.number, begins=event.flap is not None)
             case _:
                 pass  # changed conditions part nobody for sure
+
+    def handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
+        """Take the beginning or the end of a fault of an agent."""
+        if abs(event.offset_s) > self._slack_s or event.drift_ppm:
+            self._mark(event.number, begins=not event.ends)
 
     def _mark(self, number: int, *, begins: bool) -> None:
         if begins:

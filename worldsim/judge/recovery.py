@@ -1,7 +1,7 @@
 """Recoveries: the time until a team that was disturbed stands in a complete formation again.
 
-It is disturbed where agents are lost or come back, where the radio changes, and where a fault of
-the radio ends that parted it.
+It is disturbed where agents are lost or come back, where the radio or an agent's fault changes, and
+where a fault ends that parted it.
 
 Complete: the running agents hold exactly the places that the formation has for their number; a
 place in which a dead vehicle hovers is not among them (E18). Standing: each agent is within 0.12 m
@@ -11,7 +11,13 @@ of its own slot for 2 s.
 import msgspec
 
 from worldsim.judge.radio_events import RadioRunEvent
-from worldsim.judge.run_events import LOSS_KINDS, LossEvent, ReturnEvent
+from worldsim.judge.run_events import (
+    LOSS_KINDS,
+    RETURN_KINDS,
+    AgentFaultRunEvent,
+    LossEvent,
+    ReturnEvent,
+)
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import CONVERGED_S
 
@@ -24,7 +30,7 @@ class Recovery(msgspec.Struct):
     kind: str
     """The kind of the events."""
     agents: list[int]
-    """The agents that were lost or came back; none for a change of the radio."""
+    """The agents that were lost, came back, or have or had a fault; none for the radio."""
     reformed_s: float | None = None
     """From the change to the start of the 2 s [s]; None until the team has re-formed."""
 
@@ -57,6 +63,17 @@ class Recoveries:
         self.all.append(Recovery(event.t_s, event.kind, []))
         self._open.append(self.all[-1])
 
+    def handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
+        """Take a change of an agent's fault, after which the team is not parted, or no more."""
+        self._since_s = None
+        last = self.all[-1] if self.all else None
+        if last is None or (last.t_s, last.kind) != (event.t_s, event.kind):
+            last = Recovery(event.t_s, event.kind, [])
+            self.all.append(last)
+            self._open.append(last)
+        if event.agent is not None:
+            last.agents.append(event.agent)
+
     def see(self, tick: Tick, in_place: bool) -> None:
         """Take a tick; in_place: whether every running agent is in its place."""
         if not self._open:
@@ -77,6 +94,8 @@ class Recoveries:
         for recovery in reversed(self.all):
             if recovery.kind in LOSS_KINDS:
                 lost_again.update(recovery.agents)
-            elif any(not tick.alive[agent] for agent in recovery.agents if agent not in lost_again):
+            elif recovery.kind in RETURN_KINDS and any(
+                not tick.alive[agent] for agent in recovery.agents if agent not in lost_again
+            ):
                 return False
         return True

@@ -69,6 +69,23 @@ class SensorChanged(PlannedEvent, frozen=True, kw_only=True, tag="sensor"):
     """stuck, silent, wrong, or "works again"."""
 
 
+class AgentFaultEvent(PlannedEvent, frozen=True, kw_only=True):
+    """A fault of an agent whose process goes on, or its end."""
+
+    number: int
+    """The fault's number."""
+    ends: bool = False
+
+
+class ClockChanged(AgentFaultEvent, frozen=True, tag="clock"):
+    """An agent's clock goes wrong by the values of a fault, or no more."""
+
+    offset_s: float = 0.0
+    """[s]"""
+    drift_ppm: float = 0.0
+    """[1e-6]"""
+
+
 class MissionEvent(PlannedEvent, frozen=True, kw_only=True):
     """A mission was given to an agent."""
 
@@ -118,15 +135,18 @@ class LateStart(Event, frozen=True, kw_only=True, tag="late"):
     detail: str
 
 
+AgentFaultRunEvent = ClockChanged
 LossEvent = Killed | Left | Paused
 ReturnEvent = Restarted | Joined | Resumed
 LOSS_KINDS = frozenset({str(event.__struct_config__.tag) for event in get_args(LossEvent)})
+RETURN_KINDS = frozenset({str(event.__struct_config__.tag) for event in get_args(ReturnEvent)})
 MissionRunEvent = FormationGiven | FrameGiven
 RunEvent = (
     LossEvent
     | ReturnEvent
     | RadioRunEvent
     | SensorChanged
+    | AgentFaultRunEvent
     | MissionRunEvent
     | SlotChanged
     | QueueChanged

@@ -29,6 +29,8 @@ from worldsim.judge.radio_events import RadioRunEvent, Sabotaged
 from worldsim.judge.recovery import Recoveries, Recovery
 from worldsim.judge.run_events import (
     NOBODY_TO_RESTART,
+    AgentFaultRunEvent,
+    ClockChanged,
     FormationGiven,
     FrameGiven,
     Joined,
@@ -116,7 +118,7 @@ class Judge:
         self.clearance = ObstacleClearance(scenario)
         bounded = scenario.expect.attitude_within_deg is not None
         self._attitudes = HeldAttitudes(scenario) if bounded else None
-        self._parting = PartingFaults()
+        self._parting = PartingFaults(2.0 / scenario.fleet.tick_hz)
         window_s = scenario.expect.reform_within_s or DISTURBED_S
         self._held = HeldFormation(window_s, self._parting)
         strength = scenario.expect.min_lambda2 is not None
@@ -152,6 +154,8 @@ class Judge:
                 self._open_phase(event)
             case Restarted() | Joined() | Killed() | Left() | Paused() | Resumed():
                 self._change_team(event)
+            case ClockChanged():
+                self._handle_agent_fault(event)
             case SensorChanged():
                 self._held.open_window(event.t_s)
             case SlotChanged() | QueueChanged() | RoleChanged() | LateStart():
@@ -166,6 +170,12 @@ class Judge:
         self._held.open_window(event.t_s)
         if not self._parting:
             self._recoveries.handle_radio(event)
+
+    def _handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
+        self._parting.handle_agent_fault(event)
+        self._held.open_window(event.t_s)
+        if not self._parting:
+            self._recoveries.handle_agent_fault(event)
 
     def _change_team(self, event: LossEvent | ReturnEvent) -> None:
         if isinstance(event, Restarted | Joined):

@@ -9,6 +9,11 @@ MAX_AGENTS_NAMED = 8
 """More agents are told by their number."""
 MAX_IDLE_NAMED = 3
 """So many idle faults are named in the reason of an outcome."""
+READ = {
+    "sensor": "reading",
+    "clock": "clock reading",
+}
+"""What the faults change that strike what agents read, by kind."""
 MAX_TOLD = 20
 """So many faults have a line of their own in the verdict."""
 
@@ -21,9 +26,9 @@ class FaultRow(TypedDict):
     from_s: float
     to_s: float | None  # None: in force to the end
     by: str | None  # "operator", or None for the timeline
-    agents: list[int] | None  # ended, paused, with a sensor that failed, or with a saboteur
+    agents: list[int] | None  # those that it struck; of sabotage, with a saboteur
     frames: int | None  # times the links on which the fault cut, altered or sent them
-    readings: int | None  # of sensors, that differ from the true ones
+    readings: int | None  # of sensors or clocks, that differ from the true ones
 
 
 def fault_rows(
@@ -42,7 +47,7 @@ def fault_rows(
             "by": each.by,
             "agents": None if each.on_radio and each.kind != "sabotage" else each.agents,
             "frames": frames.get(each.number, 0) if each.on_radio and frames is not None else None,
-            "readings": readings.get(each.number, 0) if each.kind == "sensor" else None,
+            "readings": readings.get(each.number, 0) if each.kind in READ else None,
         }
         for each in faults
     ]
@@ -58,7 +63,7 @@ def idle_text(rows: Sequence[FaultRow]) -> str | None:
 
 def _is_idle(row: FaultRow) -> bool:
     counts = [row["frames"], row["readings"]]
-    if row["kind"] != "sensor" and row["agents"] is not None:
+    if row["readings"] is None and row["agents"] is not None:
         counts.append(len(row["agents"]))
     return any(count == 0 for count in counts)
 
@@ -81,7 +86,7 @@ def _struck(row: FaultRow) -> str:
         return "struck nothing"
     agents = _named(row["agents"] or [])
     if row["readings"] is not None:
-        return f"changed {_counted(row['readings'], 'reading')} of {agents}"
+        return f"changed {_counted(row['readings'], READ[row['kind']])} of {agents}"
     if row["kind"] == "sabotage" and row["frames"] is not None:
         return f"sent others {_counted(row['frames'], 'frame')} by the radio of {agents}"
     if row["frames"] is not None:

@@ -242,7 +242,7 @@ def _fault_rows(run: FinishedRun) -> list[FaultRow]:
     return fault_rows(
         run.loop.effects.faults.all,
         dict(counters.struck) if counters is not None else None,
-        run.loop.world.sensor_faults.struck,
+        run.loop.world.readings_struck,
     )
 
 

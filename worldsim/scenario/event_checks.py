@@ -14,13 +14,17 @@ from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from agent.qstructure.mission_check import MissionError, check_mission
 from netem.faults import RadioFault
 from netem.link_parameters import Conditions
+from worldsim.scenario.agent_fault_checks import agent_fault_problem
 from worldsim.scenario.events import ACTIONS, UNDOABLE, EventTable
 from worldsim.scenario.faults import (
+    AgentFault,
     EndFault,
     Join,
     Kill,
     Leave,
+    MissionChange,
     Pause,
+    ProcessFault,
     Restart,
     Resume,
     SabotageFault,
@@ -211,6 +215,15 @@ class EventChecks:
         action = event.action
         if isinstance(action, RadioFault):
             return self._radio(event)
+        if isinstance(action, AgentFault):
+            return self._agent_fault(event.kind, action, event.at_s)
+        return self._other_problems(event, action)
+
+    def _other_problems(
+        self,
+        event: EventTable,
+        action: ProcessFault | SensorFault | SabotageFault | MissionChange | EndFault,
+    ) -> Iterator[Problem]:
         match action:
             case (
                 Kill() | Leave() | Pause() | Restart() | Resume() | SensorFault() | SabotageFault()
@@ -239,6 +252,12 @@ class EventChecks:
             case SensorFault() | SabotageFault():
                 return self._selectors(f"{kind}.agents", action.agents, hold_places=True)
         assert_never(action)
+
+    def _agent_fault(self, kind: str, fault: AgentFault, at_s: float) -> Iterator[Problem]:
+        yield from self._selectors(f"{kind}.agents", fault.agents, hold_places=True)
+        broken = agent_fault_problem(fault, at_s)
+        if broken is not None:
+            yield broken.within(kind)
 
     def _radio(self, event: EventTable) -> Iterator[Problem]:
         if event.heal and not self.fleet.partitioned:

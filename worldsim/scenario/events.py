@@ -12,6 +12,8 @@ from agent.qstructure.formation import FormationSpec
 from netem.faults import RadioKeys
 from worldsim.scenario.faults import (
     Action,
+    AgentFault,
+    ClockFault,
     EndFault,
     Join,
     Joiners,
@@ -48,9 +50,10 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     partition: cuts the links between groups, unnamed agents form one more; a table for other kinds;
     heal: ends all partitions. jam: a sphere in which no radio works; flap: links that go down and
     up. netem: changes keys of [netem]. sabotage: somebody sends frames by agents' radios.
-    sensor: lets sensors fail. end: ends a fault by its name,
-    which is its kind and the event's index, as in "jam-2", unless ``name`` gives another one.
-    formation, frame: a mission for the team.
+    sensor: lets sensors fail.
+    clock: agents' clocks are wrong.
+    end: ends a fault by its name, which is its kind and the event's index, as in "jam-2", unless
+    ``name`` gives another one. formation, frame: a mission for the team.
     """
 
     at_s: Time
@@ -64,6 +67,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     resume: Selectors | None = None
     join: Joiners | Join | None = None
     sensor: SensorFault | None = None
+    clock: ClockFault | None = None
     end: str | None = None
     formation: FormationSpec | None = None
     frame: FrameChange | None = None
@@ -86,11 +90,17 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     @property
     def action(self) -> Action:
         """The action whose key is set. Raises LookupError without one."""
-        fault = self.radio_fault or self._process_fault or self.sensor or self.sabotage
+        of_agents = self.sensor or self.sabotage or self.agent_fault
+        fault = self.radio_fault or self._process_fault or of_agents
         action = fault or self.formation or self.frame or self._end
         if action is None:
             raise LookupError("the event has no action")
         return action
+
+    @property
+    def agent_fault(self) -> AgentFault | None:
+        """The fault of single agents whose key is set; None where there is none."""
+        return self.clock
 
     def called(self, number: int) -> str:
         """Return the event's name. number: its index, or the number of an operator's event."""
@@ -125,7 +135,7 @@ _OTHERS = (key for key in EventTable.__struct_fields__ if key not in (*_NO_ACTIO
 ACTIONS = (*_OTHERS, *_RADIO)
 """The keys of all actions."""
 _LASTING = tuple(key for key in _RADIO if key != "heal")
-UNDOABLE = ("kill", "leave", "pause", *_LASTING, "sensor")
+UNDOABLE = ("kill", "leave", "pause", *_LASTING, "sensor", "clock")
 """The keys of the actions that ``for_s`` can undo."""
 FAULTS = UNDOABLE
 """The keys of the actions that are faults: each of them can be undone."""

@@ -1,10 +1,10 @@
-"""Actions of the timeline: faults of processes and sensors, and missions.
+"""Actions of the timeline: faults of processes, sensors and agents, and missions.
 
 An event decodes into one of these types, or into a radio fault of ``netem.faults``. Its selectors
 are resolved to agents when it happens.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 from msgspec import Meta
@@ -65,6 +65,17 @@ class SabotageFault(SabotageKeys[Selectors], frozen=True):
     """Let a saboteur send frames by the radios of the selected agents."""
 
 
+class ClockFault(Table, frozen=True):
+    """Let the clocks of the selected agents be wrong."""
+
+    kind: ClassVar[str] = "clock"
+    agents: Selectors
+    offset_s: Annotated[float, Meta(ge=-86_400, le=86_400)] = 0.0
+    """Added to the time that the agents read [s]."""
+    drift_ppm: Annotated[float, Meta(ge=-10_000, le=10_000)] = 0.0
+    """So much more for each second [1e-6]."""
+
+
 class EndFault(msgspec.Struct, frozen=True):
     """End a fault before its time, or one that has no end."""
 
@@ -72,7 +83,11 @@ class EndFault(msgspec.Struct, frozen=True):
     """Its name."""
 
 
+AgentFault = ClockFault
+"""A fault of single agents whose processes go on."""
 ProcessFault = Kill | Leave | Restart | Pause | Resume | Join
 MissionChange = FormationSpec | FrameChange
-Action = RadioFault | ProcessFault | SensorFault | SabotageFault | MissionChange | EndFault
+Action = (
+    RadioFault | ProcessFault | SensorFault | SabotageFault | AgentFault | MissionChange | EndFault
+)
 """The action of one event."""

@@ -9,6 +9,7 @@ from typing import NamedTuple, assert_never
 from agent.qstructure.formation import Formation, FormationSpec, formation_of
 from netem.faults import Heal, Partition, RadioFault
 from worldsim.scenario.faults import (
+    AgentFault,
     EndFault,
     Join,
     Kill,
@@ -88,6 +89,8 @@ class ForeseenFleet:
         if isinstance(action, RadioFault):
             self._apply_radio(step, action)
             return
+        if isinstance(action, AgentFault):
+            return  # the agents' processes go on
         match action:
             case Kill() | Leave() | Pause():
                 self._change_team(action.selectors, back=step.ends)

@@ -9,6 +9,7 @@ from math import isnan
 
 from agent.config import Vehicle
 from agent.messages import ZERO, Command, Observation, Scan, Vector
+from worldsim.truth.agent_clocks import AgentClocks
 from worldsim.truth.proximity_sensor import NO_READING, ProximitySensor
 from worldsim.truth.scanning_sensors import ScanningSensors
 from worldsim.truth.sensor_faults import SensorFaults
@@ -65,6 +66,7 @@ class World:
         self.discarded = 0
         """Number of commands that were not accepted."""
         self.sensor_faults = SensorFaults(proximity.seed)
+        self.clocks = AgentClocks()
         self._has_proximity = ["proximity" in each.sensors for each in limits]
         self._proximity = proximity
         self._scanning = scanning
@@ -81,6 +83,11 @@ class World:
     def time_s(self) -> float:
         """Simulated time at the start of the present slot [s]."""
         return self.clock.time_s(self.slot)
+
+    @property
+    def readings_struck(self) -> dict[int, int]:
+        """How many readings each fault of what agents read has changed, by its number."""
+        return self.sensor_faults.struck | self.clocks.struck
 
     def positions(self) -> tuple[Vector | None, ...]:
         """Return true positions, row i = agent i [m; world frame], None where there is none."""
@@ -102,7 +109,7 @@ class World:
 
     def observe(self, agents: list[int]) -> list[Observation]:
         """Return the present slot's observations of some agents, in their order."""
-        slot, time_s, vehicles = self.slot, self.time_s, self.vehicles
+        slot, time_s, vehicles, clocks = self.slot, self.time_s, self.vehicles, self.clocks
         read = self._proximity.read(self.positions(), agents, slot, time_s)
         readings = [
             each if self._has_proximity[agent] else NO_READING
@@ -118,7 +125,7 @@ class World:
         return [
             Observation(
                 slot,
-                time_s,
+                clocks.shown_s(agent, time_s) if clocks else time_s,
                 vehicles.positions[agent],
                 vehicles.velocities[agent],
                 vehicles.yaws[agent],

@@ -1,0 +1,64 @@
+"""Faults of single agents whose processes go on: the others are unaffected, and nobody collides."""
+
+import numpy as np
+import pytest
+
+from tests.closed_loop.test_faults import BAD, check_safety, flown, reformed_s, violated
+from worldsim.engine.virtual import Flight
+
+STRUCK = 4
+
+
+def others_stand(flight: Flight) -> bool:
+    """Return whether all but the struck agent hold places of their own."""
+    found = [place for agent, place in enumerate(flight.loop.effects.places) if agent != STRUCK]
+    return None not in found and len(set(found)) == 8
+
+
+def breaches(flight: Flight) -> list[str]:
+    """Return the violated ones of the invariants whose premise held."""
+    found = flight.loop.judge.invariants()
+    return [name for name, tally in found.items() if tally.violations]
+
+
+@pytest.mark.parametrize(
+    ("radio", "offset_s"), [({}, 3.0), ({}, -3.0), ({}, 100.0), (BAD, 3.0), (BAD, -3.0)]
+)
+def test_an_agent_with_a_wrong_clock_is_left_out_and_comes_back(
+    radio: dict[str, str], offset_s: float
+) -> None:
+    fault = f"at_s = 15, for_s = 15, clock = {{ agents = [{STRUCK}], offset_s = {offset_s} }}"
+    flight = flown(1, 60, fault, **radio)
+    assert breaches(flight) == []
+    assert max(reformed_s(flight)) <= 15.0
+    rejected = flight.loop.rejections.by_cause()
+    assert rejected["future" if abs(offset_s) < 5.0 else "old"] > 100
+
+
+@pytest.mark.parametrize("offset_s", [3.0, -3.0, 100.0])
+def test_the_others_keep_places_of_their_own_while_a_clock_is_wrong(offset_s: float) -> None:
+    fault = f"at_s = 15, clock = {{ agents = [{STRUCK}], offset_s = {offset_s} }}"
+    flight = flown(1, 40, fault)
+    assert violated(flight) == []
+    assert others_stand(flight)
+
+
+def test_a_clock_that_is_off_by_a_tick_changes_nothing_of_note() -> None:
+    flight = flown(1, 40, f"at_s = 15, clock = {{ agents = [{STRUCK}], offset_s = 0.05 }}")
+    assert violated(flight) == []
+    assert flight.loop.judge.phases[0].residual_m is not None
+    assert flight.loop.judge.phases[0].residual_m < 0.05
+
+
+def test_vehicles_without_a_sensor_keep_apart_while_clocks_are_wrong() -> None:
+    """The jump at the end would make old reports seem fresh, if the agent kept them."""
+    for offset_s in (3.0, -3.0, 0.09):
+        flight = flown(
+            3,
+            25,
+            f"at_s = 1, for_s = 4, clock = {{ agents = [1, 5], offset_s = {max(offset_s, -1.0)} }}",
+            f"at_s = 8, for_s = 4, clock = {{ agents = [2], offset_s = {offset_s} }}",
+            **{"vehicle.sensors": "[]"},
+        )
+        check_safety(flight)
+        assert np.isfinite(flight.loop.world.vehicles.position).all()
