@@ -10,6 +10,7 @@ from zlib import crc32
 import msgpack
 import msgspec
 
+from agent.heard_beacon import HeardBeacon
 from agent.messages import MAX_PIECES, PIECE_B, Beacon, Command, Gossip, Observation, Summary
 from agent.qstructure.expression import MAX_EXPRESSION_LENGTH
 from agent.qstructure.formation import FormationSpec
@@ -104,6 +105,11 @@ _command = msgspec.msgpack.Decoder(Command).decode
 def decode_beacon(payload: bytes) -> Beacon:
     """Decode a payload of the local channel, or raise :class:`RejectedError`."""
     return _typed(strip_checksum(payload), _beacon, MAX_PAYLOAD_B)
+
+
+def hear_beacon(payload: bytes) -> HeardBeacon:
+    """Decode a payload of the local channel for its receivers, or raise :class:`RejectedError`."""
+    return HeardBeacon(decode_beacon(payload))
 
 
 def decode_gossip(payload: bytes) -> Gossip:

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple, assert_never, final
 import msgspec
 
 from agent.checked_controller import CheckedController
-from agent.codec import decode_beacon, decode_gossip
+from agent.codec import decode_gossip, hear_beacon
 from agent.comms.broadcast import Broadcast, OwnState
 from agent.comms.gossip import RecordTable
 from agent.comms.mission import Missions
@@ -28,6 +28,7 @@ from agent.comms.unidentified_vehicles import (
 from agent.config import AgentSetup
 from agent.controller import UNHEARD, HeardSummary, Intent, Peer, Senses
 from agent.guidance.safety_monitor import SafetyMonitor
+from agent.heard_beacon import HeardBeacon
 from agent.messages import (
     CAUSES,
     MAX_COST_MM,
@@ -35,7 +36,6 @@ from agent.messages import (
     MAX_PLACES,
     NO_MISSION,
     ZERO,
-    Beacon,
     Command,
     Gossip,
     Mission,
@@ -74,7 +74,7 @@ class Outbox:
 class Decoders(NamedTuple):
     """Decoders of radio payloads; a process that feeds many agents may pass memoising ones."""
 
-    beacon: Callable[[bytes], Beacon] = decode_beacon
+    beacon: Callable[[bytes], HeardBeacon] = hear_beacon
     gossip: Callable[[bytes], Gossip] = decode_gossip
 
 
@@ -88,7 +88,7 @@ class Agent:
         self.rejected: Counter[str] = Counter()
         self._setup = setup
         self._incarnation = setup.incarnation
-        self._decode_beacon, self._decode_gossip = decoders.beacon, decoders.gossip
+        self._hear_beacon, self._decode_gossip = decoders.beacon, decoders.gossip
         self._slack_s = 2.0 * tick_s
         self._implausible2 = (IMPLAUSIBLE_SPEEDS * setup.fleet_max_speed_mps) ** 2
         self._command_slots = setup.command_ticks * setup.slots_per_tick
@@ -204,15 +204,15 @@ class Agent:
             self.rejected[error.cause] += 1
 
     def _receive_beacon(self, source: int, payload: bytes, now_s: float) -> None:
-        beacon = self._decode_beacon(payload)
+        beacon = self._hear_beacon(payload)
         if beacon.id != source:
             raise RejectedError("spoofed", f"a beacon of agent {source} with the id {beacon.id}")
         u, v, w = beacon.velocity
         if u * u + v * v + w * w > self._implausible2:
             raise RejectedError("speed", f"agent {source} reports {hypot(u, v, w):.1f} m/s")
-        version = self._neighbours.receive(beacon, now_s, self._broadcast.sent_s)
+        self._neighbours.receive(beacon, now_s, self._broadcast.sent_s)
         self._clock.confirm(now_s)
-        self._table.adopt_beacon(beacon, version)
+        self._table.adopt_beacon(beacon)
         self._safety_monitor.hear(beacon)
         if beacon.drift is not None or beacon.frame_key != self._missions.frame_key:
             self._missions.receive_frame(beacon)
@@ -227,7 +227,9 @@ class Agent:
             raise RejectedError("old", f"the stamp is {now_s - gossip.stamp_s:.3f} s old")
         self._table.adopt(gossip, now_s, self._slack_s)
         if gossip.summary is not None:
-            heard = self._summaries.setdefault(source, deque(maxlen=MAX_SUMMARIES))
+            heard = self._summaries.get(source)
+            if heard is None:
+                heard = self._summaries[source] = deque(maxlen=MAX_SUMMARIES)
             heard.append(HeardSummary(source, gossip.stamp_s, gossip.summary))
         if gossip.piece is not None:
             self._missions.receive(gossip.piece, source, now_s)
@@ -256,7 +258,7 @@ class Agent:
             silent=self._unidentified,
             blocked=self._blocked,
             link=self._link,
-            summaries=tuple(each for heard in summaries.values() for each in heard),
+            summaries=tuple([each for heard in summaries.values() for each in heard]),
             obstacles=self._obstacles(observation),
             heard_frame=self._missions.heard_frame_at(now_s),
         )
@@ -306,7 +308,7 @@ class Agent:
         """
         mission = self._missions.flown
 
-        def reports_vehicle(witness: Beacon, vehicle: Vector) -> bool:
+        def reports_vehicle(witness: HeardBeacon, vehicle: Vector) -> bool:
             if mission is None or witness.mission != mission.key:
                 return True
             if len(witness.blocked) >= MAX_PLACES:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple, final
 
-from agent.messages import Place, Standing, Summary, Vector
+from agent.heard_beacon import HeardStanding
+from agent.messages import Place, Summary, Vector
 from agent.qstructure.formation import Formation
 from agent.qstructure.target_frame import Frame
 
@@ -27,7 +28,7 @@ class Heard:
         place: Place | None,  # the place that it claims
         mission: int = 0,  # key of the mission that it flies
         cost_m: float | None = None,  # see Peer
-        standing: Standing | None = None,  # in the Q-structure, None where it uses none
+        standing: HeardStanding | None = None,  # in the Q-structure, None where it uses none
         hears_me: bool = False,  # whether it echoed an own beacon of late
     ) -> None:
         self.id = id

@@ -1,7 +1,7 @@
 """Gossip: a table of single-writer records, the newest of each subject, passed on (E24).
 
 A record is adopted only if it supersedes the last one ever adopted for that subject, as
-:class:`~agent.comms.neighbours.Version` says. That version outlives the record; otherwise departed
+:class:`~agent.heard_beacon.Version` says. That version outlives the record; otherwise departed
 agents would circulate as ghosts. It goes by the stamp, which cannot run ahead, so the subject's own
 records supersede whatever another agent invents. A record's version is its subject's beacon
 sequence, so a beacon heard directly counts as a record too. Records of ids that the run does not
@@ -15,10 +15,10 @@ from types import MappingProxyType
 from typing import Final, assert_never
 
 from agent.codec import CHECKSUM_B, add_checksum, encode
-from agent.comms.neighbours import NEVER_HEARD, Version
 from agent.comms.unidentified_vehicles import DepartedMember, MemberPosition
 from agent.controller import Peer
-from agent.messages import AGENT_IDS, MAX_TEAM, NO_MISSION, Beacon, Gossip, Piece, Place, Record
+from agent.heard_beacon import NEVER_HEARD, HeardBeacon, Version
+from agent.messages import AGENT_IDS, MAX_TEAM, NO_MISSION, Gossip, Piece, Place, Record
 from netem.wire.channels import MAX_PAYLOAD_B
 
 RELAYED_SILENCE_ROUNDS: Final = 12
@@ -41,15 +41,15 @@ class RecordTable:
     def __init__(self, own_id: int, multihop_hz: float, ids: int = AGENT_IDS) -> None:
         self._own_id = own_id
         self._ids = ids
-        self._newest: dict[int, Beacon | Record] = {}
+        self._newest: dict[int, HeardBeacon | Record] = {}
         self._last: dict[int, Version] = {}
         self._lag_s: dict[int, float] = {}
         period_s = 1.0 / multihop_hz if multihop_hz > 0.0 else 0.0
         self._relayed_silence_s = max(LEAST_RELAYED_SILENCE_S, RELAYED_SILENCE_ROUNDS * period_s)
 
-    def adopt_beacon(self, beacon: Beacon, version: Version) -> None:
-        """Take a neighbour's beacon, of this version, as the newest record of that neighbour."""
-        subject = beacon.id
+    def adopt_beacon(self, beacon: HeardBeacon) -> None:
+        """Take a neighbour's beacon as the newest record of that neighbour."""
+        subject, version = beacon.id, beacon.version
         if self._may_know(subject) and version.supersedes(self._last.get(subject, NEVER_HEARD)):
             self._last[subject] = version
             self._newest[subject] = beacon
@@ -86,7 +86,7 @@ class RecordTable:
         gone = []
         for subject, newest in self._newest.items():
             match newest:
-                case Beacon():
+                case HeardBeacon():
                     silent = subject not in heard
                 case Record():
                     limit_s = self._relayed_silence_s + 2.0 * self._lag_s.get(subject, 0.0)
@@ -124,7 +124,7 @@ class RecordTable:
             for subject, newest in self._newest.items()
         ]
 
-    def newest(self) -> Collection[Beacon | Record]:
+    def newest(self) -> Collection[HeardBeacon | Record]:
         """Return the newest statement of each member."""
         return self._newest.values()
 
@@ -168,15 +168,15 @@ class RecordTable:
         return other and len(self._newest) < MAX_TEAM
 
 
-def _record_of(newest: Beacon | Record) -> Record:
+def _record_of(newest: HeardBeacon | Record) -> Record:
     match newest:
         case Record():
             return newest
-        case Beacon():
+        case HeardBeacon():
             return Record(
                 id=newest.id,
-                incarnation=newest.incarnation,
-                version=newest.sequence,
+                incarnation=newest.version.incarnation,
+                version=newest.version.sequence,
                 stamp_s=newest.stamp_s,
                 position=newest.position,
                 queue=newest.queue,

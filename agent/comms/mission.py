@@ -27,6 +27,7 @@ from typing import Final, NamedTuple, assert_never
 from agent.codec import decode, decode_formation, encode, encode_formation
 from agent.comms.reported_frame import FrameFromTiers, ReportedFrame, check_stamp
 from agent.controller import Flown, HeardFrame
+from agent.heard_beacon import HeardBeacon
 from agent.messages import (
     AGENT_IDS,
     AT_HOME,
@@ -35,7 +36,6 @@ from agent.messages import (
     NO_MISSION,
     PIECE_B,
     AllocationKind,
-    Beacon,
     Drift,
     FramePath,
     Mission,
@@ -179,7 +179,7 @@ class Missions:
             for index, part in enumerate(parts)
         ]
 
-    def receive_frame(self, beacon: Beacon) -> None:
+    def receive_frame(self, beacon: HeardBeacon) -> None:
         """Take the frame from a beacon if it is newer, before its mission has arrived.
 
         So a moving frame spreads down the tiers at the local channel's rate. An agent without a
@@ -201,7 +201,7 @@ class Missions:
         self.frame_key = beacon.frame_key
         self._set_frame(self.flown, ReportedFrame(beacon.frame, beacon.drift), beacon.stamp_s)
 
-    def _is_newer(self, beacon: Beacon) -> bool:
+    def _is_newer(self, beacon: HeardBeacon) -> bool:
         """Whether a beacon's frame is of a newer mission, or of the same one with a newer stamp."""
         key, drift = beacon.frame_key, beacon.drift
         if key != self.frame_key or drift is None:

@@ -6,16 +6,15 @@ never read.
 
 from collections.abc import Collection
 from math import dist, inf, log
-from typing import Final, final
+from typing import Final
 
 from agent.controller import UNHEARD, Heard, Link
-from agent.messages import NO_MISSION, Beacon, Place, Vector
+from agent.heard_beacon import NEVER_HEARD, HeardBeacon, Version
+from agent.messages import Vector
 from agent.rejection import RejectedError
 
 MAX_AGE_S: Final = 5.0
 """An older beacon is rejected."""
-INCARNATION_LASTS_S: Final = 5.0
-"""An older incarnation is heard again when the newer one has been silent for this long."""
 MAX_EXTRAPOLATION_S: Final = 1.0
 """A position is extrapolated along its velocity for this long at most."""
 LEAST_SILENCE_S: Final = 1.5
@@ -32,38 +31,6 @@ ECHO_LASTS_S: Final = 3.0
 SMOOTHING: Final = 0.05
 MARGIN: Final = 1.2
 """The loss is estimated from the last 39 gaps or so: n (1e6^(1/n) - 1) / ln 1e6 at n = 39."""
-
-
-@final
-class Version:
-    """Which of a sender's statements one is: by its stamp, and by the sender's own count."""
-
-    def __init__(
-        self,
-        stamp_s: float,
-        incarnation: int,
-        sequence: int,
-    ) -> None:
-        self.stamp_s = stamp_s
-        self.incarnation = incarnation
-        self.sequence = sequence
-
-    def supersedes(self, other: "Version") -> bool:
-        """Whether this statement is newer: later, and not the same one once more.
-
-        A higher sequence alone does not count: an invented one would shut out all that follow. So
-        would an invented incarnation, so it loses its rank when nothing follows it.
-        """
-        if self.incarnation < other.incarnation:
-            return self.stamp_s > other.stamp_s + INCARNATION_LASTS_S
-        if self.stamp_s == other.stamp_s:
-            return (self.incarnation, self.sequence) > (other.incarnation, other.sequence)
-        same = self.sequence == other.sequence and self.incarnation == other.incarnation
-        return self.stamp_s > other.stamp_s and not same
-
-
-NEVER_HEARD = Version(-inf, -1, -1)
-"""Of a sender not heard so far: older than any."""
 
 
 class LinkQuality:
@@ -105,24 +72,22 @@ class LinkQuality:
 class Neighbour:
     """One neighbour: its last beacon, and the radio's quality estimated from its sequence."""
 
-    __slots__ = ("beacon", "echoed_s", "id", "latency_s", "mean_gap", "place", "version")
+    __slots__ = ("beacon", "echoed_s", "id", "latency_s", "mean_gap")
 
-    def __init__(self, beacon: Beacon, version: Version, latency_s: float) -> None:
+    def __init__(self, beacon: HeardBeacon, latency_s: float) -> None:
         self.id = beacon.id
         self.beacon = beacon
-        self.version = version
         self.latency_s = latency_s
         self.mean_gap = 1.0
-        self.place = _claimed_place(beacon)
         self.echoed_s = -inf
         """When it last echoed an own beacon [s]."""
 
-    def update(self, beacon: Beacon, version: Version, latency_s: float, beacon_hz: float) -> float:
+    def update(self, beacon: HeardBeacon, latency_s: float, beacon_hz: float) -> float:
         """Take a newer beacon; return how many the sender has sent since the last one.
 
         latency_s: its delay [s]; beacon_hz: the expected rate [Hz].
         """
-        before, last, self.version = self.beacon, self.version, version
+        last, version = self.beacon.version, beacon.version
         gap = 1.0
         if version.incarnation == last.incarnation:
             gap = float(version.sequence - last.sequence)
@@ -132,8 +97,6 @@ class Neighbour:
                 gap = min(max(gap, 1), most)
             self.mean_gap += SMOOTHING * (gap - self.mean_gap)
         self.latency_s += SMOOTHING * (latency_s - self.latency_s)
-        if beacon.rank != before.rank or beacon.queue != before.queue:
-            self.place = _claimed_place(beacon)
         self.beacon = beacon
         return gap
 
@@ -164,19 +127,17 @@ class Neighbours:
         self._last: dict[int, Version] = {}
         self._quality = LinkQuality()
 
-    def receive(self, beacon: Beacon, now_s: float, own_sent_s: dict[int, float]) -> Version:
+    def receive(self, beacon: HeardBeacon, now_s: float, own_sent_s: dict[int, float]) -> None:
         """Take a beacon, or raise RejectedError for a replay or an implausible stamp.
-
-        Returns its version.
 
         own_sent_s: sending time of each recent own sequence [s]. A beacon that echoes a sequence
         was sent after it (E22), whatever its stamp says.
         """
-        sender, version = beacon.id, version_of(beacon)
+        sender, version = beacon.id, beacon.version
         if sender == self._own_id:
             raise RejectedError("spoofed", "a beacon with the receiver's own id")
         known = self._known.get(sender)
-        last = known.version if known is not None else self._last.get(sender, NEVER_HEARD)
+        last = known.beacon.version if known is not None else self._last.get(sender, NEVER_HEARD)
         if not version.supersedes(last):
             raise RejectedError("replay", f"{version} of agent {sender} is not new")
         age_s = now_s - version.stamp_s
@@ -185,34 +146,26 @@ class Neighbours:
         if age_s > MAX_AGE_S:
             raise RejectedError("old", f"the stamp is {age_s:.3f} s old")
         # A fresh stamp is later than every own beacon; only an old one can contradict its echo.
-        echoed = self._echoed(beacon)
+        echoed = beacon.echoes.get(self._own_id)
         sent_s = own_sent_s.get(echoed, -inf) if echoed is not None else -inf
         if age_s > self._slack_s and version.stamp_s + self._slack_s < sent_s:
             raise RejectedError("offset", "the stamp is older than a beacon that it echoes")
         latency_s = age_s if age_s > 0.0 else 0.0
         if known is not None:
-            gap = known.update(beacon, version, latency_s, self._beacon_hz)
+            gap = known.update(beacon, latency_s, self._beacon_hz)
         else:
-            gap, known = 1.0, Neighbour(beacon, version, latency_s)
+            gap, known = 1.0, Neighbour(beacon, latency_s)
             self._known[sender] = known
             self._put_in_order()
         self._quality.note(gap, latency_s)
         if echoed is not None:
             known.echoed_s = version.stamp_s
-        return version
 
     def link(self, here: Vector) -> Link:
         """Return the radio's quality as measured. here: own position [m; world frame]."""
         for known in self._in_order:
             self._quality.note_distance(known.id, dist(here, known.beacon.position))
         return self._quality.link()
-
-    def _echoed(self, beacon: Beacon) -> int | None:
-        """Return the sequence of the own beacon that a beacon echoes, None for none."""
-        for heard, sequence in beacon.echoes:
-            if heard == self._own_id:
-                return sequence
-        return None
 
     @property
     def ids(self) -> Collection[int]:
@@ -228,11 +181,11 @@ class Neighbours:
         gone = {
             sender: stamp_s + HEARD_BY_OTHERS * known.silence_s(self._beacon_hz)
             for sender, known in self._known.items()
-            if now_s - (stamp_s := known.version.stamp_s) > LEAST_SILENCE_S
+            if now_s - (stamp_s := known.beacon.stamp_s) > LEAST_SILENCE_S
             and now_s - stamp_s > known.silence_s(self._beacon_hz)
         }
         for sender in gone:
-            self._last[sender] = self._known.pop(sender).version
+            self._last[sender] = self._known.pop(sender).beacon.version
         if gone:
             self._put_in_order()
         return gone
@@ -249,7 +202,7 @@ class Neighbours:
         heard = []
         for known in self._in_order:
             beacon = known.beacon
-            since_s = now_s - known.version.stamp_s
+            since_s = now_s - beacon.stamp_s
             age_s = since_s if since_s > 0.0 else 0.0
             along = age_s if age_s < MAX_EXTRAPOLATION_S else MAX_EXTRAPOLATION_S
             x, y, z = beacon.position
@@ -263,7 +216,7 @@ class Neighbours:
                     position=position,
                     velocity=velocity,
                     target=beacon.target,
-                    place=known.place if flown == mission else None,
+                    place=beacon.place if flown == mission else None,
                     mission=flown,
                     cost_m=beacon.cost_mm / 1000.0,
                     standing=beacon.standing,
@@ -276,24 +229,14 @@ class Neighbours:
         """Whether any neighbour flies an older mission than the one with this key, or none."""
         return any(known.beacon.mission < mission for known in self._in_order)
 
-    def beacons(self) -> list[Beacon]:
+    def beacons(self) -> list[HeardBeacon]:
         """Return the last beacon of each neighbour, sorted by id."""
         return [each.beacon for each in self._in_order]
 
     def echoes(self) -> tuple[tuple[int, int], ...]:
         """Return (id, last sequence heard) of each neighbour, sorted by id."""
-        return tuple([(each.id, each.version.sequence) for each in self._in_order])
+        return tuple([(each.id, each.beacon.version.sequence) for each in self._in_order])
 
     def _put_in_order(self) -> None:
         self.sorted_ids = tuple(sorted(self._known))
         self._in_order = [self._known[sender] for sender in self.sorted_ids]
-
-
-def version_of(beacon: Beacon) -> Version:
-    """Return which of its sender's statements a beacon is."""
-    return Version(beacon.stamp_s, beacon.incarnation, beacon.sequence)
-
-
-def _claimed_place(beacon: Beacon) -> Place | None:
-    claims = beacon.queue >= 0 and beacon.rank >= 0 and beacon.mission != NO_MISSION
-    return Place(beacon.queue, beacon.rank) if claims else None

@@ -7,7 +7,8 @@ a mission keeps pace with one that comes down the tiers.
 from typing import Final, NamedTuple
 
 from agent.controller import HeardFrame
-from agent.messages import NO_MISSION, Beacon, Drift, Pose
+from agent.heard_beacon import HeardBeacon
+from agent.messages import NO_MISSION, Drift, Pose
 from agent.qstructure.target_frame import Frame
 from agent.rejection import RejectedError
 
@@ -60,7 +61,7 @@ class FrameFromTiers:
     def __init__(self) -> None:
         self._last: _Report | None = None
 
-    def receive(self, beacon: Beacon) -> None:
+    def receive(self, beacon: HeardBeacon) -> None:
         """Take the frame of a beacon if it is newer. Raises RejectedError for one of the future."""
         if beacon.frame_key == NO_MISSION or not _has_tier(beacon):
             return
@@ -82,13 +83,13 @@ class FrameFromTiers:
         return last is None or not last.holds_at(time_s) or report[:2] > last[:2]
 
 
-def check_stamp(beacon: Beacon) -> None:
+def check_stamp(beacon: HeardBeacon) -> None:
     """Raise RejectedError for a frame with a stamp later than its beacon's."""
     if beacon.drift is not None and beacon.drift.stamp_s > beacon.stamp_s:
         raise RejectedError("future", "the frame's stamp is later than the beacon's")
 
 
-def _has_tier(beacon: Beacon) -> bool:
+def _has_tier(beacon: HeardBeacon) -> bool:
     """Whether the sender belongs to a tree: as its root, or with a parent (E15)."""
     branches = beacon.standing.branches if beacon.standing is not None else ()
     return any(branch is not None and branch.tier >= 0 for branch in branches)

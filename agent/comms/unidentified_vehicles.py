@@ -18,10 +18,12 @@ survivor of a team has none.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import dist, inf
+from math import inf
 from typing import Final, NamedTuple, final
 
-from agent.messages import PROXIMITY_RANGE_M, Beacon, Vector
+from agent.heard_beacon import HeardBeacon
+from agent.messages import PROXIMITY_RANGE_M, Vector
+from agent.vectors import apart
 
 SAME_VEHICLE_M: Final = 0.2
 """Two sightings nearer than this are the same vehicle, which then is stationary."""
@@ -42,11 +44,11 @@ MISSED_S: Final = 1.5
 """How long one is that the agent or a neighbour would sense; a neighbour needs as long to report a
 vehicle that it comes to sense."""
 
-ReportsVehicle = Callable[[Beacon, Vector], bool]
+ReportsVehicle = Callable[[HeardBeacon, Vector], bool]
 """Whether a neighbour's beacon reports an unidentified vehicle at a position [m; world frame]."""
 
 
-def _always(_witness: Beacon, _vehicle: Vector) -> bool:
+def _always(_witness: HeardBeacon, _vehicle: Vector) -> bool:
     return True
 
 
@@ -110,7 +112,7 @@ class Surroundings(NamedTuple):
     now_s: float  # [s]
     position: Vector  # own [m; world frame]
     sensed: Sequence[Vector]  # vehicles, relative to ``position`` [m; world axes]
-    beacons: Sequence[Beacon]  # the last one of each neighbour
+    beacons: Sequence[HeardBeacon]  # the last one of each neighbour
     team: Sequence[MemberPosition]  # all known members
     departed: Sequence[DepartedMember] = ()  # members that fell silent since the last update
     reports_vehicle: ReportsVehicle = _always
@@ -141,7 +143,7 @@ class UnidentifiedVehicles:
         new = [
             seen
             for seen in unknown
-            if all(dist(track.position, seen) >= SAME_VEHICLE_M for track in tracks)
+            if all(apart(track.position, seen) >= SAME_VEHICLE_M for track in tracks)
         ]
         sensed = [track for track in tracks if track.seen_s == around.now_s]
         lost = [track for track in tracks if track.seen_s < around.now_s]
@@ -164,7 +166,7 @@ class UnidentifiedVehicles:
 
     def _note_hearing_range(self, around: Surroundings) -> None:
         for beacon in around.beacons:
-            away_m = dist(around.position, beacon.position)
+            away_m = apart(around.position, beacon.position)
             self._heard_from_m = max(self._heard_from_m, away_m)
 
     def _unknown(self, around: Surroundings) -> list[Vector]:
@@ -173,7 +175,7 @@ class UnidentifiedVehicles:
         return [
             vehicle
             for vehicle in _in_world(around.position, around.sensed)
-            if dist(around.position, vehicle) <= reach_m
+            if apart(around.position, vehicle) <= reach_m
             and not self._is_member(vehicle, around.team)
         ]
 
@@ -189,12 +191,12 @@ class UnidentifiedVehicles:
             (
                 gone.stamp_s
                 for gone in self._departed
-                if dist(gone.position, vehicle) < SAME_MEMBER_M
+                if apart(gone.position, vehicle) < SAME_MEMBER_M
             ),
             default=now_s,
         )
         moved = any(
-            dist(each.position, vehicle) < SAME_VEHICLE_M + self._max_speed * (now_s - each.seen_s)
+            apart(each.position, vehicle) < SAME_VEHICLE_M + self._max_speed * (now_s - each.seen_s)
             for each in lost
             if now_s - each.seen_s <= RECENT_S
         )
@@ -204,7 +206,7 @@ class UnidentifiedVehicles:
         """Whether a vehicle that is not sensed now is still taken to be where it hovered."""
         return (
             track.seen_s - track.since_s >= UNIDENTIFIED_AFTER_S
-            and dist(track.position, around.position) > SURE_RANGE_M
+            and apart(track.position, around.position) > SURE_RANGE_M
             and not self._is_member(track.position, around.team)
             and not self._may_have_joined(track, around)
         )
@@ -213,7 +215,7 @@ class UnidentifiedVehicles:
         """Whether a member first heard since the vehicle was sensed may be that vehicle."""
         return any(
             member.id not in track.others
-            and dist(track.position, member.position)
+            and apart(track.position, member.position)
             < SAME_MEMBER_M + self._max_speed * (around.now_s - track.seen_s)
             for member in around.team
         )
@@ -221,7 +223,7 @@ class UnidentifiedVehicles:
     def _is_member(self, vehicle: Vector, team: Sequence[MemberPosition]) -> bool:
         """Whether a member may be there by now, having moved on since its last report."""
         for member in team:
-            if dist(vehicle, member.position) < SAME_MEMBER_M + self._max_speed * member.age_s:
+            if apart(vehicle, member.position) < SAME_MEMBER_M + self._max_speed * member.age_s:
                 return True
         return False
 
@@ -231,15 +233,15 @@ def _followed(
 ) -> _Track:
     """Return a track as it is now. sensed: the unidentified vehicles [m; world frame]."""
     for vehicle in sensed:
-        if dist(track.position, vehicle) < SAME_VEHICLE_M:
+        if apart(track.position, vehicle) < SAME_VEHICLE_M:
             return track.seen(around.now_s, vehicle, members)
     return track.unseen(around.now_s, missed=_is_missed(track, around))
 
 
 def _is_missed(track: _Track, around: Surroundings) -> bool:
     """Whether the agent would sense a vehicle that has not moved, or a neighbour reports none."""
-    return dist(track.last, around.position) < UNMOVED_RANGE_M or any(
-        dist(track.last, witness.position) < UNMOVED_RANGE_M
+    return apart(track.last, around.position) < UNMOVED_RANGE_M or any(
+        apart(track.last, witness.position) < UNMOVED_RANGE_M
         and not around.reports_vehicle(witness, track.position)
         for witness in around.beacons
     )

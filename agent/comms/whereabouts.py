@@ -9,7 +9,8 @@ from collections.abc import Iterable
 from math import inf
 from typing import Final, NamedTuple
 
-from agent.messages import Beacon, Record, Vector
+from agent.heard_beacon import HeardBeacon
+from agent.messages import Record, Vector
 
 PROMISE_S: Final = 3.0
 """For how long a beacon's promise of a speed holds [s]."""
@@ -33,15 +34,15 @@ class Whereabouts:
 
     def __init__(self, own_id: int, team: int) -> None:
         self._unheard = set(range(team)) - {own_id}
-        self._heard: dict[int, Beacon | Record] = {}
-        self._relayed: dict[int, Beacon | Record] = {}
+        self._heard: dict[int, HeardBeacon | Record] = {}
+        self._relayed: dict[int, HeardBeacon | Record] = {}
 
-    def hear(self, beacon: Beacon) -> None:
+    def hear(self, beacon: HeardBeacon) -> None:
         """Take a beacon, the newest one of its sender."""
         self._unheard.discard(beacon.id)
         self._heard[beacon.id] = beacon
 
-    def relay(self, newest: Iterable[Beacon | Record]) -> None:
+    def relay(self, newest: Iterable[HeardBeacon | Record]) -> None:
         """Take the newest statements of all members, of which beacons are known already."""
         for each in newest:
             if isinstance(each, Record) and (each.id in self._heard or each.id in self._unheard):
@@ -66,8 +67,8 @@ class Whereabouts:
         return [_report(each, position, now_s) for each in newest.values()]
 
 
-def _report(newest: Beacon | Record, position: Vector, now_s: float) -> VehicleReport:
+def _report(newest: HeardBeacon | Record, position: Vector, now_s: float) -> VehicleReport:
     (u, v, w), (x, y, z) = newest.position, position
     age_s = max(0.0, now_s - newest.stamp_s)
-    cap = newest.speed_cap if isinstance(newest, Beacon) else inf
+    cap = newest.speed_cap if isinstance(newest, HeardBeacon) else inf
     return VehicleReport((u - x, v - y, w - z), age_s, cap)

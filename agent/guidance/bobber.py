@@ -6,7 +6,7 @@ lies in the cone, else to a point on the cone's edge on the target's side.
 """
 
 from dataclasses import dataclass
-from math import cos, hypot, sin, sqrt
+from math import cos, sin, sqrt
 from typing import Final, final
 
 from agent.config import DEFAULT_CAST_FAR_M, Control
@@ -69,7 +69,7 @@ def bobber(q: Vector, yaw: float, q_toq: Vector, zone: CastZone) -> Vector:
     otherwise the vehicle would orbit the target (E11).
     """
     x, y, z = q_toq[0] - q[0], q_toq[1] - q[1], q_toq[2] - q[2]
-    across = hypot(x, y)
+    across = sqrt(x * x + y * y)
     error = azimuth_error(x, y, yaw)
     if zone.cone.holds(error) or across < STRAIGHT_AHEAD_M or across < 2.0 * zone.turning_radius:
         scale = min(1.0, zone.reach / max(sqrt(x * x + y * y + z * z), 1e-12))

@@ -18,6 +18,7 @@ from typing import Final
 from agent.comms.unidentified_vehicles import SAME_MEMBER_M
 from agent.controller import Heard, Senses
 from agent.messages import ZERO, Vector
+from agent.vectors import apart
 
 ARRIVED_M: Final = 0.12
 PROGRESS_M: Final = 0.05
@@ -72,7 +73,7 @@ class DeadlockEscape:
         vehicle = _nearest_ahead(way, senses.vehicles, VEHICLE_NEAR_M)
         if vehicle is None:
             self._vertical = None
-            lags = self._side is not None or dist(senses.position, target) > MIN_LAG_M
+            lags = self._side is not None or apart(senses.position, target) > MIN_LAG_M
             return self._round_obstacle(senses, way) if lags else None
         if self._vertical is None:
             self._vertical = self._choose_vertical(senses, vehicle)
@@ -80,13 +81,13 @@ class DeadlockEscape:
 
     def _is_free(self, senses: Senses, target: Vector) -> bool:
         """Whether the agent has arrived or has a new target; notes its progress."""
-        away_m = dist(senses.position, target)
+        away_m = apart(senses.position, target)
         before, self._target = self._target, target
-        if before is None or away_m < ARRIVED_M or dist(before, target) > NEW_TARGET_M:
+        if before is None or away_m < ARRIVED_M or apart(before, target) > NEW_TARGET_M:
             self._nearest_m, self._since_s = away_m, senses.now_s
             return True
         if target != before:
-            self._nearest_m += away_m - dist(senses.position, before)
+            self._nearest_m += away_m - apart(senses.position, before)
         if away_m < self._nearest_m - PROGRESS_M:
             self._nearest_m = away_m
             if self._vertical is None and self._side is None:

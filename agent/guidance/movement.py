@@ -5,9 +5,12 @@ from typing import Final
 
 from agent.guidance.cone import Cone, azimuth_error
 from agent.messages import Vector
+from agent.vectors import across
 
 DEAD_BAND_MPS: Final = 0.02
 """Up to this horizontal speed a motion has no azimuth: the vehicle hovers or climbs (E10)."""
+SURELY: Final = 1.0 - 1e-9
+"""A square that is below its limit by this factor is below it whatever the rounding."""
 
 
 def steer(wanted: Vector, yaw: float, cone: Cone) -> tuple[Vector, float]:
@@ -16,7 +19,7 @@ def steer(wanted: Vector, yaw: float, cone: Cone) -> tuple[Vector, float]:
     wanted: desired velocity [m/s; world frame]; yaw: present heading [rad]. Vehicles hover, climb
     and descend without turning.
     """
-    if hypot(wanted[0], wanted[1]) <= DEAD_BAND_MPS:
+    if across(wanted) <= DEAD_BAND_MPS:
         return wanted, yaw
     heading = atan2(wanted[1], wanted[0])
     if cone.holds(azimuth_error(wanted[0], wanted[1], yaw)):
@@ -27,6 +30,9 @@ def steer(wanted: Vector, yaw: float, cone: Cone) -> tuple[Vector, float]:
 def saturated(velocity: Vector, max_speed: float, max_climb: float) -> Vector:
     """Return a velocity scaled down, in its direction, to the vehicle's limits [m/s]."""
     x, y, z = velocity
+    square = x * x + y * y + z * z
+    if square < SURELY * max_speed * max_speed and abs(z) < SURELY * max_climb:
+        return velocity
     speed = hypot(x, y, z)
     scale = 1.0
     if speed > max_speed:

@@ -17,11 +17,14 @@ from typing import Final
 
 from agent.controller import Heard
 from agent.messages import Vector
+from agent.vectors import apart
 
 LEAST_GAP_M: Final = 1e-3
 """E2: g is at least this, also inside d_ob."""
 TARGET_FLOOR_M: Final = 0.25
 """E1: targets nearer than d_ob plus this are no equilibrium of the potential."""
+ROUNDED_UP: Final = 1.0 + 1e-9
+"""By this factor a distance exceeds any rounding of it."""
 
 
 class Potential:
@@ -76,16 +79,20 @@ class Potential:
         q, q_tg: own position and immediate target [m; world frame]; others: the neighbours.
         """
         x, y, z = q[0] - q_tg[0], q[1] - q_tg[1], q[2] - q_tg[2]
-        here: Sequence[float] = q
-        target: Sequence[float] = q_tg
         for other in others:
             there = other.position
-            push = self._push(dist(here, there), dist(target, other.target))
+            if self._is_surely_apart(apart(q, there), apart(q_tg, other.target)):
+                continue
+            push = self._push(dist(q, there), dist(q_tg, other.target))
             if push != 0.0:
                 x += push * (q[0] - there[0])
                 y += push * (q[1] - there[1])
                 z += push * (q[2] - there[2])
         return (x, y, z)
+
+    def _is_surely_apart(self, r: float, between_targets: float) -> bool:
+        """Whether two agents do not push each other, whatever the rounding; as ``_push``."""
+        return r > ROUNDED_UP * between_targets and r > ROUNDED_UP * self._floor
 
     def _push(self, r: float, between_targets: float) -> float:
         """Return the factor of q_ij in Omega_i: k_ob U'_ob g / r, with a capped pair term."""

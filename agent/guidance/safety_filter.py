@@ -16,8 +16,9 @@ from math import hypot, inf, sqrt
 from typing import Final, NamedTuple
 
 from agent.guidance.cone import Cone, azimuth_error
-from agent.guidance.movement import DEAD_BAND_MPS
+from agent.guidance.movement import DEAD_BAND_MPS, SURELY
 from agent.messages import ZERO, Vector
+from agent.vectors import across
 
 SHARE: Final = 0.18
 """Share of the gap that one vehicle of a pair may close within H: 2 * SHARE <= 1/e."""
@@ -150,11 +151,14 @@ def slid(velocity: Vector, bounds: Sequence[Bound]) -> Vector:
 
 def shortened(velocity: Vector, max_speed: float) -> Vector:
     """Return a velocity no faster than ``max_speed`` [m/s], in the same direction."""
-    speed = hypot(*velocity)
+    x, y, z = velocity
+    if x * x + y * y + z * z < SURELY * max_speed * max_speed:
+        return velocity
+    speed = hypot(x, y, z)
     if speed <= max_speed:
         return velocity
     scale = max_speed / speed
-    return (velocity[0] * scale, velocity[1] * scale, velocity[2] * scale)
+    return (x * scale, y * scale, z * scale)
 
 
 def _slid_along(velocity: Vector, bounds: Sequence[Bound]) -> Vector:
@@ -212,6 +216,6 @@ def approach_of(velocity: Vector, bound: Bound) -> float:
 
 
 def _in_cone(velocity: Vector, yaw: float, cone: Cone) -> bool:
-    if hypot(velocity[0], velocity[1]) <= DEAD_BAND_MPS:
+    if across(velocity) <= DEAD_BAND_MPS:
         return True
     return cone.holds(azimuth_error(velocity[0], velocity[1], yaw))

@@ -34,7 +34,8 @@ from agent.guidance.sight import (
     surface_margin_m,
     vehicle_margin_m,
 )
-from agent.messages import ZERO, Beacon, Record, Vector
+from agent.heard_beacon import HeardBeacon
+from agent.messages import ZERO, Record, Vector
 from agent.sensing.surface_motion import LEAST_MPS, SurfaceMotion
 
 CLIMBS: Final = 1.5
@@ -93,12 +94,12 @@ class SafetyMonitor:
             )
         self.speed_cap = limits.max_speed_mps
 
-    def hear(self, beacon: Beacon) -> None:
+    def hear(self, beacon: HeardBeacon) -> None:
         """Take a neighbour's newest beacon."""
         if self._promises is not None:
             self._whereabouts.hear(beacon)
 
-    def relay(self, newest: Iterable[Beacon | Record]) -> None:
+    def relay(self, newest: Iterable[HeardBeacon | Record]) -> None:
         """Take the newest statements of all members."""
         if self._promises is not None:
             self._whereabouts.relay(newest)

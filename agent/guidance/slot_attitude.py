@@ -4,7 +4,7 @@ An agent near a slot at rest turns on the spot. Where its slot moves outside the
 yaw, it keeps the heading of its flight; ``check`` warns of such a queue.
 """
 
-from math import dist, hypot
+from math import hypot
 from typing import Final, final
 
 from agent.config import Vehicle
@@ -13,6 +13,7 @@ from agent.guidance.movement import DEAD_BAND_MPS
 from agent.messages import Vector
 from agent.qstructure.formation import Slot
 from agent.qstructure.target_frame import Frame
+from agent.vectors import across, apart
 
 AT_SLOT_M: Final = 0.05
 """Within this distance of its slot an agent takes up the queue's orientation."""
@@ -55,10 +56,9 @@ class AttitudeAtSlot:
         if slot is None:
             return AWAY
         q_toq = frame.to_world(slot.point)
-        u, v, _ = frame.velocity_at(q_toq)
-        at_rest = hypot(u, v) <= DEAD_BAND_MPS
-        if dist(q, q_toq) >= self._at_slot_m:
+        if apart(q, q_toq) >= self._at_slot_m:
             return AWAY
+        at_rest = not frame.moves or across(frame.velocity_at(q_toq)) <= DEAD_BAND_MPS
         yaw, pitch, roll = slot.attitude
         in_world = None if yaw is None else yaw + frame.yaw
         return SlotAttitude(in_world, (pitch or 0.0, roll or 0.0), at_rest)
@@ -89,4 +89,4 @@ class AttitudeAtSlot:
     def _flies_with(self, yaw: float, velocity: Vector) -> bool:
         """Whether the vehicle can fly a velocity [m/s] while it keeps a heading [rad]."""
         u, v, _ = velocity
-        return hypot(u, v) <= DEAD_BAND_MPS or self._cone.holds(azimuth_error(u, v, yaw))
+        return across(velocity) <= DEAD_BAND_MPS or self._cone.holds(azimuth_error(u, v, yaw))

@@ -10,7 +10,6 @@ which they hover are found anew, before anybody reports them.
 """
 
 from collections.abc import Sequence
-from math import dist
 from typing import Final
 
 from agent.comms.unidentified_vehicles import SAME_MEMBER_M
@@ -18,6 +17,7 @@ from agent.controller import Flown, Senses
 from agent.messages import MAX_PLACES, Place, Vector
 from agent.places.place_points import PlacePoints
 from agent.qstructure.formation import NO_PLACES
+from agent.vectors import apart
 
 HELD_M: Final = 0.2
 """An agent nearer than this to the place that it claims stands in it."""
@@ -116,7 +116,7 @@ class OccupiedSlots:
         for place, position in holders:
             if place is not None:
                 point = self._points.point(mission, self._agents, place)
-                if point is not None and dist(point, position) < HELD_M:
+                if point is not None and apart(point, position) < HELD_M:
                     held.add(place)
         return held
 
@@ -151,5 +151,7 @@ def _vehicles_without_neighbour(senses: Senses) -> list[Vector]:
     seen = [(x + dx, y + dy, z + dz) for dx, dy, dz in senses.vehicles]
     heard = [other.position for other in senses.neighbours]
     return [
-        vehicle for vehicle in seen if all(dist(vehicle, there) >= SAME_MEMBER_M for there in heard)
+        vehicle
+        for vehicle in seen
+        if all(apart(vehicle, there) >= SAME_MEMBER_M for there in heard)
     ]

@@ -6,10 +6,10 @@ jumps several times in a row measures nothing real.
 
 from array import array
 from collections.abc import Sequence
-from math import dist, hypot
 from typing import Final
 
-from agent.messages import NO_ECHO_MM, PROXIMITY_RANGE_M, Scan
+from agent.messages import NO_ECHO_MM, PROXIMITY_RANGE_M, Scan, Vector
+from agent.vectors import apart, length
 
 JUMP_MM: Final = 1000
 MIN_ECHOES: Final = 8
@@ -43,25 +43,25 @@ class VehicleJumps(_Jumps):
         super().__init__()
         self._closing_mps = 2.0 * max_speed
         self._slack_m = SLACK_M + 2.0**0.5 * 6.0 * noise_m
-        self._before: Sequence[Sequence[float]] = ()
+        self._before: Sequence[Vector] = ()
         self._read_s = 0.0
 
-    def add(self, now_s: float, vehicles: Sequence[Sequence[float]]) -> None:
+    def add(self, now_s: float, vehicles: Sequence[Vector]) -> None:
         """Take the next reading, relative to the own centre [m; world axes].
 
         A vehicle near the edge of the sensor's range may have come in from outside.
         """
         step_m = self._slack_m + self._closing_mps * (now_s - self._read_s)
-        inside = [each for each in vehicles if hypot(*each) < PROXIMITY_RANGE_M - step_m]
+        inside = [each for each in vehicles if length(each) < PROXIMITY_RANGE_M - step_m]
         if inside:
             new = sum([_is_new(each, self._before, step_m) for each in inside])
             self.count(jumped=2 * new > len(inside))
         self._before, self._read_s = vehicles, now_s
 
 
-def _is_new(vehicle: Sequence[float], before: Sequence[Sequence[float]], step_m: float) -> bool:
+def _is_new(vehicle: Vector, before: Sequence[Vector], step_m: float) -> bool:
     for old in before:  # noqa: SIM110  # several times as fast as all()
-        if dist(vehicle, old) <= step_m:
+        if apart(vehicle, old) <= step_m:
             return False
     return True
 

@@ -6,12 +6,14 @@ scan, or most sensed vehicles, jump several times in a row.
 """
 
 from collections.abc import Sequence
-from math import dist, hypot
+from math import hypot
 from typing import Final
 
-from agent.messages import Beacon, Observation, Vector
+from agent.heard_beacon import HeardBeacon
+from agent.messages import Observation, Vector
 from agent.sensing.ray_pattern import Pattern
 from agent.sensing.scan_jumps import ScanJumps, VehicleJumps
+from agent.vectors import apart
 
 MOVED_M: Final = 0.03
 """Once a vehicle has moved this far, its reading must have changed."""
@@ -65,12 +67,12 @@ class SensorHealth:
         faulty = bool(self._due_s) and (self._is_late(observation) or self._jumped(observation))
         return not (self._stuck or faulty or self._vehicles_jumped(observation) or self._blind)
 
-    def compare(self, observation: Observation, neighbours: Sequence[Beacon]) -> None:
+    def compare(self, observation: Observation, neighbours: Sequence[HeardBeacon]) -> None:
         """Check that near neighbours are sensed where they report themselves."""
         if self._vehicle_jumps is None:
             return
         here = observation.position
-        near = [beacon for beacon in neighbours if dist(here, beacon.position) <= NEAR_M]
+        near = [beacon for beacon in neighbours if apart(here, beacon.position) <= NEAR_M]
         looks = [(beacon, self._is_missed(observation, beacon)) for beacon in near]
         missed = {beacon.id: beacon.stamp_s for beacon, missed in looks if missed}
         if missed:
@@ -84,8 +86,12 @@ class SensorHealth:
         self._missed_s = missed
 
     def _update_stuck(self, observation: Observation) -> None:
-        if self._due_s and not observation.scans:
-            return
+        if not observation.scans:
+            if self._due_s:
+                return
+            if PROXIMITY not in self._noisy and not observation.obstacles:
+                self._reading, self._stuck = NO_READING, False
+                return
         reading = (
             observation.vehicles if PROXIMITY in self._noisy else (),
             observation.obstacles,
@@ -106,7 +112,7 @@ class SensorHealth:
         Without noise a reading changes only as the vehicle approaches a surface or leaves it, not
         along a wall.
         """
-        if dist(observation.position, read_at) <= MOVED_M:
+        if apart(observation.position, read_at) <= MOVED_M:
             return False
         if PROXIMITY in self._noisy or self._reading[2]:
             return True
@@ -140,7 +146,7 @@ class SensorHealth:
         self._vehicle_jumps.add(observation.time_s, observation.vehicles)
         return self._vehicle_jumps.wrong
 
-    def _is_missed(self, observation: Observation, beacon: Beacon) -> bool | None:
+    def _is_missed(self, observation: Observation, beacon: HeardBeacon) -> bool | None:
         """Whether a near neighbour is not sensed; None where its beacon is too old to tell."""
         here, there = observation.position, beacon.position
         age_s = max(0.0, observation.time_s - beacon.stamp_s)
@@ -148,4 +154,4 @@ class SensorHealth:
             return None
         slack = SLACK_M + self._max_speed * age_s
         away = (there[0] - here[0], there[1] - here[1], there[2] - here[2])
-        return all(dist(away, vehicle) > slack for vehicle in observation.vehicles)
+        return all(apart(away, vehicle) > slack for vehicle in observation.vehicles)

@@ -12,13 +12,13 @@ from typing import Final
 
 from agent.config import AgentSetup
 from agent.controller import Flown, Heard, Senses
+from agent.heard_beacon import HeardBranch
 from agent.messages import (
     DISTRESS,
     MAX_TEAM,
     MEMBER,
     SUB_VERTEX,
     VERTEX,
-    Branch,
     Place,
     Standing,
     Subtree,
@@ -328,7 +328,7 @@ class Structure:
         return standing
 
 
-def _branch(heard: Heard, vertex: int) -> Branch | None:
+def _branch(heard: Heard, vertex: int) -> HeardBranch | None:
     standing = heard.standing
     if standing is None or vertex >= len(standing.branches):
         return None

@@ -15,7 +15,9 @@ from math import dist, inf
 from typing import Final, final
 
 from agent.controller import Heard
+from agent.heard_beacon import HeardBranch
 from agent.messages import Branch, RootKey, Vector
+from agent.vectors import apart
 
 VERSIONS_PER_S: Final = 100.0
 REVIVAL_S: Final = 1.0
@@ -39,9 +41,10 @@ VOID_KEPT: Final = 32
 class Follower:
     """An agent heard, with its branch in this tree."""
 
-    def __init__(self, heard: Heard, branch: Branch) -> None:
+    def __init__(self, heard: Heard, branch: HeardBranch) -> None:
         self.heard = heard
-        self.root, self.version, self.tier, self.parent = branch
+        self.root, self.version = branch.root, branch.version
+        self.tier, self.parent = branch.tier, branch.parent
 
 
 def version_at(time_s: float) -> int:
@@ -198,7 +201,7 @@ def _leaves(here: Vector, velocity: Vector, other: Heard, horizon_s: float, reac
     """Whether another agent leaves the range within a time, if both fly on as now."""
     (x, y, z), (there_x, there_y, there_z) = here, other.position
     (u, v, w), (their_u, their_v, their_w) = velocity, other.velocity
-    away_m = dist(here, other.position)
+    away_m = apart(here, other.position)
     opening = (
         (there_x - x) * (their_u - u)
         + (there_y - y) * (their_v - v)

@@ -26,7 +26,7 @@ from agent.messages import (
 from agent.qstructure.formation import FormationSpec
 from agent.structure.label_code import FIRST_QUEUE
 from netem.wire.channels import LOCAL, MULTIHOP
-from tests.agent.comms.builders import beacon, gossip, record
+from tests.agent.comms.builders import beacon, gossip, heard_beacon, record
 from tests.agent.structure.builders import standing
 from tests.agent.test_core import TICK_S, observation
 from tests.random_flights.lies import Lies, liars_senses
@@ -309,18 +309,18 @@ def test_a_position_far_away_does_not_stretch_the_reach():
     neighbours = Neighbours(0, 20.0, 0.1)
     for sequence, liars_x in enumerate((2.0, 1e6, 2.0), start=1):
         now_s = 0.05 * sequence
-        neighbours.receive(beacon(LIAR, sequence, now_s, at=(liars_x, 0.0, 0.0)), now_s, {})
-        neighbours.receive(beacon(HONEST, sequence, now_s, at=(0.0, 3.0, 0.0)), now_s, {})
-        neighbours.receive(beacon(HONEST + 1, sequence, now_s, at=(0.0, 0.0, 1.0)), now_s, {})
+        neighbours.receive(heard_beacon(LIAR, sequence, now_s, at=(liars_x, 0.0, 0.0)), now_s, {})
+        neighbours.receive(heard_beacon(HONEST, sequence, now_s, at=(0.0, 3.0, 0.0)), now_s, {})
+        neighbours.receive(heard_beacon(HONEST + 1, sequence, now_s, at=(0.0, 0.0, 1.0)), now_s, {})
         neighbours.link((0.0, 0.0, 0.0))
     assert neighbours.link((0.0, 0.0, 0.0)).reach_m == 3.0
 
 
 def test_the_reach_of_two_is_what_the_nearer_shows_and_of_one_what_it_shows():
     neighbours = Neighbours(0, 20.0, 0.1)
-    neighbours.receive(beacon(3, 1, 0.0, at=(7.0, 0.0, 0.0)), 0.0, {})
+    neighbours.receive(heard_beacon(3, 1, 0.0, at=(7.0, 0.0, 0.0)), 0.0, {})
     assert neighbours.link((0.0, 0.0, 0.0)).reach_m == 7.0
-    neighbours.receive(beacon(4, 1, 0.0, at=(5.0, 0.0, 0.0)), 0.0, {})
+    neighbours.receive(heard_beacon(4, 1, 0.0, at=(5.0, 0.0, 0.0)), 0.0, {})
     assert neighbours.link((0.0, 0.0, 0.0)).reach_m == 5.0
-    neighbours.receive(beacon(4, 2, 0.05, at=(6.0, 0.0, 0.0)), 0.05, {})
+    neighbours.receive(heard_beacon(4, 2, 0.05, at=(6.0, 0.0, 0.0)), 0.05, {})
     assert neighbours.link((0.0, 0.0, 0.0)).reach_m == 6.0

@@ -13,7 +13,7 @@ import numpy as np
 from agent.config import AgentSetup, Comms, Control
 from agent.controller import Senses
 from agent.guidance.safety_monitor import SafetyMonitor
-from tests.agent.comms.builders import beacon
+from tests.agent.comms.builders import heard_beacon
 from tests.laws.kinds import DT, SLOTS, TICK_S, WISHES, anything
 from tests.laws.speck import SPECK
 from worldsim.truth.vehicle import Vehicles
@@ -104,7 +104,7 @@ class BlindFleet:
         self.sequence += 1
         cap = self.monitors[me].speed_cap
         self.promises[me].append((now_s, cap))
-        said = beacon(me, self.sequence, now_s, at=here, speed_cap=cap)
+        said = heard_beacon(me, self.sequence, now_s, at=here, speed_cap=cap)
         for other in range(len(self.vehicles)):
             if other != me and self.radio.carries(self.random, now_s):
                 self.flying.append((now_s + self.radio.delay_s, other, said))

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from agent.comms.neighbours import Neighbours
 from agent.controller import Senses, Words
+from agent.heard_beacon import HeardBeacon
 from agent.messages import (
     AGENT_IDS,
     MAX_CANDIDATES,
@@ -46,7 +47,7 @@ def liars_senses(own_id: int, heard: Sequence[Beacon], now_s: float) -> Senses:
     """Return what a liar knows that hears some beacons."""
     neighbours = Neighbours(own_id, BEACON_HZ, 0.1)
     for beacon in heard:
-        neighbours.receive(beacon, now_s, {})
+        neighbours.receive(HeardBeacon(beacon), now_s, {})
     return Senses(
         now_s=now_s,
         position=ZERO,

@@ -1,9 +1,9 @@
 """Virtual time: the whole fleet in one process, as fast as the host allows.
 
 The agents, the medium and the world are those of the processes, driven by the same slot loop. What
-an agent says by radio and commands is encoded and decoded, a payload that several agents hear once.
-The other messages are handed over as they are, since nobody can change them; in one slot of
-``CHECKED_EVERY`` they go through the codec too, as between processes, and must come out equal.
+an agent says by radio is encoded and decoded, a payload that several agents hear once. The other
+messages are handed over as they are, since nobody can change them; in one slot of ``CHECKED_EVERY``
+they go through the codec too, as between processes, and must come out equal.
 """
 
 from collections import deque
@@ -13,7 +13,7 @@ from functools import lru_cache
 from time import perf_counter, process_time
 from typing import Final, Protocol, TypeVar, assert_never
 
-from agent.codec import decode_beacon, decode_command, decode_gossip, decode_observation, encode
+from agent.codec import decode_command, decode_gossip, decode_observation, encode, hear_beacon
 from agent.core import Agent, Decoders
 from agent.messages import Observation
 from netem.faults import FaultOrder
@@ -49,6 +49,8 @@ PROGRESS_EVERY_S: Final = 0.5
 """[s; wall time]"""
 CHECKED_EVERY: Final = 61
 """A prime, so that each agent's turn comes: agents step in every fourth slot."""
+HEARD_AGAIN: Final = 16
+"""So many payloads are kept decoded for each agent: those of about a second."""
 _Message = TypeVar("_Message")
 
 
@@ -87,7 +89,8 @@ class VirtualFleet:
     ) -> None:
         self._watch = watch
         self._slot = 0
-        decoders = Decoders(lru_cache(4096)(decode_beacon), lru_cache(4096)(decode_gossip))
+        kept = HEARD_AGAIN * scenario.rows
+        decoders = Decoders(lru_cache(kept)(hear_beacon), lru_cache(kept)(decode_gossip))
         self._scenario = scenario
         self._medium = Medium(scenario.medium_setup())
         self._decoders = decoders
@@ -170,7 +173,9 @@ class VirtualFleet:
             _check_codec(transmission, unpack_transmission(pack(transmission)))
         self._medium.transmit(agent, now_s, transmission)
         command = encode(outbox.command)
-        self.loop.apply_command(agent, decode_command(command), command)
+        if checks:
+            _check_codec(outbox.command, decode_command(command))
+        self.loop.apply_command(agent, outbox.command, command)
 
     def _deliver(self, slot: int) -> None:
         """Put the batches of a slot into the inboxes of the agents that step in it."""

@@ -1,6 +1,7 @@
 """Builders of messages and members for tests: a test names only the fields that matter to it."""
 
 from agent.controller import Peer
+from agent.heard_beacon import HeardBeacon
 from agent.messages import HOME, MAX_PLACES, Beacon, Gossip, Place, Record
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -35,6 +36,11 @@ def beacon(sender, sequence, stamp_s, *, at=ORIGIN, echoes=(), **fields):
         echoes=tuple(echoes),
         **{**defaults, **fields},
     )
+
+
+def heard_beacon(sender, sequence, stamp_s, **fields):
+    """Return a beacon as its receivers use it."""
+    return HeardBeacon(beacon(sender, sequence, stamp_s, **fields))
 
 
 def record(subject, version, stamp_s=0.0, *, incarnation=0, at=ORIGIN, queue=-1, rank=-1):

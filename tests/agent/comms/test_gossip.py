@@ -9,15 +9,14 @@ from hypothesis import strategies as st
 
 from agent.codec import decode_gossip, encode
 from agent.comms.gossip import FRAME_HEAD_B, RecordTable
-from agent.comms.neighbours import version_of
 from agent.messages import MAX_TEAM, Place
 from netem.wire.channels import MAX_PAYLOAD_B
 from netem.wire.frame import MAX_OUTGOING
 from tests.agent.comms.builders import (
     LATE_S,
-    beacon,
     gossip,
     greatest_record,
+    heard_beacon,
     peer,
     record,
 )
@@ -40,10 +39,6 @@ def table(own=OWN):
 def adopted(known, *records, now_s=1.0):
     known.adopt(gossip(9, 1.0, records), now_s, SLACK_S)
     return known
-
-
-def adopt_beacon(known, said):
-    known.adopt_beacon(said, version_of(said))
 
 
 def content(known, now_s=1.0):
@@ -125,7 +120,7 @@ def test_a_rejected_record_does_not_block_a_later_one():
 
 def test_a_beacon_counts_as_a_record():
     known = table()
-    adopt_beacon(known, beacon(3, 7, 1.0, at=(1.0, 2.0, 3.0)))
+    known.adopt_beacon(heard_beacon(3, 7, 1.0, at=(1.0, 2.0, 3.0)))
     assert content(known)[3] == record(3, 7, 1.0, at=(1.0, 2.0, 3.0))
     adopted(known, record(3, 6, 0.9))
     assert content(known)[3].version == 7
@@ -137,7 +132,7 @@ def test_the_team_is_all_known_members_in_order_of_ids():
     known = adopted(
         table(own=4), record(7, 1, queue=1, rank=2), record(2, 1, at=(1.0, 0.0, 0.0), queue=0)
     )
-    adopt_beacon(known, beacon(5, 1, 1.0))
+    known.adopt_beacon(heard_beacon(5, 1, 1.0))
     team = known.team(peer(4))
     assert [each.id for each in team] == [2, 4, 5, 7]
     assert team[0].position == (1.0, 0.0, 0.0)
@@ -147,7 +142,7 @@ def test_the_team_is_all_known_members_in_order_of_ids():
 
 def test_a_neighbour_that_fell_silent_is_dropped():
     known = table()
-    adopt_beacon(known, beacon(3, 7, 10.0))
+    known.adopt_beacon(heard_beacon(3, 7, 10.0))
     known.forget_silent(20.0, {3})
     assert 3 in content(known), "a neighbour's silence is judged by Neighbours"
     known.forget_silent(20.0, {4})
@@ -171,7 +166,7 @@ def test_a_subject_known_by_relay_may_be_silent_for_as_long_as_relays_take():
 
 def test_old_records_do_not_bring_back_a_departed_agent():
     known = table()
-    adopt_beacon(known, beacon(3, 7, 10.0))
+    known.adopt_beacon(heard_beacon(3, 7, 10.0))
     known.forget_silent(12.0, ())
     for version in (1, 6, 7):
         adopted(known, record(3, version, 10.0), now_s=12.0)
@@ -183,7 +178,7 @@ def test_old_records_do_not_bring_back_a_departed_agent():
 def test_a_team_that_relays_records_forgets_a_departed_agent():
     """All relay to all, with loss: after the relayed silence no agent knows the departed one."""
     random, team = Random(11), [table(own) for own in range(1, 8)]
-    adopt_beacon(team[0], beacon(99, 500, 0.0))
+    team[0].adopt_beacon(heard_beacon(99, 500, 0.0))
     for index in range(1, 60):
         now_s = index * ROUND_S
         for own, known in enumerate(team, start=1):

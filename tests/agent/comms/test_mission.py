@@ -9,7 +9,7 @@ from agent.comms.reported_frame import MAX_EXTRAPOLATION_S
 from agent.messages import AT_HOME, HOME, NO_MISSION, Drift, FramePath, Mission, Pose
 from agent.qstructure.formation import FormationSpec
 from agent.rejection import RejectedError
-from tests.agent.comms.builders import beacon
+from tests.agent.comms.builders import heard_beacon
 
 NOW_S = 3.0
 PATH = FramePath(waypoints=((1.0, 0.0, 0.0), (9.0, 0.0, 0.0)), speed=0.5)
@@ -66,23 +66,23 @@ def test_what_was_heard_is_passed_on(briefed, unbriefed):
 
 
 def test_a_frame_without_any_mission_means_nothing(briefed, unbriefed):
-    unbriefed.receive_frame(beacon(0, 1, NOW_S, mission=SECOND, frame_key=SECOND, **DRIFTING))
+    unbriefed.receive_frame(heard_beacon(0, 1, NOW_S, mission=SECOND, frame_key=SECOND, **DRIFTING))
     assert unbriefed.flown_at(NOW_S) is None
     assert unbriefed.frame_report(NOW_S) == (HOME, None)
     far_ahead = 40 * KEYS_PER_VERSION
-    unbriefed.receive_frame(beacon(0, 2, NOW_S, mission=far_ahead, frame_key=far_ahead))
+    unbriefed.receive_frame(heard_beacon(0, 2, NOW_S, mission=far_ahead, frame_key=far_ahead))
     hear(unbriefed, briefed)
     assert unbriefed.flown_at(NOW_S).frame.origin == (2.5, 0.0, 0.0)
 
 
 def test_with_an_older_mission_the_stamped_frame_is_flown_until_its_mission_comes(briefed):
-    briefed.receive_frame(beacon(1, 1, NOW_S, mission=SECOND, frame_key=SECOND, **DRIFTING))
+    briefed.receive_frame(heard_beacon(1, 1, NOW_S, mission=SECOND, frame_key=SECOND, **DRIFTING))
     assert (briefed.key, briefed.frame_key) == (0, SECOND)
     assert briefed.flown_at(NOW_S + 2.0).frame.origin == (8.0, 0.0, 0.0)
 
 
 def test_a_frame_that_is_heard_of_no_more_comes_to_rest_where_it_was_last_expected(briefed):
-    briefed.receive_frame(beacon(1, 1, NOW_S, mission=SECOND, frame_key=SECOND, **DRIFTING))
+    briefed.receive_frame(heard_beacon(1, 1, NOW_S, mission=SECOND, frame_key=SECOND, **DRIFTING))
     moving = briefed.flown_at(NOW_S + MAX_EXTRAPOLATION_S).frame
     resting = briefed.flown_at(NOW_S + MAX_EXTRAPOLATION_S + 60.0).frame
     assert moving.moves
@@ -92,7 +92,7 @@ def test_a_frame_that_is_heard_of_no_more_comes_to_rest_where_it_was_last_expect
 
 def test_a_beacon_of_an_agent_without_a_mission_changes_nothing(briefed):
     before = briefed.flown_at(NOW_S)
-    silent = beacon(1, 1, NOW_S, mission=NO_MISSION, frame_key=NO_MISSION, **DRIFTING)
+    silent = heard_beacon(1, 1, NOW_S, mission=NO_MISSION, frame_key=NO_MISSION, **DRIFTING)
     briefed.receive_frame(silent)
     after = briefed.flown_at(NOW_S)
     assert (after.key, after.frame.origin) == (before.key, before.frame.origin)

@@ -7,7 +7,7 @@ from agent.comms.mission import FIRST_VERSIONS, KEYS_PER_VERSION, Missions
 from agent.comms.reported_frame import MAX_EXTRAPOLATION_S
 from agent.messages import HOME, NO_MISSION, Branch, Drift, Mission, Pose, RootKey, Standing
 from agent.rejection import RejectedError
-from tests.agent.comms.builders import beacon
+from tests.agent.comms.builders import heard_beacon
 from tests.agent.comms.test_mission import NOW_S, PATH, RAY, SECOND
 
 ALONG_X = (0.3, 0.0, 0.0, 0.0)
@@ -23,7 +23,7 @@ def report(sender, stamp_s, x_m, drift=ALONG_X, **fields):
     """Return a beacon of an agent of tier 1 that reports a frame at x; drift None: at rest."""
     made = {"standing": standing(1), "frame": Pose(x_m, 0.0, 0.0, 0.0), **fields}
     moving = None if drift is None else Drift(made.pop("of_s", stamp_s), *drift)
-    return beacon(sender, 1, stamp_s, drift=moving, **made)
+    return heard_beacon(sender, 1, stamp_s, drift=moving, **made)
 
 
 @pytest.fixture

@@ -18,11 +18,11 @@ from agent.comms.unidentified_vehicles import (
     UnidentifiedVehicles,
 )
 from agent.messages import PROXIMITY_RANGE_M
-from tests.agent.comms.builders import ORIGIN, beacon
+from tests.agent.comms.builders import ORIGIN, heard_beacon
 
 VEHICLE = (1.0, 0.0, 0.0)
 FAR_MEMBER = MemberPosition(id=5, position=(-2.0, 0.0, 0.0), age_s=0.0)
-BEACONS = [beacon(5, 1, 10.0, at=FAR_MEMBER.position)]
+BEACONS = [heard_beacon(5, 1, 10.0, at=FAR_MEMBER.position)]
 
 
 def surroundings(now_s, sensed=(VEHICLE,), team=(FAR_MEMBER,), here=ORIGIN, **fields):
@@ -63,7 +63,7 @@ def test_a_member_may_be_anywhere_within_the_distance_flown_since_its_report():
 def test_a_vehicle_beyond_all_neighbours_may_be_out_of_the_radios_range():
     known = UnidentifiedVehicles(0.5)
     for now_s in (10.0, 12.0, 14.0):
-        beacons = [beacon(5, 1, 10.0, at=(0.5, 0.0, 0.0))]
+        beacons = [heard_beacon(5, 1, 10.0, at=(0.5, 0.0, 0.0))]
         assert updated(known, now_s, beacons=beacons) == ()
 
 
@@ -82,7 +82,7 @@ def test_a_vehicle_is_remembered_out_of_sight_but_not_where_it_would_be_sensed(a
 def test_the_last_survivor_takes_the_dead_vehicle_for_unidentified():
     known = UnidentifiedVehicles(0.5)
     alive = MemberPosition(6, VEHICLE, 0.0)
-    assert updated(known, 10.0, team=(alive,), beacons=[beacon(6, 1, 10.0, at=VEHICLE)]) == ()
+    assert updated(known, 10.0, team=(alive,), beacons=[heard_beacon(6, 1, 10.0, at=VEHICLE)]) == ()
     gone = [DepartedMember(VEHICLE, 10.0)]
     assert updated(known, 11.6, team=(), beacons=[], departed=gone) == (VEHICLE,)
     assert updated(known, 11.6 + 2 * RECENT_S, team=(), beacons=[]) == (VEHICLE,)
@@ -90,7 +90,7 @@ def test_the_last_survivor_takes_the_dead_vehicle_for_unidentified():
 
 def test_a_vehicle_farther_than_any_member_was_heard_from_is_not_judged():
     known = UnidentifiedVehicles(0.5)
-    near = [beacon(5, 1, 10.0, at=(0.5, 0.0, 0.0))]
+    near = [heard_beacon(5, 1, 10.0, at=(0.5, 0.0, 0.0))]
     for now_s, beacons in ((10.0, near), (12.0, []), (14.0, near)):
         assert updated(known, now_s, team=(), beacons=beacons) == ()
 
@@ -261,14 +261,14 @@ def test_a_neighbour_that_would_sense_a_remembered_vehicle_and_reports_none_is_b
         identified(),
         12.0,
         here=AWAY,
-        beacons=[beacon(5, 1, 12.2, at=(1.0, away_m, 0.0))],
+        beacons=[heard_beacon(5, 1, 12.2, at=(1.0, away_m, 0.0))],
         reports_vehicle=lambda *_: reports,
     )
     assert forgotten_s == pytest.approx(REMEMBERED_S if reports else MISSED_S, abs=2 * STEP_S)
 
 
 def test_a_neighbour_out_of_the_sensors_range_contradicts_nothing():
-    witness = beacon(5, 1, 12.2, at=(1.0, PROXIMITY_RANGE_M, 0.0))
+    witness = heard_beacon(5, 1, 12.2, at=(1.0, PROXIMITY_RANGE_M, 0.0))
     forgotten_s = forgotten_after_s(
         identified(), 12.0, here=AWAY, beacons=[witness], reports_vehicle=lambda *_: False
     )

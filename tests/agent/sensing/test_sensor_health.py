@@ -10,7 +10,7 @@ from agent.messages import NO_ECHO_MM, Observation, Scan
 from agent.sensing.ray_pattern import pattern_of
 from agent.sensing.scan_jumps import READINGS, VehicleJumps
 from agent.sensing.sensor_health import LOOKS, PROXIMITY, SensorHealth
-from tests.agent.comms.builders import beacon
+from tests.agent.comms.builders import heard_beacon
 
 LASER = pattern_of("laser", Sensors(coverage="planar"), 20.0)
 
@@ -116,7 +116,7 @@ def test_missing_scans_are_noticed():
 def test_a_neighbour_near_by_must_be_sensed(vehicles, trusted):
     watch = sensor_health()
     for look in range(LOOKS):
-        there = beacon(1, look, stamp_s=0.01 * look, at=(1.0, 0.0, 0.0))
+        there = heard_beacon(1, look, stamp_s=0.01 * look, at=(1.0, 0.0, 0.0))
         watch.compare(observation(0, vehicles=vehicles), [there])
     assert watch.update(observation(0, vehicles=vehicles)) is trusted
 
@@ -124,8 +124,8 @@ def test_a_neighbour_near_by_must_be_sensed(vehicles, trusted):
 def test_old_beacons_and_far_neighbours_prove_nothing():
     watch = sensor_health()
     old, far = (
-        beacon(1, 1, stamp_s=0.0, at=(1.0, 0.0, 0.0)),
-        beacon(2, 1, stamp_s=2.0, at=(1.5, 0.0, 0.0)),
+        heard_beacon(1, 1, stamp_s=0.0, at=(1.0, 0.0, 0.0)),
+        heard_beacon(2, 1, stamp_s=2.0, at=(1.5, 0.0, 0.0)),
     )
     for _ in range(2 * LOOKS):
         watch.compare(observation(40), [old, far])
@@ -134,9 +134,9 @@ def test_old_beacons_and_far_neighbours_prove_nothing():
 
 def test_a_blind_sensor_is_trusted_again_once_it_senses_a_neighbour():
     watch, vehicle = sensor_health(), ((1.0, 0.0, 0.0),)
-    there, gone = (beacon(1, 1, stamp_s=0.0, at=(x, 0.0, 0.0)) for x in (1.0, 5.0))
+    there, gone = (heard_beacon(1, 1, stamp_s=0.0, at=(x, 0.0, 0.0)) for x in (1.0, 5.0))
     for look in range(LOOKS):
-        speaking = beacon(1, look, stamp_s=0.01 * look, at=(1.0, 0.0, 0.0))
+        speaking = heard_beacon(1, look, stamp_s=0.01 * look, at=(1.0, 0.0, 0.0))
         watch.compare(observation(0), [speaking])
     for _ in range(2 * LOOKS):
         watch.compare(observation(0), [gone])
@@ -164,7 +164,7 @@ def test_jumping_scans_are_wrong_and_quiet_ones_are_right_again():
 
 def test_a_departed_neighbour_is_missed_once_and_proves_no_blind_sensor():
     watch = sensor_health()
-    gone = beacon(1, 7, 1.0, at=(1.0, 0.0, 0.0))
+    gone = heard_beacon(1, 7, 1.0, at=(1.0, 0.0, 0.0))
     for tick in range(20, 40, 2):
         watch.compare(observation(tick), [gone])
         assert watch.update(observation(tick))

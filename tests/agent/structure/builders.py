@@ -6,6 +6,7 @@ import msgspec
 
 from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.controller import Heard, Link
+from agent.heard_beacon import HeardStanding
 from agent.messages import ZERO, LeaderSummary, RootKey, Standing, Subtree
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
@@ -81,7 +82,7 @@ def heard(
         target=at,
         place=place,
         cost_m=cost_m,
-        standing=standing(**fields),
+        standing=HeardStanding(standing(**fields)),
         hears_me=hears_me,
     )
 
