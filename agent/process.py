@@ -6,7 +6,9 @@ Observations pace the process and carry the time; the core reads no clock.
 import sys
 import time
 from collections.abc import Callable
+from math import inf
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 
@@ -19,15 +21,33 @@ from netem.wire.access import AccessError, login_of
 from netem.wire.barrier import LockstepError
 from netem.wire.bus import Bus, RefusedError
 from netem.wire.keys import Keys, agent_name
-from netem.wire.session import SessionError, open_client
+from netem.wire.session import OPEN_TIMEOUT_S, SessionError, open_client
 from netem.wire.shutdown import RunEnd, StopRequest
 
 WAIT_S = 0.2
 SILENCE_S = 30.0
+A_DAY_S = 24 * 3600.0
 SETUP_WITHIN_S = 30.0
 ASK_EVERY_S = 0.1
 LISTEN_EVERY_S = 0.005
 MAX_SETUP_B = 256 * 1024
+
+
+class Patience(NamedTuple):
+    """How long an agent waits for others that are silent."""
+
+    long_lease: bool = False
+    """Whether its session survives a long pause of its own process."""
+    open_within_s: float = OPEN_TIMEOUT_S
+    silence_s: float = SILENCE_S
+
+
+BY_HAND = Patience()
+
+
+def launched(long_lease: bool) -> Patience:
+    """Return the patience of an agent that a launcher ends: it waits while netem is down."""
+    return Patience(long_lease, open_within_s=A_DAY_S, silence_s=inf)
 
 
 class WorldGoneError(RuntimeError):
@@ -38,7 +58,7 @@ def run(
     agent: int,
     run_name: str,
     connect: str,
-    patient: bool = False,
+    patience: Patience = BY_HAND,
     users: Path | None = None,
     row: "memoryview[int] | None" = None,
 ) -> int:
@@ -51,7 +71,7 @@ def run(
     except ValueError as error:
         return _failed(agent, error, 2)
     try:
-        return fly(agent, keys, connect, patient, users, row)
+        return fly(agent, keys, connect, patience, users, row)
     except (WorldGoneError, LockstepError) as error:
         return _failed(agent, error, 1)
     except (AccessError, SessionError, RefusedError, ControllerError) as error:
@@ -67,26 +87,27 @@ def fly(
     agent: int,
     keys: Keys,
     connect: str,
-    patient: bool = False,
+    patience: Patience = BY_HAND,
     users: Path | None = None,
     row: "memoryview[int] | None" = None,
 ) -> int:
     """Fly one agent of a run until the run is over; return 0.
 
-    patient: whether the session survives a long pause of this process. users: the file of
-    passwords, if the router wants one. row: of a StepPage, for this agent's
-    steps. Raises SessionError without a router, AccessError without a
-    password, RefusedError if the world has no such agent, ControllerError if its controller cannot
-    be loaded, WorldGoneError if the world is not there, LockstepError for a message out of turn.
+    users: the file of passwords, if the router wants one. row: of a StepPage, for this agent's
+    steps. Raises SessionError without a router, AccessError without a password, RefusedError if the
+    world has no such agent, ControllerError if its controller cannot be loaded, WorldGoneError if
+    the world is not there, LockstepError for a message out of turn.
     """
     login = login_of(users, agent_name(agent)) if users is not None else None
-    with open_client(connect, long_lease=patient, login=login) as session:
+    lease, within_s = patience.long_lease, patience.open_within_s
+    with open_client(connect, within_s, long_lease=lease, login=login) as session:
         stop = StopRequest()
         bus = Bus(session, keys)
         setup = _setup(bus, agent, keys.run, stop)
         if setup is not None:
             guard = StepGuard(row, 1.0 / setup.tick_hz)
-            _run_shell(bus, setup, guard, RunEnd(bus.subscriber("over"), stop), keys.run)
+            ending = RunEnd(bus.subscriber("over"), stop)
+            _run_shell(bus, setup, guard, ending, patience.silence_s)
     return 0
 
 
@@ -118,14 +139,16 @@ def _checked_setup(answer: bytes) -> AgentSetup:
         raise WorldGoneError(f"the world sent a setup that cannot be decoded: {error}") from error
 
 
-def _run_shell(bus: Bus, setup: AgentSetup, guard: StepGuard, ending: RunEnd, run: str) -> None:
+def _run_shell(
+    bus: Bus, setup: AgentSetup, guard: StepGuard, ending: RunEnd, silence_s: float
+) -> None:
     shell = (
         LockstepAgent(bus, setup, guard) if setup.lockstep else FreeRunningAgent(bus, setup, guard)
     )
     _wait_for_listener(bus, ending)
     bus.declare_alive(f"agent-{setup.id}")
-    print(f"agent-{setup.id} flies in run {run!r}", flush=True)
-    _step_until_over(shell, run, ending)
+    print(f"agent-{setup.id} flies in run {bus.run!r}", flush=True)
+    _step_until_over(shell, bus.run, ending, silence_s)
     shell.report()
     print(f"agent-{setup.id} is done", flush=True)
 
@@ -139,7 +162,9 @@ def _wait_for_listener(bus: Bus, ending: RunEnd) -> None:
         time.sleep(LISTEN_EVERY_S)
 
 
-def _step_until_over(shell: FreeRunningAgent | LockstepAgent, run: str, ending: RunEnd) -> None:
+def _step_until_over(
+    shell: FreeRunningAgent | LockstepAgent, run: str, ending: RunEnd, most_silence_s: float
+) -> None:
     """Step on each of the shell's inputs until the run is over.
 
     Silence is counted in waits, not on a clock: a process that was stopped for a minute has not
@@ -153,8 +178,8 @@ def _step_until_over(shell: FreeRunningAgent | LockstepAgent, run: str, ending: 
             shell.observe(data)
             continue
         silent_s += WAIT_S
-        if silent_s > SILENCE_S:
-            raise WorldGoneError(f"the world of run {run!r} was silent for {SILENCE_S:g} s")
+        if silent_s > most_silence_s:
+            raise WorldGoneError(f"the world of run {run!r} was silent for {most_silence_s:g} s")
 
 
 def _printed_once(text: str) -> Callable[[], None]:

@@ -12,7 +12,18 @@ from typing import Final, NamedTuple, TypeVar, assert_never
 
 import msgspec
 
-from netem.faults import FaultOrder, Flap, Heal, Jam, LastingFault, Partition, Position, Sabotage
+from netem.faults import (
+    FaultOrder,
+    Flap,
+    Heal,
+    Jam,
+    LastingFault,
+    Outage,
+    OutageCause,
+    Partition,
+    Position,
+    Sabotage,
+)
 from netem.link_model import LinkModel
 from netem.link_parameters import RATE_KEYS, Conditions, LinkKeys
 from netem.range_index import InRange
@@ -148,6 +159,7 @@ class NetworkConditions:
         self._jams: dict[int, Jam] = {}
         self._flaps: dict[int, tuple[float, Flap]] = {}
         """With the start of each [s; simulated time]."""
+        self._outages: dict[int, OutageCause] = {}
         self.conditions = base
         """The base conditions with all changes in force."""
         self.models = LinkModels(base)
@@ -174,6 +186,21 @@ class NetworkConditions:
     def flapping(self) -> bool:
         """Whether a flap is in force."""
         return bool(self._flaps)
+
+    @property
+    def outages(self) -> Mapping[int, OutageCause]:
+        """The causes of the outages in force, by number: while there are any, no message passes."""
+        return self._outages
+
+    def orders(self) -> tuple[FaultOrder, ...]:
+        """Return the orders that bring the faults in force into force again, without outages."""
+        return tuple(
+            [
+                FaultOrder.begin(number, since_s, fault)
+                for number, (since_s, fault) in self._in_force.items()
+                if number not in self._outages
+            ]
+        )
 
     def apply(self, order: FaultOrder) -> None:
         """Begin or end a fault. The end of a fault that is not in force changes nothing."""
@@ -233,7 +260,7 @@ class NetworkConditions:
 
     def _refresh(self) -> None:
         """Derive the effects of the faults in force."""
-        self._partitions, self._jams, self._flaps = {}, {}, {}
+        self._partitions, self._jams, self._flaps, self._outages = {}, {}, {}, {}
         changes: dict[int, Conditions] = {}
         for number, (since_s, fault) in self._in_force.items():
             match fault:
@@ -247,6 +274,8 @@ class NetworkConditions:
                     self._flaps[number] = since_s, fault
                 case Sabotage():
                     pass  # it sends frames of its own, and changes no link
+                case Outage(cause=cause):
+                    self._outages[number] = cause
                 case _:
                     assert_never(fault)
         conditions = self._changed(changes.values())

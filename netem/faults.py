@@ -22,6 +22,7 @@ FlapPeriod = Annotated[float, Meta(ge=0.05, le=86_400)]
 Group = Annotated[tuple[AgentId, ...], Meta(min_length=1, max_length=1000)]
 Groups = Annotated[tuple[Group, ...], Meta(min_length=1, max_length=1000)]
 PartitionKind = Literal["clean", "one_way", "bridge", "ring"]
+OutageCause = Literal["kill", "pause"]
 
 
 class Partition(Table, frozen=True):
@@ -77,12 +78,24 @@ class Sabotage(SabotageKeys[Victims], frozen=True):
     """Sabotage of the radios of given agents."""
 
 
+class Outage(msgspec.Struct, frozen=True):
+    """The radio's own processes are down; they are the router too, so no message passes.
+
+    kill: frames in flight are lost, and what the medium remembers of its links. pause: frames in
+    flight are delayed.
+    """
+
+    cause: OutageCause
+
+
 class Heal(msgspec.Struct, frozen=True):
     """The end of every partition in force."""
 
 
-LastingFault = Conditions | Partition | Jam | Flap | Sabotage
-"""A fault that stays in force until it ends. Conditions are the link keys that change."""
+KeyedFault = Conditions | Partition | Jam | Flap | Sabotage
+"""A fault that has a key of its own in an event. Conditions are the link keys that change."""
+LastingFault = KeyedFault | Outage
+"""A fault that stays in force until it ends."""
 RadioFault = LastingFault | Heal
 """The effect of one event on the radio."""
 
@@ -111,7 +124,7 @@ class RadioKeys(
     sabotage: SabotageTable | None = None
 
     @property
-    def radio_fault(self) -> RadioFault | None:
+    def radio_fault(self) -> KeyedFault | Heal | None:
         """The fault whose key is set; None where there is none, or one of unknown victims."""
         if self.partition is not None and not isinstance(self.partition, Partition):
             return Partition(groups=self.partition)
@@ -124,7 +137,7 @@ class RadioEvent(RadioKeys[Sabotage], frozen=True, kw_only=True):
     """One radio fault under its key; exactly one key is set."""
 
     @staticmethod
-    def of(fault: RadioFault) -> "RadioEvent":
+    def of(fault: KeyedFault | Heal) -> "RadioEvent":
         """Return a fault under its key."""
         match fault:
             case Partition():
@@ -148,7 +161,7 @@ class RadioEvent(RadioKeys[Sabotage], frozen=True, kw_only=True):
         return next((key for key in keys if getattr(self, key) is not None), "")
 
     @property
-    def radio_fault(self) -> RadioFault | None:
+    def radio_fault(self) -> KeyedFault | Heal | None:
         """The fault whose key is set; None where there is none."""
         return self.sabotage or super().radio_fault
 
@@ -166,9 +179,20 @@ class FaultOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
     at_s: Annotated[float, Meta(ge=0, le=1e9)]
     """When the fault begins or ends [s; simulated time]."""
     event: RadioEvent | None = None
-    """The fault that begins; None: the fault of that number ends."""
+    """The fault that begins."""
+    outage: OutageCause | None = None
+    """The outage that begins; without an event and an outage, the fault of that number ends."""
+
+    @staticmethod
+    def begin(number: int, at_s: float, fault: RadioFault) -> "FaultOrder":
+        """Return the order that begins a fault."""
+        if isinstance(fault, Outage):
+            return FaultOrder(number, at_s, outage=fault.cause)
+        return FaultOrder(number, at_s, RadioEvent.of(fault))
 
     @property
     def fault(self) -> RadioFault | None:
         """The fault that begins; None where one ends."""
+        if self.outage is not None:
+            return Outage(self.outage)
         return self.event.radio_fault if self.event is not None else None

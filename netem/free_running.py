@@ -60,7 +60,8 @@ class Intake:
     """Decides which transmissions the medium takes, and counts rejected ones by cause."""
 
     def __init__(self, setup: MediumSetup) -> None:
-        self.rejected: Counter[str] = Counter()
+        before = setup.resumes.counters if setup.resumes is not None else None
+        self.rejected = Counter(before.rejected if before is not None else {})
         """Number of rejected messages by cause."""
         self.incarnations: tuple[int, ...] = (0,) * setup.agents
         """Row i = agent i's current incarnation, from the newest truth."""
@@ -123,7 +124,7 @@ class FreeRunningMedium:
         self._faults = FaultQueue()
         self._report = bus.publisher("verdicts")
         self._report_every = max(1, round(setup.slot_hz))
-        self._slot = 0
+        self._slot = setup.resumes.slot if setup.resumes is not None else 0
 
     def play(self, inputs: list[bytes]) -> None:
         """Play the slots whose truths have arrived, oldest first."""

@@ -121,6 +121,8 @@ class LockstepMedium:
 
     def _queue_batches(self, slot_input: SlotInput) -> None:
         """Queue the frames due in the next slot for the agents of its group."""
+        if self._medium.down:
+            return
         slot, step = slot_input.truth.slot + 1, self._setup.slots_per_tick
         for agent in range(slot % step, self._setup.agents, step):
             if agent in self._own and slot_input.truth.positions[agent] is not None:

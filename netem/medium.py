@@ -15,10 +15,10 @@ import msgspec
 
 from netem.conditions import NetworkConditions, differing
 from netem.delivery_log import FATE, HEAD, DeliveryLog
-from netem.faults import FaultOrder, Position, Sabotage
+from netem.faults import FaultOrder, Outage, Position, Sabotage
 from netem.link import LOST_TO_PARTITION, LOST_TO_QUEUE, Cause, Links, Sending, Verdict
 from netem.link_model import LinkModel
-from netem.messages import MediumCounters, MediumSetup
+from netem.messages import NEW_RUN, MediumCounters, MediumSetup
 from netem.range_index import InRange, RangeIndex
 from netem.rate_queue import RateQueue
 from netem.saboteur import Saboteur
@@ -28,6 +28,7 @@ from netem.wire.frame import (
     FRAME_HEAD_B,
     MAX_BATCH_B,
     MAX_FRAMES,
+    MAX_OUTGOING,
     Frame,
     Transmission,
 )
@@ -74,6 +75,15 @@ class Medium:
         self._delivery_log = DeliveryLog(setup.agents)
         self._sent_b = [0] * (len(CHANNELS) * setup.agents)
         self.sent = self.addressed = self.in_flight = self.duplicated = self.corrupted = 0
+        resumes = setup.resumes or NEW_RUN
+        self._first_count = resumes.slot * MAX_OUTGOING
+        """Above the count of every frame that an earlier medium of the run has seen."""
+        self._next_forged += self._first_count
+        for order in resumes.orders:
+            self.apply(order)
+        self._miss(resumes.slot / setup.slot_hz)
+        if resumes.counters is not None:
+            self._count_on(resumes.counters)
 
     def place(self, positions: tuple[Position | None, ...]) -> None:
         """Set the positions, row i = agent i [m; world frame]; None where there is no radio."""
@@ -84,20 +94,33 @@ class Medium:
                     self.discard(receiver)
 
     def apply(self, order: FaultOrder) -> None:
-        """Begin or end a fault, between slots; frames that are in flight are not affected."""
+        """Begin or end a fault, between slots; of all faults only a kill affects frames in flight.
+
+        A kill takes them, and what is remembered of links and queues, as the process's end does.
+        """
         self._conditions.apply(order)
         number, fault = order.number, order.fault
         if isinstance(fault, Sabotage):
             self._saboteurs[number] = Saboteur(self._seed, number, order.at_s, fault)
         elif fault is None:
             self._saboteurs.pop(number, None)
+        elif isinstance(fault, Outage) and fault.cause == "kill":
+            self._links = Links(self._seed)
+            self._rate_queues.clear()
+            for receiver in self._own:
+                self.discard(receiver)
+
+    @property
+    def down(self) -> bool:
+        """Whether an outage is in force: no frame is sent or collected."""
+        return bool(self._conditions.outages)
 
     def transmit(self, source: int, sent_s: float, transmission: Transmission) -> None:
         """Send one agent's frames of one slot at ``sent_s`` [s]: decide their fate on each link."""
         incarnation = transmission.incarnation
         for outgoing in transmission.frames:
             count_key = (source, incarnation, outgoing.channel)
-            count = self._counts.get(count_key, 0)
+            count = self._counts.get(count_key, self._first_count)
             self._counts[count_key] = count + 1
             self._send(
                 Frame(source, incarnation, outgoing.channel, count, outgoing.payload), sent_s
@@ -108,6 +131,9 @@ class Medium:
 
     def sabotage(self, now_s: float) -> None:
         """Send the saboteurs' frames of the slot that began at ``now_s`` [s], after all agents'."""
+        if self.down:
+            self._miss(now_s)
+            return
         for number, saboteur in self._saboteurs.items():
             for forged in saboteur.due(now_s):
                 if self._range_index.positions[forged.victim] is None:
@@ -121,6 +147,11 @@ class Medium:
                 )
                 received = self.in_flight - before
                 self._struck[number] = self._struck.get(number, 0) + received
+
+    def _miss(self, now_s: float) -> None:
+        """Lose the saboteurs' frames that are due by a time [s]."""
+        for saboteur in self._saboteurs.values():
+            saboteur.miss(now_s)
 
     def collect(
         self, receiver: int, now_s: float, due_s: list[float] | None = None
@@ -144,11 +175,20 @@ class Medium:
         return tuple([entry[-1] for entry in taken])
 
     def discard(self, receiver: int) -> None:
-        """Drop the frames in flight to a receiver that has disappeared."""
+        """Drop the frames in flight to a receiver that has disappeared, or to all at a kill."""
         lost = len(self._queues[receiver])
         self._queues[receiver].clear()
         self.in_flight -= lost
         self._fates[Cause.DROPPED_MEDIUM] += lost
+
+    def _count_on(self, counters: MediumCounters) -> None:
+        """Continue the counters of an earlier medium of the run."""
+        self.sent, self.addressed = counters.sent, counters.addressed
+        self.duplicated, self.corrupted = counters.duplicated, counters.corrupted
+        self._fates = [counters.fates.get(fate, 0) for fate in FATES]
+        self._struck = dict(counters.struck)
+        if counters.sent_b:
+            self._sent_b = list(counters.sent_b)
 
     def digest(self) -> bytes:
         """End the slot in the delivery log; return the hash over all verdicts of the run.

@@ -37,38 +37,6 @@ class FaultOrders(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     orders: tuple[FaultOrder, ...]
 
 
-class MediumSetup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Everything that a medium needs before its first slot."""
-
-    seed: Count
-    agents: Annotated[int, Meta(ge=1, lt=2**16)]
-    """Number of agents, those that join later included; their ids are 0 to agents - 1."""
-    slots_per_tick: Annotated[int, Meta(ge=1, le=64)]
-    slot_hz: Annotated[float, Meta(gt=0, le=1e5)]
-    """Slots per simulated second."""
-    conditions: Conditions
-    """Link conditions at the start of the run."""
-    speed: Annotated[float, Meta(gt=0, le=1e4)] = 1.0
-    """Simulated seconds per second of wall time."""
-    lockstep: bool = False
-    receivers: tuple[AgentId, ...] | None = None
-    """The agents that this shard of the medium delivers to; None: all."""
-
-
-class Truth(
-    msgspec.Struct, frozen=True, kw_only=True, array_like=True, gc=False, forbid_unknown_fields=True
-):
-    """True positions at the start of a slot."""
-
-    slot: Count
-    time_s: Annotated[float, Meta(ge=0, le=1e9)]
-    """[s; simulated time]"""
-    positions: tuple[Position | None, ...]
-    """Row i = agent i [m; world frame]; None where the agent has no vehicle or no process."""
-    incarnations: tuple[Count, ...] = ()
-    """Row i = agent i's current incarnation; empty in lockstep, where SlotInput holds them."""
-
-
 class MediumCounters(
     msgspec.Struct, frozen=True, kw_only=True, array_like=True, gc=False, forbid_unknown_fields=True
 ):
@@ -110,6 +78,60 @@ class MediumCounters(
             "corrupted": self.corrupted,
             "in_flight": self.in_flight,
         }
+
+    def after_kill(self) -> "MediumCounters":
+        """Return the counters once the medium's process was killed: its frames are lost."""
+        lost = self.fates.get("dropped_medium", 0) + self.in_flight
+        fates = {**self.fates, "dropped_medium": lost}
+        return msgspec.structs.replace(self, fates=fates, in_flight=0)
+
+
+class Resumption(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the medium of a run needs of the one before it, whose process has ended."""
+
+    slot: Count
+    """The next slot to play."""
+    orders: tuple[FaultOrder, ...] = ()
+    """Bring the faults in force into force again."""
+    counters: MediumCounters | None = None
+    """Of the earlier medium; nothing is in flight any more."""
+
+
+NEW_RUN = Resumption(0)
+
+
+class MediumSetup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Everything that a medium needs before its first slot."""
+
+    seed: Count
+    agents: Annotated[int, Meta(ge=1, lt=2**16)]
+    """Number of agents, those that join later included; their ids are 0 to agents - 1."""
+    slots_per_tick: Annotated[int, Meta(ge=1, le=64)]
+    slot_hz: Annotated[float, Meta(gt=0, le=1e5)]
+    """Slots per simulated second."""
+    conditions: Conditions
+    """Link conditions at the start of the run."""
+    speed: Annotated[float, Meta(gt=0, le=1e4)] = 1.0
+    """Simulated seconds per second of wall time."""
+    lockstep: bool = False
+    receivers: tuple[AgentId, ...] | None = None
+    """The agents that this shard of the medium delivers to; None: all."""
+    resumes: Resumption | None = None
+    """Where the medium goes on; None: at the start of a run."""
+
+
+class Truth(
+    msgspec.Struct, frozen=True, kw_only=True, array_like=True, gc=False, forbid_unknown_fields=True
+):
+    """True positions at the start of a slot."""
+
+    slot: Count
+    time_s: Annotated[float, Meta(ge=0, le=1e9)]
+    """[s; simulated time]"""
+    positions: tuple[Position | None, ...]
+    """Row i = agent i [m; world frame]; None where the agent has no vehicle or no process."""
+    incarnations: tuple[Count, ...] = ()
+    """Row i = agent i's current incarnation; empty in lockstep, where SlotInput holds them."""
 
 
 class SlotInput(

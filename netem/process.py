@@ -5,6 +5,8 @@ medium; shard 0 is the router, and the others are its clients.
 """
 
 import sys
+from math import inf
+from typing import NamedTuple
 
 import msgspec
 import zenoh
@@ -34,6 +36,18 @@ USUAL_BY_HAND = 512
 
 class SilenceError(RuntimeError):
     """No message from the world has arrived for SILENCE_S."""
+
+
+class ServingOptions(NamedTuple):
+    """How a medium treats other processes that are silent."""
+
+    long_lease: bool = False
+    """Whether it keeps the sessions of those that are silent for long."""
+    patient: bool = False
+    """Whether it waits for the world without end: a launcher ends it."""
+
+
+BY_HAND = ServingOptions()
 
 
 class SetupServer:
@@ -88,11 +102,14 @@ class SetupServer:
 
 
 def run(
-    endpoint: str, shard: int = 0, long_lease: bool = False, access: AccessControl | None = None
+    endpoint: str,
+    shard: int = 0,
+    options: ServingOptions = BY_HAND,
+    access: AccessControl | None = None,
 ) -> int:
     """Serve at an endpoint; print an error as one line. Return the exit status."""
     try:
-        return serve(endpoint, shard, long_lease, access)
+        return serve(endpoint, shard, options, access)
     except (AccessError, SessionError) as error:
         return _failed(shard, error, 2)
     except (SilenceError, LockstepError) as error:
@@ -105,17 +122,20 @@ def _failed(shard: int, error: Exception, status: int) -> int:
 
 
 def serve(
-    endpoint: str, shard: int = 0, long_lease: bool = False, access: AccessControl | None = None
+    endpoint: str,
+    shard: int = 0,
+    options: ServingOptions = BY_HAND,
+    access: AccessControl | None = None,
 ) -> int:
     """Serve as the medium of the first run that asks; return 0 at its end.
 
-    Shard 0 listens as the router at the endpoint; the others connect to it. long_lease: keep the
-    sessions of processes that are silent for long. access: None allows everything.
+    Shard 0 listens as the router at the endpoint; the others connect to it. access: None allows
+    everything.
 
     Raises SessionError when it cannot listen or connect, AccessError without a password,
     SilenceError when the world is gone, LockstepError when a message is missing or of another slot.
     """
-    with _opened(endpoint, shard, long_lease, access) as session:
+    with _opened(endpoint, shard, options.long_lease, access) as session:
         stop = StopRequest()
         state = "is connected to" if shard else "listens at"
         print(f"{medium_name(shard)} {state} {endpoint}, for one run", flush=True)
@@ -126,7 +146,8 @@ def serve(
             limiter.enforce()
             server.wait(WAIT_S)
         if server.run is not None and server.setup is not None:
-            _serve_run(Bus(session, Keys(server.run)), server, limiter, stop)
+            silence_s = inf if options.patient else SILENCE_S
+            _serve_run(Bus(session, Keys(server.run)), server, limiter, stop, silence_s)
     return 0
 
 
@@ -140,7 +161,11 @@ def _opened(
 
 
 def _serve_run(
-    bus: Bus, server: SetupServer, limiter: ConnectionLimiter, stop: StopRequest
+    bus: Bus,
+    server: SetupServer,
+    limiter: ConnectionLimiter,
+    stop: StopRequest,
+    silence_s: float,
 ) -> None:
     name, setup = medium_name(server.shard), server.setup
     assert setup is not None  # as the server serves a run
@@ -155,7 +180,7 @@ def _serve_run(
     )
     bus.declare_alive(name)
     try:
-        _play(medium, truths, server, limiter, ending)
+        _play(medium, truths, server, limiter, ending, silence_s)
     except RunOverError:
         print(f"{name}: the run is over, within a slot", flush=True)
     else:
@@ -171,6 +196,7 @@ def _play(
     server: SetupServer,
     limiter: ConnectionLimiter,
     ending: RunEnd,
+    most_silence_s: float,
 ) -> None:
     """Play slots until the run is over, those that arrived before its end included."""
     silent_s = 0.0
@@ -182,7 +208,7 @@ def _play(
         first = truths.wait(WAIT_S) if not ended else None
         medium.play(([first] if first is not None else []) + truths.drain(TRUTH_RING))
         silent_s = 0.0 if first is not None else silent_s + WAIT_S
-        if silent_s > SILENCE_S:
+        if silent_s > most_silence_s:
             raise SilenceError(
-                f"no message from the world of run {server.run!r} for {SILENCE_S:g} s"
+                f"no message from the world of run {server.run!r} for {most_silence_s:g} s"
             )

@@ -68,18 +68,27 @@ class Saboteur:
                 again = Forged(source, transmission.incarnation, channel, payload)
                 self._to_repeat.append((sent_s + self._sabotage.delay_s, again))
 
+    def miss(self, now_s: float) -> None:
+        """Forget the frames that are due by a time [s]: nobody sends them."""
+        self._repeated(now_s)
+        self._sent = self._number_by(now_s)
+
     def due(self, now_s: float) -> Iterator[Forged]:
         """Yield the frames that are due by a time [s], each once."""
         if self._sabotage.kind == "replay":
             yield from self._repeated(now_s)
             return
         first = self._sent
-        self._sent = int((now_s - self._since_s) * self._sabotage.per_s + 1e-6)
+        self._sent = self._number_by(now_s)
         for number in range(first, self._sent):
             for victim in self._incarnations:
                 forged = self._forged(victim, number)
                 if forged is not None:
                     yield forged
+
+    def _number_by(self, now_s: float) -> int:
+        """Return how many frames of each victim are due by a time [s]."""
+        return int((now_s - self._since_s) * self._sabotage.per_s + 1e-6)
 
     def _repeated(self, now_s: float) -> list[Forged]:
         """Return the frames to repeat by a time [s]; of one time, by victim."""

@@ -169,6 +169,26 @@ class Liveliness:
         return departed
 
 
+class PendingQuery:
+    """A query on its way; asking for its reply never waits."""
+
+    def __init__(self, replies: Handler[zenoh.Reply]) -> None:
+        self._replies = replies
+
+    def answered(self) -> bool | None:
+        """Return whether a process has accepted the query; None while that is open.
+
+        Raises :class:`RefusedError` when the reply is an error.
+        """
+        try:
+            reply = self._replies.try_recv()
+        except zenoh.ZError:  # no process has received it
+            return False
+        if reply is None or reply.ok is not None:
+            return None if reply is None else True
+        return _refuse_unless_timeout(reply)
+
+
 class Bus:
     """One process's access to the topics of one run.
 
@@ -176,6 +196,8 @@ class Bus:
     """
 
     def __init__(self, session: zenoh.Session, keys: Keys) -> None:
+        self.run = keys.run
+        """The run's name."""
         self._session = session
         self._keys = keys
         self._tokens: list[zenoh.LivelinessToken] = []
@@ -232,8 +254,20 @@ class Bus:
         """
         key = self._keys.of(topic, owner)
         for reply in self._session.get(key, payload=payload, timeout=timeout_s):
-            if reply.err is not None and reply.err.payload.to_string() != QUERY_TIMEOUT:
-                raise RefusedError(reply.err.payload.to_string())
             if reply.ok is not None:
                 return reply.ok.payload.to_bytes()
+            _refuse_unless_timeout(reply)
         return None
+
+    def begin_query(self, topic: str, payload: bytes, timeout_s: float) -> PendingQuery:
+        """Send a query; its reply is awaited by :meth:`PendingQuery.answered`."""
+        return PendingQuery(
+            self._session.get(self._keys.of(topic), payload=payload, timeout=timeout_s)
+        )
+
+
+def _refuse_unless_timeout(reply: zenoh.Reply) -> bool:
+    """Return False for a query without a reply in time; raise RefusedError for another error."""
+    if reply.err is not None and reply.err.payload.to_string() != QUERY_TIMEOUT:
+        raise RefusedError(reply.err.payload.to_string())
+    return False

@@ -59,6 +59,18 @@ sabotage = { kind = "replay", agents = [0], delay_s = 0.7 }
 [[event]]
 at_s = 3.5
 sabotage = { kind = "spoof", agents = ["vertex:V1"] }
+[[event]]
+at_s = 2.25
+kill = ["netem"]
+for_s = 0.5
+[[event]]
+at_s = 5.1
+pause = ["netem"]
+for_s = 0.3
+[[event]]
+at_s = 5.5
+pause = ["world"]
+for_s = 0.2
 """
 
 

@@ -108,7 +108,7 @@ def measured(scenario: Scenario) -> Flown:
     """Fly a scenario slot by slot, and measure each slot."""
     fleet, seen = VirtualFleet(scenario), Measured(Obstacles(scenario.obstacle))
     world = fleet.loop.world
-    while world.slot < scenario.slots:
+    while world.slot < scenario.slots and fleet.ended_by is None:
         fleet.slot()
         seen.see(world.vehicles.position, world.time_s, fleet.loop.members.running)
     fleet.loop.finish()

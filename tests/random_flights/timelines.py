@@ -32,6 +32,7 @@ class Timeline:
         draw = self._draw
         kinds: list[tuple[int, Callable[[], Tables]]] = [
             (5, self._process),
+            (1, self._other_process),
             (2, lambda: {"join": self._join()}),
             (6, lambda: fault(draw, self._agents, self._spacing)),
             (2, lambda: {"formation": self._formation()}),
@@ -70,6 +71,11 @@ class Timeline:
     def _process(self) -> Tables:
         kind = self._draw.among(("kill", "kill", "leave", "pause", "restart", "resume"))
         return {kind: self._selectors(by_place=kind not in ("restart", "resume"))}
+
+    def _other_process(self) -> Tables:
+        """Netem down, or the world paused: its kill would leave nothing to look at."""
+        made: Tables = {self._draw.among(("kill", "pause")): ["netem"]}
+        return made if self._draw.chance(0.8) else {"pause": ["world"], "for_s": 0.1}
 
     def _selectors(self, by_place: bool) -> list[int | str]:
         draw, agents = self._draw, self._agents

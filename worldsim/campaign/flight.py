@@ -65,7 +65,7 @@ def finished(flight: Flight, scenario: Scenario) -> FinishedRun:
         medium_counters=flight.medium_counters,
         late_tick_fraction=0.0,
         real_time_factor=world.time_s / flight.wall_s,
-        cut_off_by="interrupted" if world.slot < scenario.slots else None,
+        cut_off_by=(flight.ended_by or "interrupted") if world.slot < scenario.slots else None,
     )
 
 

@@ -202,6 +202,9 @@ def _print_radio(run: Path) -> int:
     answer = ask(run, Request())
     in_force: dict[str, list[dict[str, Any]]] = {}
     for active in answer.faults:
+        if active.outage is not None:
+            found = {"name": active.name, "since_s": active.since_s, "cause": active.outage}
+            in_force.setdefault("outage", []).append(found)
         for kind, keys in msgspec.to_builtins(active.fault).items():
             if kind != "netem":  # the conditions below include it
                 found = {"name": active.name, "since_s": active.since_s, **keys}

@@ -16,23 +16,35 @@ from worldsim.engine.operations import (
     ResumeProcesses,
     SetSensorMode,
     StartProcesses,
+    StopWorldProcess,
 )
 from worldsim.judge.event import By
+from worldsim.scenario.selectors import ProcessName
 
 
 class FaultReport:
     """One fault of a run.
 
     number: of its event, as in events.jsonl; kind: the event's key; from_s: when it began [s];
-    to_s: when it ended [s], None while it is in force; agents: those that it struck, ascending.
+    to_s: when it ended [s], None while it is in force; agents: those that it struck, ascending;
+    process: netem's or the world's, of a fault that struck that one. observations: how many did not
+    pass while netem was down; stopped_s: how long the world stood still [s; wall time].
     """
 
     def __init__(
-        self, number: int, kind: str, from_s: float, by: By, agents: Sequence[int]
+        self,
+        number: int,
+        kind: str,
+        from_s: float,
+        by: By,
+        agents: Sequence[int],
+        process: ProcessName | None = None,
     ) -> None:
         self.number, self.kind, self.from_s, self.by = number, kind, from_s, by
         self.agents = sorted(agents)
+        self.process = process
         self.to_s: float | None = None
+        self.observations, self.stopped_s = 0, 0.0
         self._held = set(agents)
 
     def release(self, agents: Collection[int], t_s: float) -> None:
@@ -64,6 +76,7 @@ class FaultReports:
 
         Agents that an earlier fault holds down are struck too: this one may hold them for longer.
         """
+        self._take_stop(operation, t_s, by)
         match operation:
             case EndProcesses():
                 kind = "leave" if operation.leaves else "kill"
@@ -88,6 +101,29 @@ class FaultReports:
             case _:
                 return
         self.all.append(FaultReport(operation.number, kind, t_s, by, agents))
+
+    def _take_stop(self, operation: Operation, t_s: float, by: By) -> None:
+        """Take the beginning of a fault of netem's processes or the world's."""
+        match operation:
+            case StopWorldProcess(number=number, cause=cause):
+                report = FaultReport(number, cause, t_s, by, (), "world")
+                # The world's clock stands still meanwhile: by it a pause takes no time.
+                report.to_s = t_s if cause == "pause" else None
+                self.all.append(report)
+            case FaultOrder(number=number, outage=cause) if cause is not None:
+                self.all.append(FaultReport(number, cause, t_s, by, (), "netem"))
+
+    def withhold(self, numbers: Collection[int], observations: int) -> None:
+        """Note that the outages of these numbers kept observations from their agents."""
+        for each in self.all:
+            if each.number in numbers:
+                each.observations += observations
+
+    def note_standstill(self, number: int, stopped_s: float) -> None:
+        """Note that the world stood still for a pause [s; wall time]."""
+        for each in self.all:
+            if each.number == number:
+                each.stopped_s += stopped_s
 
     def end(self, number: int, t_s: float) -> None:
         """Note that the time of a fault is over [s]; its agents may be held down by others."""

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 from agent.messages import FramePath, Vector
 from agent.qstructure.formation import FormationSpec
-from netem.faults import FaultOrder
+from netem.faults import FaultOrder, OutageCause
 from worldsim.scenario.faults import AgentFault, FailureMode
 from worldsim.scenario.selectors import Selectors
 
@@ -111,6 +111,16 @@ class DisturbAgents(NamedTuple):
         return self.fault.agents
 
 
+class StopWorldProcess(NamedTuple):
+    """Stop the world's own process."""
+
+    number: int
+    """The event's number."""
+    cause: OutageCause
+    for_s: float
+    """How long a pause lasts [s]; of wall time at speed 1."""
+
+
 class GiveMission(NamedTuple):
     """Give the team a mission, by way of one agent."""
 
@@ -126,4 +136,5 @@ class GiveMission(NamedTuple):
 
 
 ProcessOperation = EndProcesses | PauseProcesses | ResumeProcesses | StartProcesses | AdmitAgents
-Operation = ProcessOperation | SetSensorMode | DisturbAgents | FaultOrder | GiveMission
+AgentOperation = ProcessOperation | SetSensorMode | DisturbAgents
+Operation = AgentOperation | StopWorldProcess | FaultOrder | GiveMission

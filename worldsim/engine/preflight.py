@@ -11,7 +11,8 @@ from agent.checked_controller import described
 from agent.controller import ControllerError
 from agent.controller import load as load_controller
 from netem.compiled import UnloadableError
-from worldsim.scenario.faults import Join, ProcessFault
+from netem.faults import Outage
+from worldsim.scenario.faults import Join, ProcessFault, StopWorld
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.rules import speed_problem
 from worldsim.scenario.start import BoxStart
@@ -46,7 +47,7 @@ def admit(scenario: Scenario, file: str | Path, command_ticks: int, by_hand: boo
 def _launcher(scenario: Scenario) -> Problem | None:
     """Return a problem for the first event that needs a launcher."""
     for index, event in enumerate(scenario.event):
-        if isinstance(event.action, ProcessFault):
+        if isinstance(event.action, ProcessFault | StopWorld | Outage):
             return Problem(
                 f"event[{index}].{event.kind}",
                 "needs the launcher (qswarm run): processes started by hand are ended by hand",

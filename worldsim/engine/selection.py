@@ -9,6 +9,7 @@ from agent.qstructure.formation import Formation
 from worldsim.scenario.selectors import (
     AllAgents,
     OneAgent,
+    OtherProcess,
     QueueAgents,
     RandomAgents,
     Selector,
@@ -79,6 +80,8 @@ def _selected(
             return claims.of_vertex(name, candidates.running)
         case QueueAgents(name):
             return claims.of_queue(name, candidates.running)
+        case OtherProcess():
+            return []  # event_checks allows it in the events of processes of no agent only
     assert_never(kind)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from agent.messages import Command, Mission, Observation, Vector
 from worldsim.engine.counters import RadioUse, RejectionCounters
-from worldsim.engine.operations import Operation, StartProcesses
+from worldsim.engine.operations import Operation, StartProcesses, StopWorldProcess
 from worldsim.engine.queue_neighbours import QueueNeighbours
 from worldsim.engine.telemetry import FleetTelemetry
 from worldsim.engine.timeline_effects import TimelineEffects
@@ -90,7 +90,8 @@ def world_of(scenario: Scenario, command_ticks: int) -> World:
 class SlotLoop:
     """Steps a world slot by slot, and passes every tick to the judge and the recorder.
 
-    packets: returns the medium's packet counters; called once a tick.
+    packets: returns the medium's packet counters; called once a tick. real_outages: whether an
+    outage strikes real processes; otherwise it withholds the observations here.
     """
 
     def __init__(
@@ -99,7 +100,9 @@ class SlotLoop:
         world: World,
         recorder: Recorder | None = None,
         packets: Callable[[], Packets] = dict,
+        real_outages: bool = False,
     ) -> None:
+        self._real_outages = real_outages
         self.world = world
         self.judge = Judge(scenario)
         self.trace = Trace()
@@ -126,7 +129,10 @@ class SlotLoop:
 
     def apply(self, operation: Operation, by: By = None) -> None:
         """Apply an operation that was carried out, and report its events, requested ``by``."""
+        stopped = bool(self.network.outages) or _is_pause_of_world(operation)
         self.effects.apply(operation, by)
+        if stopped and not self.network.outages and not self._real_outages:
+            self.effects.reconnect()
         if isinstance(operation, StartProcesses):
             for agent in operation.incarnations:
                 self._telemetry.forget(agent)
@@ -140,6 +146,9 @@ class SlotLoop:
         slots, running = world.clock.slots_per_tick, self.members.running.tolist()
         rows = range(world.slot % slots, len(running), slots)
         group = [agent for agent in rows if running[agent]]
+        if self.network.outages:
+            self.effects.faults.withhold(self.network.outages.keys(), len(group))
+            group = group if self._real_outages else []
         observations = list(zip(group, world.observe(group), strict=True)) if group else []
         for agent, observation in observations:
             self._headings[agent] = observation.yaw
@@ -225,6 +234,10 @@ class SlotLoop:
         self.figures = self.judge.see(tick)
         if self._recorder is not None and self._records_ticks:
             self._recorder.tick(tick, self.figures)
+
+
+def _is_pause_of_world(operation: Operation) -> bool:
+    return isinstance(operation, StopWorldProcess) and operation.cause == "pause"
 
 
 def _is_vertex(place: tuple[int, int] | None) -> bool:

@@ -10,7 +10,7 @@ from typing import Literal, assert_never
 from agent.messages import NO_MISSION
 from agent.qstructure.formation import FormationSpec, formation_of
 from netem.conditions import NetworkConditions
-from netem.faults import FaultOrder, RadioEvent, RadioFault, Sabotage
+from netem.faults import FaultOrder, RadioFault, Sabotage
 from worldsim.engine.agent_fault_effects import AgentFaultEffects
 from worldsim.engine.fault_reports import FaultReports
 from worldsim.engine.membership import Membership
@@ -25,6 +25,7 @@ from worldsim.engine.operations import (
     ResumeProcesses,
     SetSensorMode,
     StartProcesses,
+    StopWorldProcess,
 )
 from worldsim.engine.selection import Claims
 from worldsim.judge.event import By
@@ -37,10 +38,12 @@ from worldsim.judge.run_events import (
     Killed,
     Left,
     Paused,
+    Reconnected,
     Restarted,
     Resumed,
     RunEvent,
     SensorChanged,
+    WorldStopped,
 )
 from worldsim.scenario.faults import (
     AgentFault,
@@ -54,6 +57,7 @@ from worldsim.scenario.faults import (
     Resume,
     SabotageFault,
     SensorFault,
+    StopWorld,
 )
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.target_frame import FrameChange
@@ -123,8 +127,9 @@ class TimelineEffects:
                 return self.members.sensor_fault(number, action, step.ends, self._claims)
             case FormationSpec() | FrameChange() if not step.ends:
                 return self.missions.changed(action, step.at_s)
-            case FormationSpec() | FrameChange() | EndFault():
-                return None  # an event that ends a fault put the fault's end into the timeline
+            case FormationSpec() | FrameChange() | EndFault() | StopWorld():
+                # An event that ends a fault put the fault's end into the timeline.
+                return _stop_world(step)
         assert_never(action)
 
     def apply(self, operation: Operation, by: By = None) -> None:
@@ -146,12 +151,19 @@ class TimelineEffects:
                 self._set_sensors(operation, by)
             case DisturbAgents():
                 self._disturb(operation, by)
-            case FaultOrder():
-                self._emit(applied(operation, self.network, self._t_s, by))
+            case FaultOrder() | StopWorldProcess():
+                self._emit(self._applied(operation, by))
             case GiveMission():
                 self._give(operation, by)
             case _:
                 assert_never(operation)
+
+    def _applied(self, operation: FaultOrder | StopWorldProcess, by: By) -> RunEvent:
+        """Apply an order to the radio; return the event that reports it, or a stop of the world."""
+        if isinstance(operation, FaultOrder):
+            return applied(operation, self.network, self._t_s, by)
+        cause = operation.cause
+        return WorldStopped(t_s=self._t_s, agent=None, planned=True, by=by, cause=cause)
 
     def _repeated_by(self, operation: Operation) -> By:
         """Return by whom a fault of the timeline happens again; None for the scenario and ends."""
@@ -162,11 +174,19 @@ class TimelineEffects:
                 begins = mode is not None
             case DisturbAgents(ends=ends):
                 begins = not ends
-            case FaultOrder(event=event):
-                begins = event is not None
+            case FaultOrder(fault=fault):
+                begins = fault is not None
             case _:
                 return None
         return "operator" if begins and self.timeline.is_operators(operation.number) else None
+
+    def reconnect(self, after_s: float = 0.0, missing: tuple[int, ...] = ()) -> None:
+        """Report that every agent is observed again, but for those that are missing.
+
+        after_s: since the end of the outage [s; simulated time].
+        """
+        after_s = round(after_s, 6)
+        self._emit(Reconnected(t_s=self._t_s, agent=None, after_s=after_s, missing=missing))
 
     def record_exit(self, agent: int, signal: int | None, status: int | None) -> None:
         """Record that an agent's process ended unplanned, by a signal or with a status."""
@@ -183,9 +203,10 @@ class TimelineEffects:
         return Claims(self.places, self._formation)
 
     def _fault_order(self, step: Step, fault: RadioFault) -> FaultOrder | None:
-        event = None if step.ends else RadioEvent.of(fault)
-        order = FaultOrder(number=step.number, at_s=step.at_s, event=event)
-        return None if step.ends and not self.network.ends(order) else order
+        if not step.ends:
+            return FaultOrder.begin(step.number, step.at_s, fault)
+        order = FaultOrder(step.number, step.at_s)
+        return order if self.network.ends(order) else None
 
     def _sabotage(self, number: int, fault: SabotageFault) -> Sabotage:
         """Return sabotage of the agents that its selectors select now."""
@@ -272,6 +293,14 @@ class TimelineEffects:
                 tables=mission.formation,
             )
         )
+
+
+def _stop_world(step: Step) -> StopWorldProcess | None:
+    """Return the operation of the beginning of a stop of the world; None for other steps."""
+    action = step.event.action
+    if step.ends or not isinstance(action, StopWorld):
+        return None
+    return StopWorldProcess(step.number, action.cause, action.for_s or 0.0)
 
 
 def _start_event(kind: Literal["restart", "join"]) -> type[Restarted | Joined]:

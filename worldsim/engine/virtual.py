@@ -39,12 +39,14 @@ from worldsim.engine.operations import (
     ResumeProcesses,
     SetSensorMode,
     StartProcesses,
+    StopWorldProcess,
 )
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
 from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
 from worldsim.judge.run_events import RunEvent
 from worldsim.scenario.tables import Scenario
 
+WORLD_KILLED: Final = "the world was killed"
 PROGRESS_EVERY_S: Final = 0.5
 """[s; wall time]"""
 CHECKED_EVERY: Final = 61
@@ -66,6 +68,8 @@ class Flight:
     """Wall time [s]."""
     cpu_s: float
     """CPU time of this process [s]."""
+    ended_by: str | None = None
+    """What in the scenario ended the run before its time."""
 
 
 class StepWatch(Protocol):
@@ -87,6 +91,8 @@ class VirtualFleet:
         recorder: Recorder | None = None,
         watch: StepWatch | None = None,
     ) -> None:
+        self.ended_by: str | None = None
+        """What in the scenario ends the run before its time; None: nothing so far."""
         self._watch = watch
         self._slot = 0
         kept = HEARD_AGAIN * scenario.rows
@@ -111,10 +117,15 @@ class VirtualFleet:
         return self._medium.counters(self.loop.world.slot)
 
     def slot(self) -> None:
-        """Run one slot: operations before it, positions, steps, batches of the next, motion."""
+        """Run one slot: operations before it, positions, steps, batches of the next, motion.
+
+        Where an operation ends the run, the slot is not run.
+        """
         for operation in self.loop.due():
             self.carry_out(operation)
             self.loop.apply(operation)
+            if self.ended_by is not None:
+                return
         open_slot = self.loop.open()
         self._slot = open_slot.slot
         self._medium.place(open_slot.positions)
@@ -137,6 +148,9 @@ class VirtualFleet:
                     self._agents[agent] = self._new_agent(agent, incarnation)
             case FaultOrder():
                 self._medium.apply(operation)
+            case StopWorldProcess(cause=cause):
+                # In a pause simulated time stands still: nothing happens meanwhile.
+                self.ended_by = WORLD_KILLED if cause == "kill" else None
             case PauseProcesses() | ResumeProcesses() | AdmitAgents():
                 pass  # the slot loop decides which agents step
             case SetSensorMode() | DisturbAgents() | GiveMission():
@@ -179,6 +193,8 @@ class VirtualFleet:
 
     def _deliver(self, slot: int) -> None:
         """Put the batches of a slot into the inboxes of the agents that step in it."""
+        if self._medium.down:
+            return
         clock = self.loop.world.clock
         alive, time_s = self.loop.members.alive.tolist(), clock.time_s(slot)
         for agent in range(slot % clock.slots_per_tick, len(alive), clock.slots_per_tick):
@@ -208,7 +224,7 @@ def fly(
     fleet = VirtualFleet(scenario, recorder, watch)
     wall, cpu = perf_counter(), process_time()
     reported, progress_at = 0, wall + PROGRESS_EVERY_S
-    while fleet.loop.world.slot < scenario.slots and not should_stop():
+    while fleet.loop.world.slot < scenario.slots and not should_stop() and not fleet.ended_by:
         fleet.slot()
         while on_event is not None and reported < len(fleet.loop.events):
             on_event(fleet.loop.events[reported])
@@ -223,4 +239,5 @@ def fly(
         rejected=fleet.rejected,
         wall_s=perf_counter() - wall,
         cpu_s=process_time() - cpu,
+        ended_by=fleet.ended_by,
     )

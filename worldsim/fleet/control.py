@@ -12,7 +12,7 @@ import numpy as np
 import zenoh
 
 from agent.comms.mission import last_version
-from netem.faults import FaultOrder, RadioEvent, Sabotage
+from netem.faults import FaultOrder, LastingFault, Outage, OutageCause, RadioEvent, Sabotage
 from netem.link_parameters import Conditions
 from netem.wire.bus import Bus, Handler, drain
 from worldsim.engine.operations import (
@@ -25,6 +25,7 @@ from worldsim.engine.operations import (
     ResumeProcesses,
     SetSensorMode,
     StartProcesses,
+    StopWorldProcess,
 )
 from worldsim.engine.step import SlotLoop
 from worldsim.judge.event import By
@@ -32,7 +33,7 @@ from worldsim.judge.run_events import RunEvent
 from worldsim.scenario.decoding import decode
 from worldsim.scenario.event_checks import problem_now
 from worldsim.scenario.events import EventTable
-from worldsim.scenario.faults import MissionChange, ProcessFault
+from worldsim.scenario.faults import MissionChange, ProcessFault, StopWorld
 from worldsim.scenario.foreseen_fleet import FleetNow
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.timeline import Step
@@ -63,7 +64,16 @@ class ActiveFault(msgspec.Struct, frozen=True):
     """By which it can be ended."""
     since_s: float
     """When it began [s; simulated time]."""
-    fault: RadioEvent
+    fault: RadioEvent = RadioEvent()
+    outage: OutageCause | None = None
+    """Instead of a fault: netem is down."""
+
+    @staticmethod
+    def of(number: int, name: str, since_s: float, fault: LastingFault) -> "ActiveFault":
+        """Return a fault in force."""
+        if isinstance(fault, Outage):
+            return ActiveFault(number, name, since_s, outage=fault.cause)
+        return ActiveFault(number, name, since_s, RadioEvent.of(fault))
 
 
 class Answer(msgspec.Struct, frozen=True):
@@ -128,7 +138,7 @@ class Control:
         problem = problem_now(self._scenario, event, self._fleet_now())
         if problem is not None:
             raise RequestError(": ".join(part for part in problem if part))
-        if isinstance(event.action, ProcessFault) and not self._launcher:
+        if isinstance(event.action, ProcessFault | StopWorld | Outage) and not self._launcher:
             raise RequestError(f"{event.kind}: this fleet has no launcher; do it by hand")
         return event
 
@@ -192,7 +202,7 @@ class Control:
                 return operation._replace(to=request.to, version=request.version)
             case FaultOrder(event=RadioEvent(sabotage=Sabotage(agents=()))):
                 raise RequestError(f"{kind}: no such agent has a radio now")
-            case FaultOrder() | SetSensorMode() | AdmitAgents():
+            case FaultOrder() | SetSensorMode() | AdmitAgents() | StopWorldProcess():
                 return operation
         assert_never(operation)
 
@@ -216,7 +226,7 @@ class Control:
     def _answer(self, events: list[RunEvent], name: str | None) -> Answer:
         network = self._loop.network
         faults = tuple(
-            ActiveFault(number, self._timeline.name_of(number), since_s, RadioEvent.of(fault))
+            ActiveFault.of(number, self._timeline.name_of(number), since_s, fault)
             for number, (since_s, fault) in network.in_force.items()
         )
         t_s = round(self._loop.world.time_s, 6)

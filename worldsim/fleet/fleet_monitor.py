@@ -22,12 +22,14 @@ from worldsim.fleet.ipc import (
     LauncherToZygote,
     MessageError,
     Notice,
+    OtherProcessRequest,
     ProcessesMissing,
     Progress,
     RunFailed,
     RunOver,
     Stalled,
 )
+from worldsim.fleet.planned_stops import WORLD, PlannedStops
 from worldsim.fleet.process_table import ProcessTable
 from worldsim.fleet.terminal import Terminal
 
@@ -67,6 +69,10 @@ class FleetMonitor:
         """Whether exits are expected from now on."""
         self.failed = False
         """Whether the run cannot go on."""
+        self.stops: PlannedStops | None = None
+        """Carries out planned stops of netem and the world; None: there are none."""
+        self.world_exit: str | None = None
+        """How the world ended before the run was over; None: it did not."""
         self._zygote, self._world = sockets
         self._terminal = terminal
         self._table = table
@@ -112,7 +118,15 @@ class FleetMonitor:
             return
         if not self.all_present:
             raise self._start_error(name, process_exit)
-        self._fail(f"{name} {process_exit}")
+        planned = self.stops is not None and self.stops.was_planned(name)
+        if name == WORLD:
+            self.world_exit = f"the world {process_exit} at about {self._time_s:.1f} s"
+        if planned:
+            ends = "; the run ends" if name == WORLD else ""
+            text = f"{name} {process_exit} at about {self._time_s:.1f} s (scheduled){ends}"
+            self._terminal.print(text)
+        else:
+            self._fail(f"{name} {process_exit}")
 
     def report_missing(self) -> None:
         """Print now and then which processes are still missing."""
@@ -161,7 +175,7 @@ class FleetMonitor:
             case Progress():
                 self._time_s = message.time_s
                 self._terminal.show(message)
-            case ActionRequest():
+            case ActionRequest() | OtherProcessRequest():
                 self._relay(message)
             case ProcessesMissing(names=names):
                 self._missing = names
@@ -174,8 +188,12 @@ class FleetMonitor:
             case _:
                 assert_never(message)
 
-    def _relay(self, request: ActionRequest) -> None:
-        """Send a request of the world to the zygote, the parent of the agents."""
+    def _relay(self, request: ActionRequest | OtherProcessRequest) -> None:
+        """Send a request of the world to the zygote, the parent of the agents, or carry it out."""
+        if isinstance(request, OtherProcessRequest):
+            if self.stops is not None and not self.run_over:
+                self.stops.carry_out(request)
+            return
         if request.action == "kill":
             self._expected_exits.update(request.processes)
         self._table.note_action(request.action, request.processes)

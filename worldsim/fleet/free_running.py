@@ -10,12 +10,12 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import assert_never
 
-import msgspec
+import numpy as np
 
 from agent.codec import decode_command, encode
 from agent.rejection import RejectedError
 from netem.faults import FaultOrder
-from netem.messages import FaultOrders, MediumCounters, Truth
+from netem.messages import MediumCounters, Truth
 from netem.wire.bus import Bus
 from netem.wire.frame import WireError, pack, unpack
 from worldsim.engine.operations import (
@@ -28,6 +28,7 @@ from worldsim.engine.operations import (
     ResumeProcesses,
     SetSensorMode,
     StartProcesses,
+    StopWorldProcess,
 )
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS
 from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
@@ -36,11 +37,14 @@ from worldsim.fleet.culprits import Culprits
 from worldsim.fleet.delivery_latency import DeliveryLatency, LatencyCollector
 from worldsim.fleet.ipc import AgentProcess
 from worldsim.fleet.launcher_link import LauncherLink
+from worldsim.fleet.netem_process import NetemProcess
 from worldsim.fleet.overload import Overload
 from worldsim.fleet.pacing import LatenessCounter, Pacer
 from worldsim.fleet.progress import ProgressReporter
+from worldsim.fleet.reconnection import Reconnection
 from worldsim.fleet.resources import ResourceMeter
 from worldsim.fleet.startup import Startup
+from worldsim.fleet.world_stop import stop_world
 from worldsim.judge.event import By
 from worldsim.judge.run_events import LateStart
 from worldsim.judge.tick import Packets
@@ -70,7 +74,11 @@ class FreeRunningFleet:
         speed = overload.requested
         rows = range(scenario.rows)
         self.loop = SlotLoop(
-            scenario, world_of(scenario, PROCESS_COMMAND_TICKS), recorder, self._packets
+            scenario,
+            world_of(scenario, PROCESS_COMMAND_TICKS),
+            recorder,
+            self._packets,
+            real_outages=True,
         )
         self.medium_counters: MediumCounters | None = None
         self.lateness = LatenessCounter(len(rows))
@@ -84,7 +92,12 @@ class FreeRunningFleet:
         self._scenario = scenario
         self._launcher = launcher
         self._startup = startup
-        self._actions = ProcessActions(bus, startup, launcher, scenario.fleet.boot_s / speed)
+        self._netem = NetemProcess(bus, startup, launcher, self.loop.network, speed)
+        self._reconnection = Reconnection(speed)
+        self._stops: list[StopWorldProcess] = []
+        """Stops of the world at the end of the present slot."""
+        boot_wall_s = scenario.fleet.boot_s / speed
+        self._actions = ProcessActions(self._netem, startup, launcher, boot_wall_s)
         self._control_server = ControlServer(
             bus, Control(scenario, self.loop, launcher.controls_processes)
         )
@@ -167,9 +180,10 @@ class FreeRunningFleet:
         self._landed = True
         if self.begun:
             self._launcher.report_run_over()
+        self._netem.wake()
         self._over(b"")
         deadline = time.monotonic() + FINAL_VERDICTS_WITHIN_S
-        while (left_s := deadline - time.monotonic()) > 0.0:
+        while self._netem.state == "up" and (left_s := deadline - time.monotonic()) > 0.0:
             report = self._reports.wait(left_s)
             if report is not None:
                 self._read_report(report)
@@ -188,6 +202,7 @@ class FreeRunningFleet:
         for operation in self.loop.due():
             self._carry_out(operation)
         self._control_server.answer_waiting(self._carry_out)
+        self._report_reconnection()
         self._send(self.loop.open())
         self._handle_exits()
         self._culprits.look(self._late_agents, self.loop.world.time_s)
@@ -195,6 +210,8 @@ class FreeRunningFleet:
         while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not should_stop():
             self._launcher.wait(min(left_s, POLL_S))
             self._handle_exits()
+        self._netem.follow(slot, self.medium_counters)
+        self._count_lost()
         for agent, commands in self._commands.drain():
             for data in commands:
                 self._accept_command(agent, data)
@@ -206,6 +223,7 @@ class FreeRunningFleet:
         ):
             self._read_arrivals(agent)
         self.loop.close(b"")
+        self._stop_world(should_stop)
         slowed_to = self.overload.speed if self.overload.slowed else None
         self._progress_reporter.report(self._pacer.elapsed_s, self.late_fraction, slowed_to)
 
@@ -225,13 +243,56 @@ class FreeRunningFleet:
         """Carry out an operation between slots, and apply it to the world at once."""
         members = self.loop.members
         late = self._actions.carry_out(operation, self.loop.world.slot, members.incarnations)
+        was_down = bool(self.loop.network.outages)
         self.loop.apply(operation, by)
+        self._follow_outage(was_down=was_down)
+        if isinstance(operation, StopWorldProcess):
+            self._stops.append(operation)
         if isinstance(operation, EndProcesses | PauseProcesses | ResumeProcesses | AdmitAgents):
             self.lateness.drop_pending(operation.agents)
         for agent in late:
             t_s = round(self.loop.world.time_s, 6)
             detail = "its process is not up by the end of boot_s"
             self.loop.emit(LateStart(t_s=t_s, agent=agent, detail=detail))
+
+    def _follow_outage(self, *, was_down: bool) -> None:
+        """Await the agents' observation after the end of an outage, and not in one."""
+        if self.loop.network.outages:
+            self._reconnection.cancel()
+        elif was_down:
+            self._await_reconnection(self._netem.paused_s)
+
+    def _await_reconnection(self, paused_s: float) -> None:
+        running = np.flatnonzero(self.loop.members.running).tolist()
+        self._reconnection.begin(running, self.loop.world.time_s, paused_s)
+
+    def _report_reconnection(self) -> None:
+        """Report it once every running agent is observed again, or should be."""
+        awaited, time_s = self._reconnection, self.loop.world.time_s
+        if awaited.since_s is None or self._netem.state != "up":
+            return
+        missing = awaited.missing(np.flatnonzero(self.loop.members.running).tolist())
+        if not missing or awaited.is_late(time_s):
+            self.loop.effects.reconnect(time_s - awaited.since_s, missing)
+            awaited.cancel()
+
+    def _stop_world(self, should_stop: Callable[[], bool]) -> None:
+        """Stop this process where the timeline asks for it, after what it did is written."""
+        for operation in self._stops:
+            stopped_s = stop_world(operation, self._launcher, self.overload.speed, should_stop)
+            self.loop.effects.faults.note_standstill(operation.number, stopped_s)
+            self._pacer.stand_still(stopped_s)
+            if not self.loop.network.outages:
+                self._await_reconnection(stopped_s)
+        self._stops.clear()
+
+    def _is_cut_off(self, agent: int) -> bool:
+        """Return whether a planned stop keeps observations from an agent: no tick of it counts."""
+        return (
+            bool(self.loop.network.outages)
+            or self._netem.state != "up"
+            or self._reconnection.awaits(agent)
+        )
 
     def _send(self, opened: OpenSlot) -> None:
         incarnations = tuple(self.loop.members.incarnations)
@@ -241,11 +302,16 @@ class FreeRunningFleet:
             positions=opened.positions,
             incarnations=incarnations,
         )
-        self._truth(pack(truth))
+        takes_messages = self._netem.takes_messages
+        if takes_messages:
+            self._truth(pack(truth))
         self._agent_steps += len(opened.observations)
         for agent, observation in opened.observations:
-            self._observers[agent](encode(observation))
-            if self.lateness.observe(agent, opened.slot, self.loop.world.latest[agent]):
+            if takes_messages:
+                self._observers[agent](encode(observation))
+            if self._is_cut_off(agent):
+                self.lateness.drop_pending([agent])
+            elif self.lateness.observe(agent, opened.slot, self.loop.world.latest[agent]):
                 self._late_agents.append(agent)
 
     def _accept_command(self, agent: int, data: bytes) -> None:
@@ -258,6 +324,7 @@ class FreeRunningFleet:
             self._rejected[error.cause] += 1
             return
         if command.incarnation == self.loop.members.incarnations[agent]:
+            self._reconnection.hear(agent, self.loop.world.clock.time_s(command.slot))
             self.loop.apply_command(agent, command, data)
         else:
             self._rejected["incarnation"] += 1
@@ -267,6 +334,12 @@ class FreeRunningFleet:
             self.medium_counters = unpack(data, MediumCounters, MAX_VERDICTS_B)
         except WireError:
             self._rejected["verdicts"] += 1
+        self._count_lost()
+
+    def _count_lost(self) -> None:
+        """Count frames in flight as lost where netem's process was killed."""
+        if self.medium_counters is not None and self._netem.state in ("dead", "starting"):
+            self.medium_counters = self.medium_counters.after_kill()
 
     def _read_arrivals(self, agent: int) -> None:
         incarnation, now_s = self.loop.members.incarnations[agent], self.loop.world.time_s
@@ -293,9 +366,9 @@ class ProcessActions:
     """
 
     def __init__(
-        self, bus: Bus, startup: Startup, launcher: LauncherLink, boot_wall_s: float
+        self, netem: NetemProcess, startup: Startup, launcher: LauncherLink, boot_wall_s: float
     ) -> None:
-        self._orders = bus.publisher("orders")
+        self._netem = netem
         self._startup = startup
         self._launcher = launcher
         self._after_s = max(0.0, boot_wall_s - START_WITHIN_S)
@@ -319,9 +392,9 @@ class ProcessActions:
             case AdmitAgents(agents=agents):
                 return self._startup.absent(agents)
             case FaultOrder():
-                self._orders(msgspec.json.encode(FaultOrders(slot, (operation,))))
-            case SetSensorMode() | DisturbAgents() | GiveMission():
-                pass  # what the world shows, and missions, are its own
+                self._netem.order(operation, slot)
+            case SetSensorMode() | DisturbAgents() | GiveMission() | StopWorldProcess():
+                pass  # what the world shows, missions and its own process are its own matter
             case _:
                 assert_never(operation)
         return []

@@ -12,6 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from worldsim.fleet.fork import ProcessExit
+from worldsim.scenario.selectors import ProcessName
 
 MAX_MESSAGE_B = 64 * 1024
 
@@ -57,6 +58,18 @@ class ActionDone(Message, frozen=True):
 
     action: ProcessAction
     processes: tuple[AgentProcess, ...]
+
+
+class OtherProcessRequest(Message, frozen=True):
+    """Kill, pause, resume or start netem's processes, or kill or pause the world."""
+
+    process: ProcessName
+    action: ProcessAction
+    for_s: float = 0.0  # wall time after which the world is woken from a pause [s]
+
+
+class WorldWoken(Message, frozen=True):
+    """The world's pause is over."""
 
 
 class EndRequest(Message, frozen=True):
@@ -129,8 +142,9 @@ class RunOver(Message, frozen=True):
 
 ToZygote = ActionRequest | EndRequest
 FromZygote = AgentStarted | AgentExited | ActionDone
-ToWorld = AgentExited | ActionDone | RunFailed
-FromWorld = ActionRequest | ProcessesMissing | Progress | Stalled | Notice | RunOver
+ToWorld = AgentExited | ActionDone | WorldWoken | RunFailed
+Report = Progress | Stalled | Notice
+FromWorld = ActionRequest | OtherProcessRequest | ProcessesMissing | Report | RunOver
 
 Sent = TypeVar("Sent", bound=Message)
 Received = TypeVar("Received", bound=Message)

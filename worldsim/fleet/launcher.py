@@ -26,6 +26,7 @@ from worldsim.fleet.ipc import (
     zygote_sockets,
 )
 from worldsim.fleet.launcher_link import LaunchedLink
+from worldsim.fleet.planned_stops import PlannedStops
 from worldsim.fleet.process import RunOptions
 from worldsim.fleet.process_table import ProcessRow, ProcessTable, processes, sweep_passwords
 from worldsim.fleet.supervisor import Supervisor
@@ -104,6 +105,10 @@ class Launcher:
             options.lockstep,
         )
         self._supervisor = Supervisor(directory.logs, self._monitor.child_exited)
+        self._stops = PlannedStops(
+            self._supervisor, self._table, self._world, self._mediums(), self._restart_netem
+        )
+        self._monitor.stops = self._stops
 
     def fly(self) -> None:
         """Start all processes, and follow the run until the world has ended.
@@ -116,7 +121,8 @@ class Launcher:
         )
         self._start()
         while "world" in self._supervisor.pids and not self._monitor.failed:
-            self._supervisor.poll(POLL_S)
+            self._supervisor.poll(self._stops.seconds_left(POLL_S))
+            self._stops.wake_world()
             self._monitor.report_missing()
         self._end_world()
 
@@ -136,7 +142,8 @@ class Launcher:
         try:
             summary: Summary = json.loads(self._directory.summary.read_text("utf-8"))
         except FileNotFoundError:
-            self.terminal.print(f"no summary was written; {self._monitor.log_tail('world')}")
+            self._directory.free_room()
+            self.terminal.print(self._without_summary())
             return UNKNOWN
         recorded = self._directory.recording.exists()
         self.terminal.print(verdict(summary, self._directory.path, recorded))
@@ -153,6 +160,15 @@ class Launcher:
         end_orphans(())
         self._directory.users.unlink(missing_ok=True)
 
+    def _without_summary(self) -> str:
+        """Return what there is to say of a run whose world wrote no summary."""
+        ended = self._monitor.world_exit
+        if ended is None or not self._directory.recording.exists():
+            ended = f"{ended}; " if ended is not None else ""
+            return f"{ended}no summary was written; {self._monitor.log_tail('world')}"
+        folder = self._directory.path
+        return f"inconclusive ({ended}); judge the recording up to then: qswarm verify {folder}"
+
     def _end_world(self) -> None:
         self._monitor.run_over = True
         self._supervisor.end(["world"], RUN_END_WITHIN_S, signal.SIGTERM)
@@ -165,21 +181,27 @@ class Launcher:
         start = self._supervisor.start
         zygote = start("zygote", signal.SIGKILL, self._run_zygote)
         self._zygote_end.close()
-        mediums = {
-            name: start(name, signal.SIGKILL, partial(self._run_netem, shard))
-            for shard, name in enumerate(self._mediums())
-        }
-        for shard, pid in enumerate(mediums.values()):
-            self._steps.note_medium(shard, pid)
+        for shard in range(self._options.shards):
+            self._start_netem(shard)
         # SIGTERM lets the world finish the recording even when the launcher has died.
         world = start("world", signal.SIGTERM, self._run_world)
         self._world_end.close()
-        for name, pid in {"zygote": zygote, **mediums, "world": world}.items():
-            self._table.add(name, pid)
+        self._table.add("zygote", zygote)
+        self._table.add("world", world)
         self._supervisor.watch(self._zygote, self._monitor.receive_from_zygote)
         self._supervisor.watch(self._world, self._monitor.receive_from_world)
         agents = tuple(AgentProcess(agent, 0) for agent in range(self._scenario.fleet.agents))
         self._zygote.send(ActionRequest("start", agents))
+
+    def _start_netem(self, shard: int) -> None:
+        name = medium_name(shard)
+        pid = self._supervisor.start(name, signal.SIGKILL, partial(self._run_netem, shard))
+        self._steps.note_medium(shard, pid)
+        self._table.add(name, pid)
+
+    def _restart_netem(self, shard: int) -> None:
+        self._start_netem(shard)
+        self._table.write()
 
     def _write_passwords(self) -> None:
         sweep_passwords(self._directory.path.parent)
@@ -206,7 +228,8 @@ class Launcher:
     def _run_netem(self, shard: int) -> int:
         for end in (self._zygote, self._world, self._world_end):
             end.close()
-        return netem_process.run(self._endpoint, shard, self._options.lockstep, self._access)
+        options = netem_process.ServingOptions(self._options.lockstep, patient=True)
+        return netem_process.run(self._endpoint, shard, options, self._access)
 
     def _run_world(self) -> int:
         for end in (self._zygote, self._world):

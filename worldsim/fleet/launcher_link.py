@@ -19,6 +19,7 @@ from worldsim.fleet.ipc import (
     AgentProcess,
     MessageError,
     Notice,
+    OtherProcessRequest,
     ProcessAction,
     ProcessesMissing,
     Progress,
@@ -27,8 +28,10 @@ from worldsim.fleet.ipc import (
     Stalled,
     ToWorld,
     WorldToLauncher,
+    WorldWoken,
     names_of,
 )
+from worldsim.scenario.selectors import ProcessName
 
 PRINT_EVERY_S = 2.0
 
@@ -81,6 +84,15 @@ class LauncherLink(Protocol):
         A process that is started sleeps ``after_s`` [s] of wall time first.
         """
 
+    def stop(self, process: ProcessName, action: ProcessAction, for_s: float = 0.0) -> None:
+        """Request an action on netem's processes or the world's.
+
+        A pause of the world ends after ``for_s`` [s] of wall time.
+        """
+
+    def is_woken(self) -> bool:
+        """Return whether a pause of the world is over; True once for each."""
+
     def has_done(self, action: ProcessAction, processes: Sequence[AgentProcess]) -> bool:
         """Return whether a requested action has taken effect; True once for each request."""
 
@@ -110,6 +122,7 @@ class LaunchedLink:
         self._launcher = launcher
         self._exits: list[AgentExit] = []
         self._done: list[ActionDone] = []
+        self._woken = 0
         self.failure: str | None = None
 
     @property
@@ -143,6 +156,17 @@ class LaunchedLink:
         """Ask the launcher for an action."""
         if processes:
             self._launcher.send(ActionRequest(action, tuple(processes), after_s))
+
+    def stop(self, process: ProcessName, action: ProcessAction, for_s: float = 0.0) -> None:
+        """Ask the launcher for an action on netem's processes or the world's."""
+        self._launcher.send(OtherProcessRequest(process, action, for_s))
+
+    def is_woken(self) -> bool:
+        """Return whether the launcher has ended a pause of the world."""
+        self._receive()
+        woken = self._woken > 0
+        self._woken -= woken
+        return woken
 
     def has_done(self, action: ProcessAction, processes: Sequence[AgentProcess]) -> bool:
         """Return whether the zygote has acknowledged an action."""
@@ -186,6 +210,8 @@ class LaunchedLink:
                 self._exits.append(AgentExit(process.agent, process.incarnation, process_exit))
             case ActionDone():
                 self._done.append(message)
+            case WorldWoken():
+                self._woken += 1
             case RunFailed(reason=reason):
                 self.failure = reason
             case _:
@@ -237,6 +263,14 @@ class ManualLink:
         raise LookupError(
             f"cannot {action} {names_of(processes)}: these processes were started by hand"
         )
+
+    def stop(self, process: ProcessName, action: ProcessAction, for_s: float = 0.0) -> None:
+        """Refuse: a process that was started by hand is stopped by hand. Raises LookupError."""
+        raise LookupError(f"cannot {action} {process}: these processes were started by hand")
+
+    def is_woken(self) -> bool:
+        """Refuse: no pause was accepted. Raises LookupError."""
+        raise LookupError("no pause of the world was accepted")
 
     def has_done(self, action: ProcessAction, processes: Sequence[AgentProcess]) -> bool:
         """Refuse: no action was accepted. Raises LookupError."""

@@ -44,6 +44,7 @@ from worldsim.engine.operations import (
     ResumeProcesses,
     SetSensorMode,
     StartProcesses,
+    StopWorldProcess,
 )
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
 from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
@@ -54,6 +55,7 @@ from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.progress import ProgressReporter, StallReporter
 from worldsim.fleet.resources import ResourceMeter
 from worldsim.fleet.startup import Startup
+from worldsim.fleet.world_stop import stop_world
 from worldsim.judge.event import By
 from worldsim.judge.tick import Packets
 from worldsim.scenario.tables import Scenario
@@ -93,6 +95,8 @@ class LockstepFleet:
         self._culprits = Culprits(launcher.steps, launcher.report_notice, speed=0.0)
         self.begun = self._landed = False
         self._stepping: list[int] = []
+        self._stops: list[StopWorldProcess] = []
+        """Stops of the world at the end of the present slot."""
         self._slots = scenario.slots
         self._launcher = launcher
         self._should_stop: Callable[[], bool] = lambda: False
@@ -155,11 +159,21 @@ class LockstepFleet:
         for agent, _ in opened.observations:
             self._await_command(agent, opened.slot)
         self.loop.close(self._await_mediums(opened.slot))
+        self._stop_world()
 
     def _carry_out(self, operation: Operation, by: By = None) -> None:
         """Carry out an operation, wait until it is done, and apply it to the world."""
         self._actions.carry_out(operation, self.loop.members.incarnations)
         self.loop.apply(operation, by)
+        if isinstance(operation, StopWorldProcess):
+            self._stops.append(operation)
+
+    def _stop_world(self) -> None:
+        """Stop this process where the timeline asks for it; the others wait."""
+        for operation in self._stops:
+            stopped_s = stop_world(operation, self._launcher, 1.0, self._stopped)
+            self.loop.effects.faults.note_standstill(operation.number, stopped_s)
+        self._stops.clear()
 
     def _send(self, opened: OpenSlot) -> None:
         slot_input = SlotInput(
@@ -271,6 +285,8 @@ class AwaitedActions:
                 self._orders.append(operation)
             case StartProcesses() | SetSensorMode() | DisturbAgents() | GiveMission():
                 pass  # nothing is to be done in other processes, or before they have booted
+            case StopWorldProcess():
+                pass  # it waits for the slot's end
             case _:
                 assert_never(operation)
 

@@ -38,6 +38,11 @@ class Pacer:
         if late_s > self._slot_s:
             self._epoch_s += late_s
 
+    def stand_still(self, seconds: float) -> None:
+        """Take this much wall time out of the reckoning [s]: the world stood still as planned."""
+        self._started_s += seconds
+        self._epoch_s += seconds
+
     def change(self, slot: int, slot_s: float) -> None:
         """Make the slots after ``slot`` due ``slot_s`` apart; ``slot`` is due as before."""
         self._epoch_s += (slot - self._epoch_slot) * self._slot_s

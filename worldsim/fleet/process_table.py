@@ -70,12 +70,15 @@ class ProcessTable:
 
     def note_action(self, action: ProcessAction, processes: Iterable[AgentProcess]) -> None:
         """Note a requested action: a requested pause is not reported as stopped."""
-        names = {agent_name(process.agent) for process in processes}
+        self.note_request(action, [agent_name(process.agent) for process in processes])
+
+    def note_request(self, action: ProcessAction, names: Iterable[str]) -> None:
+        """Note a requested action on the processes of some names."""
         match action:
             case "pause":
-                self._paused |= names
+                self._paused.update(names)
             case "start" | "kill" | "resume":
-                self._paused -= names
+                self._paused.difference_update(names)
             case _:
                 assert_never(action)
 

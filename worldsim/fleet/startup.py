@@ -7,8 +7,8 @@ import msgspec
 import zenoh
 
 from agent.config import AgentSetup
-from netem.messages import MediumSetup
-from netem.wire.bus import Bus, Handler, Liveliness, RefusedError, drain
+from netem.messages import MediumSetup, Resumption
+from netem.wire.bus import Bus, Handler, Liveliness, PendingQuery, RefusedError, drain
 from netem.wire.keys import agent_name, medium_name
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
 from worldsim.fleet.launcher_link import LauncherLink
@@ -55,6 +55,11 @@ class Startup:
                 return False
             self._unconfigured.pop(0)
         return True
+
+    def resume_medium(self, speed: float, resumption: Resumption) -> PendingQuery:
+        """Send the only medium of a run, whose process is new, what it needs to go on."""
+        setup = msgspec.structs.replace(self._medium_setup(0, speed), resumes=resumption)
+        return self._bus.begin_query("medium", msgspec.json.encode(setup), timeout_s=2.0)
 
     def answer_setup_requests(self) -> None:
         """Send their setups to the agents that have asked for them."""

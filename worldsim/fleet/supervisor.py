@@ -32,7 +32,7 @@ class Supervisor:
         self.pids[name] = pid
         exit_descriptor = os.pidfd_open(pid)
         self._selector.register(
-            exit_descriptor, selectors.EVENT_READ, lambda: self._reap(exit_descriptor, name)
+            exit_descriptor, selectors.EVENT_READ, lambda: self._reap(exit_descriptor, name, pid)
         )
         return pid
 
@@ -55,11 +55,14 @@ class Supervisor:
     def end(self, names: list[str], within_s: float, number: signal.Signals | None) -> bool:
         """Wait until these children have ended, after a signal if one is given.
 
+        A child that is stopped continues first, to handle the signal.
+
         Returns whether all of them have ended within ``within_s`` [s].
         """
         for name in names:
             if number is not None and name in self.pids:
                 os.kill(self.pids[name], number)
+                os.kill(self.pids[name], signal.SIGCONT)
         deadline = time.monotonic() + within_s
         while any(name in self.pids for name in names):
             left_s = deadline - time.monotonic()
@@ -68,11 +71,18 @@ class Supervisor:
             self.poll(left_s)
         return True
 
-    def _reap(self, exit_descriptor: int, name: str) -> None:
-        process_exit = reap(self.pids[name])
+    def strike(self, name: str, number: signal.Signals, awaited: int) -> None:
+        """Signal a child, and wait for the state that waitid calls ``awaited``."""
+        pid = self.pids[name]
+        os.kill(pid, number)
+        os.waitid(os.P_PID, pid, awaited | os.WEXITED | os.WNOWAIT)
+
+    def _reap(self, exit_descriptor: int, name: str, pid: int) -> None:
+        process_exit = reap(pid)
         if process_exit is None:
             return
         self._selector.unregister(exit_descriptor)
         os.close(exit_descriptor)
-        del self.pids[name]
+        if self.pids.get(name) == pid:  # a killed process may have been replaced already
+            del self.pids[name]
         self._on_exit(name, process_exit)

@@ -161,9 +161,8 @@ class Zygote:
         _limit_resources()
         config = self._config
         row = config.steps.row(agent) if config.steps is not None else None
-        return agent_process.run(
-            agent, config.run, config.endpoint, config.long_lease, config.users, row
-        )
+        patience = agent_process.launched(config.long_lease)
+        return agent_process.run(agent, config.run, config.endpoint, patience, config.users, row)
 
     def _reap(self, exit_descriptor: int, pid: int) -> None:
         process_exit = reap(pid)

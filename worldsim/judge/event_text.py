@@ -7,6 +7,7 @@ from worldsim.judge.event import PlannedEvent
 from worldsim.judge.radio_events import (
     ConditionsChanged,
     Jammed,
+    NetemOutage,
     Partitioned,
     RadioRunEvent,
     Sabotaged,
@@ -25,6 +26,7 @@ from worldsim.judge.run_events import (
     MissionRunEvent,
     Paused,
     QueueChanged,
+    Reconnected,
     Restarted,
     Resumed,
     ReturnEvent,
@@ -32,10 +34,21 @@ from worldsim.judge.run_events import (
     RunEvent,
     SensorChanged,
     SlotChanged,
+    WorldStopped,
 )
 
 Queues = Sequence[str]
-WARNINGS = (Killed, Left, Paused, Partitioned, Jammed, Sabotaged, LateStart)
+WARNINGS = (
+    Killed,
+    Left,
+    Paused,
+    Partitioned,
+    Jammed,
+    Sabotaged,
+    NetemOutage,
+    WorldStopped,
+    LateStart,
+)
 """Events that a list of them shows as warnings."""
 
 
@@ -63,8 +76,8 @@ def _words(event: RunEvent, queues: Queues) -> str:
             words = _mission(event)
         case SlotChanged() | QueueChanged() | RoleChanged():
             words = _place(event, queues)
-        case LateStart(agent=agent, detail=detail):
-            words = f"a{agent} starts late: {detail}"
+        case LateStart() | WorldStopped() | Reconnected():
+            words = _of_processes(event)
         case _:
             assert_never(event)
     return words
@@ -167,6 +180,17 @@ def _origin(event: RunEvent) -> str:
     if event.by is not None:
         return f" (by the {event.by})"
     return " (scheduled)" if event.planned else " (unplanned)"
+
+
+def _of_processes(event: LateStart | WorldStopped | Reconnected) -> str:
+    if isinstance(event, LateStart):
+        return f"a{event.agent} starts late: {event.detail}"
+    if isinstance(event, WorldStopped):
+        return f"the world is {'killed' if event.cause == 'kill' else 'paused'}"
+    if event.missing:
+        agents = ", ".join(f"a{agent}" for agent in event.missing)
+        return f"{agents} not observed again within {event.after_s:g} s"
+    return f"every agent is observed again, after {event.after_s:g} s"
 
 
 def _list(values: Sequence[object]) -> str:

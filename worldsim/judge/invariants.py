@@ -11,8 +11,9 @@ I7: no agent changes its place in a settled team in which every agent is in its 
 are lost, each agent may once.
 A fault is an event of the timeline, an exit, a change of the connected components, a vehicle that
 comes to hover in a component's place or leaves it, agents that look again whether a vehicle hovers
-in a place of which they cannot know it, or a radio whose queues cannot carry the traffic; while
-that lasts, none of the invariants is evaluated.
+in a place of which they cannot know it, a radio whose queues cannot carry the traffic, or a time in
+which agents are not observed, as netem is down or the world was stopped. While one of the last two
+lasts, none of the invariants is evaluated.
 """
 
 from collections import Counter
@@ -30,7 +31,7 @@ from worldsim.judge.connectivity import Components, Connectivity
 from worldsim.judge.finding import InvariantTally
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.phase import Phase
-from worldsim.judge.radio_events import RadioRunEvent, Sabotaged
+from worldsim.judge.radio_events import NetemOutage, RadioRunEvent, Sabotaged
 from worldsim.judge.radio_load import RadioLoad
 from worldsim.judge.run_events import (
     ClockChanged,
@@ -42,12 +43,14 @@ from worldsim.judge.run_events import (
     Left,
     Paused,
     QueueChanged,
+    Reconnected,
     Restarted,
     Resumed,
     RoleChanged,
     RunEvent,
     SensorChanged,
     SlotChanged,
+    WorldStopped,
 )
 from worldsim.judge.shared_places import Claims, SharedPlaces
 from worldsim.judge.tick import Tick, same_claims
@@ -77,7 +80,7 @@ class Invariants:
         self._places = BlockedPlaces(
             hovering, ["proximity" in each.sensors for each in scenario.vehicles]
         )
-        self._boot_s = scenario.fleet.boot_s
+        self._boot_s, self._unobserved = scenario.fleet.boot_s, False
         self._fault_s = 0.0
         """When the last fault is over [s; simulated time]."""
         self._components_due_s = 0.0
@@ -110,11 +113,8 @@ class Invariants:
 
     def handle_event(self, event: RunEvent) -> None:
         """Take an event; events come in order."""
-        if isinstance(event, Sabotaged):
-            return  # whatever somebody sends, it excuses nobody
         if isinstance(event, RadioRunEvent):
-            self._connectivity.handle_event(event)
-            self._fault(event.t_s, event.t_s)
+            self._handle_radio(event)
             return
         match event:
             case ClockChanged():
@@ -128,10 +128,20 @@ class Invariants:
                 self._fault(event.t_s, event.t_s + self._boot_s)
             case Killed() | Left() | Paused() | Resumed() | FormationGiven() | FrameGiven():
                 self._fault(event.t_s, event.t_s)
+            case WorldStopped() | Reconnected():
+                self._unobserved = isinstance(event, WorldStopped)
+                self._fault(event.t_s, event.t_s)
             case SlotChanged() | QueueChanged() | SensorChanged() | LateStart():
                 pass
             case _:
                 assert_never(event)
+
+    def _handle_radio(self, event: RadioRunEvent) -> None:
+        if isinstance(event, Sabotaged):
+            return  # whatever somebody sends, it excuses nobody
+        self._connectivity.handle_event(event)
+        self._unobserved = self._unobserved or isinstance(event, NetemOutage)
+        self._fault(event.t_s, event.t_s)
 
     def see(self, tick: Tick, phase: Phase) -> None:
         """Evaluate a tick, which the phase has seen."""
@@ -145,7 +155,7 @@ class Invariants:
             # Agents may have come into reach since the components were found, or gone out of it.
             self._find_components(tick)
             self._find_breaches(tick, phase)
-        if self._load.is_overloaded(tick, self._connectivity.longest_s):
+        if self._load.is_overloaded(tick, self._connectivity.longest_s) or self._unobserved:
             self._excuse(tick.time_s)
             return
         self.tallies["I6"].count(self._excess_role_changes)

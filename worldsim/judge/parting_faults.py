@@ -1,11 +1,18 @@
 """The faults in force that part the team: while there are any, it cannot be one."""
 
-from worldsim.judge.radio_events import Flapped, Healed, Jammed, Partitioned, RadioRunEvent
-from worldsim.judge.run_events import AgentFaultRunEvent
+from worldsim.judge.radio_events import (
+    Flapped,
+    Healed,
+    Jammed,
+    NetemOutage,
+    Partitioned,
+    RadioRunEvent,
+)
+from worldsim.judge.run_events import AgentFaultRunEvent, Reconnected, WorldStopped
 
 
 class PartingFaults:
-    """The numbers of the partitions, jams, flaps and wrong clocks in force.
+    """The partitions, jams, flaps and wrong clocks in force, and whether agents are observed.
 
     slack_s: clocks that differ by no more part nobody [s].
     """
@@ -14,9 +21,15 @@ class PartingFaults:
         self._slack_s = slack_s
         self._partitions: set[int] = set()
         self._others: set[int] = set()
+        self.unobserved = False
+        """Whether netem is down or the world was stopped, and not all are observed again yet."""
 
     def __bool__(self) -> bool:
-        return bool(self._partitions or self._others)
+        return bool(self._partitions or self._others or self.unobserved)
+
+    def handle_stop(self, event: WorldStopped | Reconnected) -> None:
+        """Take the stop of the world, or the end of such a time."""
+        self.unobserved = isinstance(event, WorldStopped)
 
     def handle_event(self, event: RadioRunEvent) -> None:
         """Take an event of the radio."""
@@ -30,6 +43,8 @@ class PartingFaults:
                 self._mark(event.number, begins=event.jam is not None)
             case Flapped():
                 self._mark(event.number, begins=event.flap is not None)
+            case NetemOutage():
+                self.unobserved = True
             case _:
                 pass  # changed conditions part nobody for sure
 

@@ -17,9 +17,10 @@ from netem.faults import (
     Heal,
     Jam,
     LastingFault,
+    Outage,
+    OutageCause,
     Partition,
     PartitionKind,
-    RadioEvent,
     RadioFault,
     Sabotage,
 )
@@ -103,7 +104,22 @@ class ConditionsChanged(
         return "netem"
 
 
-RadioRunEvent = Partitioned | Healed | Jammed | Flapped | ConditionsChanged | Sabotaged
+class NetemOutage(RadioFaultEvent, frozen=True, kw_only=True, tag="netem_outage"):
+    """An outage of netem began or ended: its processes are down, and no message passes."""
+
+    cause: OutageCause
+    over: bool = False
+    """Whether it ended."""
+
+
+LinkRunEvent = Partitioned | Healed | Jammed | Flapped | ConditionsChanged
+RadioRunEvent = LinkRunEvent | Sabotaged | NetemOutage
+OUTAGE_WORDS = {
+    ("kill", False): "netem is killed; no message passes",
+    ("kill", True): "the kill of netem ends",
+    ("pause", False): "netem is paused; no message passes",
+    ("pause", True): "the pause of netem ends",
+}
 _CONDITION_KEYS = Conditions.__struct_fields__
 
 
@@ -122,9 +138,8 @@ def applied(order: FaultOrder, network: NetworkConditions, t_s: float, by: By) -
 
 def order_of(event: RadioRunEvent) -> FaultOrder:
     """Return the order that an event reports."""
-    fault = _begun(event)
-    begins = RadioEvent.of(fault) if fault is not None else None
-    return FaultOrder(event.number or 0, _at_s(event), begins)
+    fault, number, at_s = _begun(event), event.number or 0, _at_s(event)
+    return FaultOrder(number, at_s) if fault is None else FaultOrder.begin(number, at_s, fault)
 
 
 def radio_sentence(event: RadioRunEvent) -> str:
@@ -146,8 +161,8 @@ def radio_sentence(event: RadioRunEvent) -> str:
             words = "flapping links restored"
         case ConditionsChanged():
             words = _changed(event)
-        case Sabotaged():
-            words = _sabotaged(event.sabotage)
+        case Sabotaged() | NetemOutage():
+            words = _by_others(event)
         case _:
             assert_never(event)
     return words
@@ -157,6 +172,12 @@ def _changed(event: ConditionsChanged) -> str:
     if event.undone is not None:
         return f"link conditions restored: end of {_settings(event.undone)}"
     return f"link conditions changed: {_settings(event)}"
+
+
+def _by_others(event: Sabotaged | NetemOutage) -> str:
+    if isinstance(event, NetemOutage):
+        return OUTAGE_WORDS[event.cause, event.over]
+    return _sabotaged(event.sabotage)
 
 
 def _sabotaged(sabotage: Sabotage | None) -> str:
@@ -203,10 +224,8 @@ def _begin_event(
                 conditions=network.conditions,
                 **{key: getattr(fault, key) for key in _CONDITION_KEYS},
             )
-        case Sabotage():
-            return Sabotaged(
-                t_s=t_s, agent=None, planned=True, by=by, number=number, sabotage=fault
-            )
+        case Sabotage() | Outage():
+            return _by_others_event(number, fault, t_s, by)
     assert_never(fault)
 
 
@@ -230,9 +249,19 @@ def _end_event(
                 conditions=network.conditions,
                 undone=fault,
             )
-        case Sabotage():
-            return Sabotaged(t_s=t_s, agent=None, planned=True, by=by, number=number, sabotage=None)
+        case Sabotage() | Outage():
+            return _by_others_event(number, fault, t_s, by, ends=True)
     assert_never(fault)
+
+
+def _by_others_event(
+    number: int, fault: Sabotage | Outage, t_s: float, by: By, *, ends: bool = False
+) -> Sabotaged | NetemOutage:
+    about: dict[str, Any] = {"t_s": t_s, "agent": None, "planned": True, "by": by}
+    about["number"] = number
+    if isinstance(fault, Outage):
+        return NetemOutage(**about, cause=fault.cause, over=ends)
+    return Sabotaged(**about, sabotage=None if ends else fault)
 
 
 def _at_s(event: RadioRunEvent) -> float:
@@ -256,9 +285,15 @@ def _begun(event: RadioRunEvent) -> RadioFault | None:
         case ConditionsChanged(undone=undone):
             keys = {key: getattr(event, key) for key in _CONDITION_KEYS}
             return Conditions(**keys) if undone is None else None
-        case Sabotaged(sabotage=sabotage):
-            return sabotage
+        case Sabotaged() | NetemOutage():
+            return _begun_by_others(event)
     assert_never(event)
+
+
+def _begun_by_others(event: Sabotaged | NetemOutage) -> Sabotage | Outage | None:
+    if isinstance(event, Sabotaged):
+        return event.sabotage
+    return None if event.over else Outage(event.cause)
 
 
 def _settings(conditions: Conditions | ConditionsChanged) -> str:

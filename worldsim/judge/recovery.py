@@ -16,6 +16,7 @@ from worldsim.judge.run_events import (
     RETURN_KINDS,
     AgentFaultRunEvent,
     LossEvent,
+    Reconnected,
     ReturnEvent,
 )
 from worldsim.judge.tick import Tick
@@ -57,7 +58,7 @@ class Recoveries:
         else:
             last.agents.append(event.agent)
 
-    def handle_radio(self, event: RadioRunEvent) -> None:
+    def handle_radio(self, event: RadioRunEvent | Reconnected) -> None:
         """Take a change of the radio, after which the team is not parted, or no more."""
         self.standing_since_s = None
         self.all.append(Recovery(event.t_s, event.kind, []))

@@ -9,6 +9,7 @@ import msgspec
 
 from agent.messages import FramePath
 from agent.qstructure.formation import FormationSpec
+from netem.faults import OutageCause
 from worldsim.judge.event import Event, PlannedEvent
 from worldsim.judge.radio_events import RadioRunEvent
 
@@ -129,6 +130,23 @@ class RoleChanged(Event, frozen=True, kw_only=True, tag="role"):
     role: Literal["vertex", "member"]
 
 
+class WorldStopped(PlannedEvent, frozen=True, kw_only=True, tag="world_outage"):
+    """The world's process was stopped: simulated time stands still, or the run ends."""
+
+    cause: OutageCause
+
+
+class Reconnected(Event, frozen=True, kw_only=True, tag="reconnect"):
+    """Every running agent has been observed again since an outage of netem or a stop of the world.
+
+    An agent that is missing still has not been observed when it should have been.
+    """
+
+    after_s: float
+    """Since the end of the outage [s; simulated time]."""
+    missing: tuple[int, ...] = ()
+
+
 class LateStart(Event, frozen=True, kw_only=True, tag="late"):
     """An agent's process had not started by the end of its boot time."""
 
@@ -152,6 +170,8 @@ RunEvent = (
     | QueueChanged
     | RoleChanged
     | LateStart
+    | WorldStopped
+    | Reconnected
 )
 
 

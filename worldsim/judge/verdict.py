@@ -41,6 +41,7 @@ from worldsim.judge.run_events import (
     MissionRunEvent,
     Paused,
     QueueChanged,
+    Reconnected,
     Restarted,
     Resumed,
     ReturnEvent,
@@ -48,6 +49,7 @@ from worldsim.judge.run_events import (
     RunEvent,
     SensorChanged,
     SlotChanged,
+    WorldStopped,
 )
 from worldsim.judge.sub_formations import SubFormations
 from worldsim.judge.tick import Packets, Tick
@@ -144,8 +146,6 @@ class Judge:
         """Take an event; events come in order."""
         if self._allocation is not None:
             self._allocation.handle_event(event)
-        if isinstance(event, Sabotaged):
-            return  # whatever somebody sends, it excuses nobody
         if isinstance(event, RadioRunEvent):
             self._handle_radio(event)
             return
@@ -158,12 +158,16 @@ class Judge:
                 self._handle_agent_fault(event)
             case SensorChanged():
                 self._held.open_window(event.t_s)
+            case WorldStopped() | Reconnected():
+                self._handle_stop(event)
             case SlotChanged() | QueueChanged() | RoleChanged() | LateStart():
                 pass
             case _:
                 assert_never(event)
 
     def _handle_radio(self, event: RadioRunEvent) -> None:
+        if isinstance(event, Sabotaged):
+            return  # whatever somebody sends, it excuses nobody
         if self._strength is not None:
             self._strength.handle_event(event)
         self._parting.handle_event(event)
@@ -176,6 +180,12 @@ class Judge:
         self._held.open_window(event.t_s)
         if not self._parting:
             self._recoveries.handle_agent_fault(event)
+
+    def _handle_stop(self, event: WorldStopped | Reconnected) -> None:
+        self._parting.handle_stop(event)
+        self._held.open_window(event.t_s)
+        if isinstance(event, Reconnected) and not self._parting:
+            self._recoveries.handle_radio(event)
 
     def _change_team(self, event: LossEvent | ReturnEvent) -> None:
         if isinstance(event, Restarted | Joined):

@@ -29,6 +29,9 @@ class FaultRow(TypedDict):
     agents: list[int] | None  # those that it struck; of sabotage, with a saboteur
     frames: int | None  # times the links on which the fault cut, altered or sent them
     readings: int | None  # of sensors or clocks, that differ from the true ones
+    process: str | None  # "netem" or "world", of a fault that strikes no agent
+    observations: int | None  # that no agent got while netem was down
+    stopped_s: float | None  # wall time that the world stood still
 
 
 def fault_rows(
@@ -45,24 +48,37 @@ def fault_rows(
             "from_s": each.from_s,
             "to_s": each.to_s,
             "by": each.by,
-            "agents": None if each.on_radio and each.kind != "sabotage" else each.agents,
+            "agents": each.agents if _strikes_agents(each) else None,
             "frames": frames.get(each.number, 0) if each.on_radio and frames is not None else None,
             "readings": readings.get(each.number, 0) if each.kind in READ else None,
+            "process": each.process,
+            "observations": each.observations if each.process == "netem" else None,
+            "stopped_s": _stopped_s(each),
         }
         for each in faults
     ]
 
 
+def _strikes_agents(fault: FaultReport) -> bool:
+    return fault.process is None and (not fault.on_radio or fault.kind == "sabotage")
+
+
+def _stopped_s(fault: FaultReport) -> float | None:
+    """Return how long the world stood still for a fault; None where it was not to."""
+    pauses = fault.process == "world" and fault.kind == "pause"
+    return round(fault.stopped_s, 3) if pauses else None
+
+
 def idle_text(rows: Sequence[FaultRow]) -> str | None:
     """Return which faults struck nothing, in words; None where each struck something."""
-    idle = [f"the {row['kind']} at {_rounded(row['from_s'])} s" for row in rows if _is_idle(row)]
+    idle = [f"the {_what(row)} at {_rounded(row['from_s'])} s" for row in rows if _is_idle(row)]
     left = len(idle) - MAX_IDLE_NAMED
     named = idle if left <= 0 else [*idle[:MAX_IDLE_NAMED], f"{left} more"]
     return f"{' and '.join(named)} struck nothing" if idle else None
 
 
 def _is_idle(row: FaultRow) -> bool:
-    counts = [row["frames"], row["readings"]]
+    counts = [row["frames"], row["readings"], row["observations"], row["stopped_s"]]
     if row["readings"] is None and row["agents"] is not None:
         counts.append(len(row["agents"]))
     return any(count == 0 for count in counts)
@@ -78,12 +94,18 @@ def fault_texts(rows: Sequence[FaultRow]) -> list[str]:
 def _when(row: FaultRow) -> str:
     by = f" by the {row['by']}" if row["by"] is not None else ""
     until = "the end" if row["to_s"] is None else f"{_rounded(row['to_s'])} s"
-    return f"{row['kind']}{by}, {_rounded(row['from_s'])} s to {until}"
+    return f"{_what(row)}{by}, {_rounded(row['from_s'])} s to {until}"
+
+
+def _what(row: FaultRow) -> str:
+    return row["kind"] if row["process"] is None else f"{row['kind']} of {row['process']}"
 
 
 def _struck(row: FaultRow) -> str:
     if _is_idle(row):
         return "struck nothing"
+    if row["process"] is not None:
+        return _stop(row)
     agents = _named(row["agents"] or [])
     if row["readings"] is not None:
         return f"changed {_counted(row['readings'], READ[row['kind']])} of {agents}"
@@ -93,6 +115,15 @@ def _struck(row: FaultRow) -> str:
         done = "changed the links of" if row["kind"] == "netem" else "cut"
         return f"{done} {_counted(row['frames'], 'frame')}"
     return f"struck {agents}" if row["agents"] else "not counted"
+
+
+def _stop(row: FaultRow) -> str:
+    """Return what a fault of netem or the world did."""
+    if row["observations"] is not None:
+        return f"kept {_counted(row['observations'], 'observation')} from agents"
+    if row["stopped_s"] is not None:
+        return f"the world stood still for {row['stopped_s']:.3g} s of wall time"
+    return "ended the run"
 
 
 def _named(agents: Sequence[int]) -> str:

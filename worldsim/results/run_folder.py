@@ -116,6 +116,10 @@ class RunDirectory:
         write_json(self.summary, written)
         return cast("Content", written)
 
+    def free_room(self) -> None:
+        """Give back the room that was kept for a summary which the world did not write."""
+        _free_room(self.path)
+
     def _lose(self, text: str) -> None:
         self.lost = self.lost or text
         # Stderr may be a file on the same full disk: then nothing can be printed.

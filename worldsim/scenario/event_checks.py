@@ -29,6 +29,7 @@ from worldsim.scenario.faults import (
     Resume,
     SabotageFault,
     SensorFault,
+    StopWorld,
 )
 from worldsim.scenario.foreseen_fleet import FleetNow, ForeseenFleet
 from worldsim.scenario.problem import Problem
@@ -37,6 +38,7 @@ from worldsim.scenario.rules import start_problem, tilt_problem
 from worldsim.scenario.selectors import (
     AllAgents,
     OneAgent,
+    OtherProcess,
     QueueAgents,
     RandomAgents,
     Selector,
@@ -222,7 +224,7 @@ class EventChecks:
     def _other_problems(
         self,
         event: EventTable,
-        action: ProcessFault | SensorFault | SabotageFault | MissionChange | EndFault,
+        action: ProcessFault | StopWorld | SensorFault | SabotageFault | MissionChange | EndFault,
     ) -> Iterator[Problem]:
         match action:
             case (
@@ -235,8 +237,8 @@ class EventChecks:
                 return self._frame_change(action, event.at_s)
             case FormationSpec():
                 return self._formation(action)
-            case EndFault():
-                return iter(())
+            case StopWorld() | EndFault():
+                return _world_problems(event)
         assert_never(action)
 
     def _selection(
@@ -288,8 +290,8 @@ class EventChecks:
                 return self._name("queue", name, [queue.name for queue in self.fleet.spec.queue])
             case VertexAgent() | QueueAgents():
                 return _not_allowed(selector, hold_places)
-            case RandomAgents() | AllAgents():
-                return None
+            case RandomAgents() | AllAgents() | OtherProcess():
+                return _other_process_problem(kind)
         assert_never(kind)
 
     def _name(self, kind: str, name: str, names: list[str]) -> str | None:
@@ -366,6 +368,26 @@ class EventChecks:
             )
         except MissionError as error:
             yield Problem(error.key, error.detail)
+
+
+def _other_process_problem(kind: RandomAgents | AllAgents | OtherProcess) -> str | None:
+    """Return what is wrong with a selector of a process of no agent among those of agents."""
+    if not isinstance(kind, OtherProcess):
+        return None
+    return f"{kind.name!r} is no agent; allowed alone, as kill or pause = [{kind.name!r}]"
+
+
+def _world_problems(event: EventTable) -> Iterator[Problem]:
+    """Yield what makes a stop of the world invalid; nothing for other events."""
+    if event.process != "world":
+        return
+    if event.kill is None:
+        if event.for_s is None:
+            yield Problem("pause", "'world' needs for_s: it cannot end its own pause")
+        return
+    for key, value in (("for_s", event.for_s), ("every_s", event.every_s)):
+        if value is not None:
+            yield Problem(key, "not with kill = ['world']: it ends the run")
 
 
 def _not_allowed(selector: Selector, hold_places: bool) -> str:

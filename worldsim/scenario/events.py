@@ -9,7 +9,7 @@ from msgspec import Meta
 
 from agent.config import Positive
 from agent.qstructure.formation import FormationSpec
-from netem.faults import RadioKeys
+from netem.faults import Outage, OutageCause, RadioKeys
 from worldsim.scenario.faults import (
     Action,
     AgentFault,
@@ -25,8 +25,9 @@ from worldsim.scenario.faults import (
     Resume,
     SabotageFault,
     SensorFault,
+    StopWorld,
 )
-from worldsim.scenario.selectors import Selectors
+from worldsim.scenario.selectors import ProcessName, Selectors, other_process
 from worldsim.scenario.target_frame import FrameChange, Time
 
 Name = Annotated[
@@ -46,7 +47,8 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     every_s: what can be undone happens again after this time, to the end of the run.
     kill: ends processes, the vehicles stop and hover; leave: the vehicles leave the world too;
     restart: starts such agents again; join: adds new agents, under the next free ids. pause: stops
-    processes, the vehicles hover when the last command has expired; resume: continues them.
+    processes, the vehicles hover when the last command has expired; resume: continues them. kill
+    and pause of ["netem"], the radio and router, or of ["world"] stop those processes.
     partition: cuts the links between groups, unnamed agents form one more; a table for other kinds;
     heal: ends all partitions. jam: a sphere in which no radio works; flap: links that go down and
     up. netem: changes keys of [netem]. sabotage: somebody sends frames by agents' radios.
@@ -91,7 +93,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     def action(self) -> Action:
         """The action whose key is set. Raises LookupError without one."""
         of_agents = self.sensor or self.sabotage or self.agent_fault
-        fault = self.radio_fault or self._process_fault or of_agents
+        fault = self.radio_fault or self._stop or self._process_fault or of_agents
         action = fault or self.formation or self.frame or self._end
         if action is None:
             raise LookupError("the event has no action")
@@ -105,6 +107,22 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     def called(self, number: int) -> str:
         """Return the event's name. number: its index, or the number of an operator's event."""
         return self.name or f"{self.kind}-{number}"
+
+    @property
+    def process(self) -> ProcessName | None:
+        """The process of no agent that the event stops; None: it does not."""
+        return other_process(self.kill or self.pause or ())
+
+    @property
+    def _stop(self) -> Outage | StopWorld | None:
+        """The fault of netem's processes, or of the world's."""
+        cause: OutageCause = "kill" if self.kill is not None else "pause"
+        match self.process:
+            case "netem":
+                return Outage(cause)
+            case "world":
+                return StopWorld(cause, self.for_s)
+        return None
 
     @property
     def _end(self) -> EndFault | None:

@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from agent.config import SensorKind, Table
 from agent.qstructure.formation import FormationSpec
-from netem.faults import RadioFault, SabotageKeys
+from netem.faults import OutageCause, RadioFault, SabotageKeys
 from worldsim.scenario.selectors import Selectors
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.target_frame import FrameChange
@@ -43,6 +43,14 @@ class Pause(_Selected, frozen=True):
 
 class Resume(_Selected, frozen=True):
     """Continue the agents' paused processes."""
+
+
+class StopWorld(msgspec.Struct, frozen=True):
+    """Stop the world's process: for good, or for a while in which simulated time stands still."""
+
+    cause: OutageCause
+    for_s: float | None
+    """How long a pause lasts [s]; of wall time at speed 1. None for a kill."""
 
 
 class Join(Table, frozen=True):
@@ -87,7 +95,6 @@ AgentFault = ClockFault
 """A fault of single agents whose processes go on."""
 ProcessFault = Kill | Leave | Restart | Pause | Resume | Join
 MissionChange = FormationSpec | FrameChange
-Action = (
-    RadioFault | ProcessFault | SensorFault | SabotageFault | AgentFault | MissionChange | EndFault
-)
+FaultOfAgents = SensorFault | SabotageFault | AgentFault
+Action = RadioFault | ProcessFault | StopWorld | FaultOfAgents | MissionChange | EndFault
 """The action of one event."""

@@ -19,10 +19,12 @@ from worldsim.scenario.faults import (
     Resume,
     SabotageFault,
     SensorFault,
+    StopWorld,
 )
 from worldsim.scenario.selectors import (
     AllAgents,
     OneAgent,
+    OtherProcess,
     QueueAgents,
     RandomAgents,
     Selectors,
@@ -103,7 +105,7 @@ class ForeseenFleet:
                 self.frame = changed_frame(self.frame, action, step.at_s)
             case FormationSpec():
                 self.spec, self.formation = action, self.made(action)
-            case SensorFault() | SabotageFault() | EndFault():
+            case SensorFault() | SabotageFault() | StopWorld() | EndFault():
                 pass  # an event that ends a fault puts the fault's end into the timeline
             case _:
                 assert_never(action)
@@ -128,6 +130,8 @@ class ForeseenFleet:
                 case RandomAgents() | VertexAgent() | QueueAgents():
                     number = self._number(kind)
                     self._fewer = max(0, self._fewer + (-number if back else number))
+                case OtherProcess():
+                    pass  # every agent stays
                 case _:
                     assert_never(kind)
 

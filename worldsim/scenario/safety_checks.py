@@ -19,7 +19,7 @@ from agent.guidance.sight import (
     vehicle_margin_m,
 )
 from agent.messages import PROXIMITY_RANGE_M
-from netem.faults import Flap, Jam, Partition
+from netem.faults import Flap, Jam, Outage, Partition
 from netem.link_parameters import Conditions
 from worldsim.scenario.faults import Join, Kill, Leave, Pause, Restart, SensorFault
 from worldsim.scenario.obstacle_tables import Obstacle, Wall
@@ -27,9 +27,9 @@ from worldsim.scenario.problem import Problem
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.tables import Scenario
 
-SILENCING = (Kill, Leave, Pause, Restart, Join, Partition, Jam, Flap)
+SILENCING = (Kill, Leave, Pause, Restart, Join, Partition, Jam, Flap, Outage)
 """Faults after which an agent may be silent, or not know of another one."""
-STOPPING = (Kill, Pause, Restart, Join, SensorFault)
+STOPPING = (Kill, Pause, Restart, Join, SensorFault, Outage)
 """Faults by which a vehicle hovers for a while or for good, so that it gives way to nothing."""
 LOSS_OF_SILENCE = 80.0
 """From this loss on, a radio is silent for seconds at a time [%]."""

@@ -1,19 +1,22 @@
 """Selectors of agents: one type for each form that an event's list may hold."""
 
 import re
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from msgspec import Meta
 
 Selector = Annotated[
     int | str,
-    Meta(description="an id, 'vertex:V1', 'queue:Q1', 'random:2' or 'all'"),
+    Meta(description="an id, 'vertex:V1', 'queue:Q1', 'random:2' or 'all'; 'netem' or 'world'"),
 ]
 """As a scenario writes it."""
 Selectors = Annotated[tuple[Selector, ...], Meta(min_length=1, max_length=1000)]
 
+ProcessName = Literal["netem", "world"]
+"""The processes that the whole fleet needs; netem: those of all shards."""
+
 _TEXT = re.compile(
-    r"(?P<all>all)|random:(?P<random>[1-9]\d{0,3})|vertex:(?P<vertex>.+)|queue:(?P<queue>.+)",
+    r"(?P<all>all)|(?P<process>netem|world)|random:(?P<random>[1-9]\d{0,3})|vertex:(?P<vertex>.+)|queue:(?P<queue>.+)",
     re.DOTALL,
 )
 
@@ -46,7 +49,13 @@ class QueueAgents(NamedTuple):
     name: str
 
 
-ParsedSelector = OneAgent | AllAgents | RandomAgents | VertexAgent | QueueAgents
+class OtherProcess(NamedTuple):
+    """A process that the whole fleet needs, of no agent."""
+
+    name: ProcessName
+
+
+ParsedSelector = OneAgent | AllAgents | RandomAgents | VertexAgent | QueueAgents | OtherProcess
 
 
 class SelectorError(ValueError):
@@ -60,6 +69,8 @@ def parsed(selector: Selector) -> ParsedSelector:
     match = _TEXT.fullmatch(selector)
     if match is None:
         raise SelectorError(f"no selector: {selector!r}")
+    if match["process"]:
+        return OtherProcess("netem" if match["process"] == "netem" else "world")
     if match["random"]:
         return RandomAgents(int(match["random"]))
     if match["vertex"]:
@@ -67,3 +78,13 @@ def parsed(selector: Selector) -> ParsedSelector:
     if match["queue"]:
         return QueueAgents(match["queue"])
     return AllAgents()
+
+
+def other_process(selectors: Selectors) -> ProcessName | None:
+    """Return the process that the selectors name instead of agents; None where they do not."""
+    match selectors:
+        case ("netem",):
+            return "netem"
+        case ("world",):
+            return "world"
+    return None
