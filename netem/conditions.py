@@ -60,7 +60,9 @@ class LinkModels:
 
     def common(self, channel: int, source: int) -> LinkModel | None:
         """Return the model that all links from a source share; None where a link has its own."""
-        return self._channels[channel] if (channel, source) not in self._reach_m else None
+        if self._reach_m and (channel, source) in self._reach_m:
+            return None
+        return self._channels[channel]
 
     def of_link(self, channel: int, source: int, destination: int) -> LinkModel:
         """Return the model of one directed link on one channel."""
@@ -83,7 +85,8 @@ class LinkModels:
 
     def reach_m(self, channel: int, source: int) -> float:
         """Return the distance [m] beyond which no agent receives a source on a channel."""
-        return self._reach_m.get((channel, source), self._channels[channel].reach_m)
+        reach_m = self._channels[channel].reach_m
+        return self._reach_m.get((channel, source), reach_m) if self._reach_m else reach_m
 
 
 def differing(a: LinkModels, b: LinkModels, channel: int, source: int, near: InRange) -> int:

@@ -10,6 +10,8 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from hashlib import sha256
 from math import inf
+from operator import itemgetter
+from typing import Any
 
 import msgspec
 
@@ -34,13 +36,17 @@ from netem.wire.frame import (
 )
 
 DELIVERED = Cause.DELIVERED
+_FRAME = itemgetter(-1)
 FATES = tuple(cause.name.lower() for cause in Cause)
 SURELY_FIT = (MAX_BATCH_B - BATCH_HEAD_B) // (FRAME_HEAD_B + MAX_PAYLOAD_B)
 """This many frames fit one batch, whatever their payloads."""
 FIRST_FORGED = 2**52
 """From here on saboteurs' frames are counted: agents' own keep numbers and fates."""
-_InFlight = tuple[float, int, int, int, int, int, Frame]
-"""A frame in a receiver's queue: due time [s], source, incarnation, channel, count, copy, frame."""
+_InFlight = tuple[Any, ...]
+"""A frame in a receiver's queue: due time [s], source, incarnation, channel, count, copy, frame.
+
+Compiled code would make a tuple of known types anew for each receiver, and take it apart.
+"""
 
 
 class Medium:
@@ -119,12 +125,12 @@ class Medium:
         """Send one agent's frames of one slot at ``sent_s`` [s]: decide their fate on each link."""
         incarnation = transmission.incarnation
         for outgoing in transmission.frames:
-            count_key = (source, incarnation, outgoing.channel)
+            channel, payload = outgoing.channel, outgoing.payload
+            count_key = (source, incarnation, channel)
             count = self._counts.get(count_key, self._first_count)
             self._counts[count_key] = count + 1
-            self._send(
-                Frame(source, incarnation, outgoing.channel, count, outgoing.payload), sent_s
-            )
+            frame = Frame(source, incarnation, channel, count, payload)
+            self._send(Sending(frame, (source, incarnation, channel, count), sent_s, 0.0))
         if self._saboteurs:
             for saboteur in self._saboteurs.values():
                 saboteur.overhear(source, sent_s, transmission)
@@ -141,10 +147,8 @@ class Medium:
                 before = self.in_flight
                 count = self._next_forged
                 self._next_forged += 1
-                self._send(
-                    Frame(forged.victim, forged.incarnation, forged.channel, count, forged.payload),
-                    now_s,
-                )
+                key = (forged.victim, forged.incarnation, forged.channel, count)
+                self._send(Sending(Frame(*key, forged.payload), key, now_s, 0.0))
                 received = self.in_flight - before
                 self._struck[number] = self._struck.get(number, 0) + received
 
@@ -162,6 +166,8 @@ class Medium:
         to which the due time [s] of each returned frame is appended.
         """
         queue = self._queues[receiver]
+        if not queue:
+            return ()
         queue.sort()
         count = bisect_right(queue, (now_s, inf))
         if count > SURELY_FIT:
@@ -172,7 +178,7 @@ class Medium:
             due_s.extend([entry[0] for entry in taken])
         self.in_flight -= count
         self._fates[Cause.DELIVERED] += count
-        return tuple([entry[-1] for entry in taken])
+        return tuple(map(_FRAME, taken))
 
     def discard(self, receiver: int) -> None:
         """Drop the frames in flight to a receiver that has disappeared, or to all at a kill."""
@@ -223,22 +229,21 @@ class Medium:
             struck=tuple(sorted(self._struck.items())),
         )
 
-    def _send(self, frame: Frame, sent_s: float) -> None:
+    def _send(self, sending: Sending) -> None:
         """Count a frame; decide its fate on its link to every other agent, in ascending order."""
-        source, channel, models = frame.source, frame.channel, self._conditions.models
+        source, _, channel, _ = sending.key
+        models = self._conditions.models
         self.sent += 1
-        self._sent_b[len(CHANNELS) * source + channel] += len(frame.payload)
+        self._sent_b[len(CHANNELS) * source + channel] += len(sending.frame.payload)
         self.addressed += self._others[source]
         if self._conditions.without:
             self._count_altered(source, channel)
-        key = (source, frame.incarnation, channel, frame.count)
-        sending = Sending(frame, key, sent_s, 0.0)
         model = models.of_channel(channel)
         if model.rate_kbit < inf:
             waited_s = self._enter_rate_queue(sending, model)
             if waited_s is None:
                 return
-            sending = Sending(frame, key, sent_s, waited_s)
+            sending = Sending(sending.frame, sending.key, sending.sent_s, waited_s)
         near = self._range_index.in_range(source, models.reach_m(channel, source))
         self._fates[Cause.DROPPED_RANGE] += self._others[source] - len(near)
         common = models.common(channel, source)
@@ -278,9 +283,10 @@ class Medium:
 
     def _deliver_all(self, sending: Sending, near: InRange, delay_s: float) -> None:
         """Deliver a frame to all receivers in range, after the same delay [s]."""
-        frame, key, sent_s = sending.frame, sending.key, sending.sent_s
-        log_entry = HEAD(*key) + FATE(0, DELIVERED, delay_s, -1.0)
-        entry = (sent_s + delay_s, *key, 0, frame)
+        source, incarnation, channel, count = sending.key
+        log_entry = HEAD(source, incarnation, channel, count) + FATE(0, DELIVERED, delay_s, -1.0)
+        due_s = sending.sent_s + delay_s
+        entry: _InFlight = (due_s, source, incarnation, channel, count, 0, sending.frame)
         queues, pages = self._queues, self._delivery_log.pages
         for receiver, _ in near:
             queues[receiver].append(entry)
@@ -289,15 +295,18 @@ class Medium:
 
     def _decide_plain(self, sending: Sending, near: InRange, link: LinkModel) -> None:
         """Decide the fate of a frame on links of one model that has only loss and jitter."""
-        frame, key, sent_s = sending.frame, sending.key, sending.sent_s
-        head, queues, pages = HEAD(*key), self._queues, self._delivery_log.pages
+        source, incarnation, channel, count = sending.key
+        frame, sent_s = sending.frame, sending.sent_s
+        head = HEAD(source, incarnation, channel, count)
+        queues, pages = self._queues, self._delivery_log.pages
         fates, delivered = self._fates, 0
         for (receiver, _), fate in zip(near, self._links.plain(link, sending, near), strict=True):
             pages[receiver] += head + FATE(0, fate.cause, fate.delay_s, fate.flipped_at)
             if fate.cause:
                 fates[fate.cause] += 1
             else:
-                queues[receiver].append((sent_s + fate.delay_s, *key, 0, frame))
+                due_s = sent_s + fate.delay_s
+                queues[receiver].append((due_s, source, incarnation, channel, count, 0, frame))
                 delivered += 1
         self.in_flight += delivered
 
