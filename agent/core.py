@@ -244,16 +244,16 @@ class Agent:
             self._note_blocked(key)
         place = self._intent.place if self._intent is not None else None
         cost_m = self._intent.cost_m if self._intent is not None else None
-        own = Peer(id=self.id, position=observation.position, place=place, cost_m=cost_m)
+        position = observation.position
         summaries, self._summaries = self._summaries, {}
         return Senses(
             now_s=now_s,
-            position=observation.position,
+            position=position,
             velocity=observation.velocity,
             yaw=observation.yaw,
             vehicles=observation.vehicles,
             neighbours=self._neighbours.heard(now_s, key),
-            team=lambda: self._table.team(own, key),
+            team=lambda: self._table.team(Peer(self.id, position, place, cost_m), key),
             mission=mission,
             silent=self._unidentified,
             blocked=self._blocked,
@@ -278,7 +278,9 @@ class Agent:
         beacons = self._neighbours.beacons()
         team = self._table.members(now_s)
         counted = self._intent.words.agents if self._intent is not None else 0
-        self._record_age_s = max((0.0, *(member.age_s for member in team)))
+        self._record_age_s = 0.0
+        for member in team:
+            self._record_age_s = max(self._record_age_s, member.age_s)
         self._unidentified = self._unidentified_vehicles.update(
             Surroundings(
                 now_s=now_s,

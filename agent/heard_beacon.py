@@ -98,8 +98,8 @@ class HeardBeacon:
         self.rank: int = beacon.rank
         self.cost_mm: int = beacon.cost_mm
         self.speed_cap: float = beacon.speed_cap
-        self.echoes: dict[int, int] = dict(reversed(beacon.echoes))
-        """The last sequence heard of each neighbour; of two the first counts."""
+        self._echoed = [agent for agent, _ in beacon.echoes]
+        self._sequences = [sequence for _, sequence in beacon.echoes]
         self.mission: int = beacon.mission
         self.frame_key: int = beacon.frame_key
         self.frame: Pose = beacon.frame
@@ -110,3 +110,10 @@ class HeardBeacon:
         claims = self.queue >= 0 and self.rank >= 0 and self.mission != NO_MISSION
         self.place = Place(self.queue, self.rank) if claims else None
         """The place that the sender claims in its mission."""
+
+    def echo_of(self, agent: int) -> int:
+        """Return the last sequence that the sender heard of an agent, -1 for none."""
+        for k, each in enumerate(self._echoed):
+            if each == agent:
+                return self._sequences[k]
+        return -1

@@ -12,6 +12,7 @@ from agent.controller import UNHEARD, Heard, Link
 from agent.heard_beacon import NEVER_HEARD, HeardBeacon, Version
 from agent.messages import Vector
 from agent.rejection import RejectedError
+from agent.vectors import apart
 
 MAX_AGE_S: Final = 5.0
 """An older beacon is rejected."""
@@ -24,6 +25,8 @@ HEARD_BY_OTHERS: Final = 0.25
 """Share of T_lost by which others may hear a departing agent's last beacon later."""
 POOLED: Final = 0.005
 """Weight of one beacon in the radio's quality: it follows from the last 200 beacons or so."""
+NEARLY: Final = 1.0 - 1e-9
+"""By this factor a distance falls below any rounding of it."""
 WITNESSES: Final = 2
 """So many neighbours must have been heard from a distance until it counts as within reach."""
 ECHO_LASTS_S: Final = 3.0
@@ -40,12 +43,18 @@ class LinkQuality:
         self._beacons = self._sent = self._latency_s = 0.0
         self._farthest_m: dict[int, float] = {}
         """The two neighbours that were heard from farthest away."""
+        self._reach_m = 0.0
+        """From how far two neighbours were heard; 0 before."""
 
     def note(self, gap: float, latency_s: float) -> None:
         """Note a beacon heard. gap: beacons that its sender has sent since the last one heard."""
         self._beacons += 1.0 - POOLED * self._beacons
         self._sent += gap - POOLED * self._sent
         self._latency_s += latency_s - POOLED * self._latency_s
+
+    def may_reach(self, away_m: float) -> bool:
+        """Whether a distance [m], but for rounding, is as far as that of one of the two."""
+        return away_m >= NEARLY * self._reach_m
 
     def note_distance(self, sender: int, away_m: float) -> None:
         """Note from how far a neighbour was heard [m].
@@ -57,6 +66,8 @@ class LinkQuality:
         farthest[sender] = max(farthest.get(sender, 0.0), away_m)
         if len(farthest) > WITNESSES:
             del farthest[min(farthest, key=farthest.__getitem__)]
+        if len(farthest) == WITNESSES:
+            self._reach_m = min(farthest.values())
 
     def link(self) -> Link:
         """Return the quality now."""
@@ -146,8 +157,8 @@ class Neighbours:
         if age_s > MAX_AGE_S:
             raise RejectedError("old", f"the stamp is {age_s:.3f} s old")
         # A fresh stamp is later than every own beacon; only an old one can contradict its echo.
-        echoed = beacon.echoes.get(self._own_id)
-        sent_s = own_sent_s.get(echoed, -inf) if echoed is not None else -inf
+        echoed = beacon.echo_of(self._own_id)
+        sent_s = own_sent_s.get(echoed, -inf) if echoed >= 0 else -inf
         if age_s > self._slack_s and version.stamp_s + self._slack_s < sent_s:
             raise RejectedError("offset", "the stamp is older than a beacon that it echoes")
         latency_s = age_s if age_s > 0.0 else 0.0
@@ -158,13 +169,15 @@ class Neighbours:
             self._known[sender] = known
             self._put_in_order()
         self._quality.note(gap, latency_s)
-        if echoed is not None:
+        if echoed >= 0:
             known.echoed_s = version.stamp_s
 
     def link(self, here: Vector) -> Link:
         """Return the radio's quality as measured. here: own position [m; world frame]."""
         for known in self._in_order:
-            self._quality.note_distance(known.id, dist(here, known.beacon.position))
+            there = known.beacon.position
+            if self._quality.may_reach(apart(here, there)):
+                self._quality.note_distance(known.id, dist(here, there))
         return self._quality.link()
 
     @property

@@ -5,7 +5,6 @@ jumps several times in a row measures nothing real.
 """
 
 from array import array
-from collections.abc import Sequence
 from typing import Final
 
 from agent.messages import NO_ECHO_MM, PROXIMITY_RANGE_M, Scan, Vector
@@ -43,23 +42,27 @@ class VehicleJumps(_Jumps):
         super().__init__()
         self._closing_mps = 2.0 * max_speed
         self._slack_m = SLACK_M + 2.0**0.5 * 6.0 * noise_m
-        self._before: Sequence[Vector] = ()
+        self._before: tuple[Vector, ...] = ()
         self._read_s = 0.0
 
-    def add(self, now_s: float, vehicles: Sequence[Vector]) -> None:
+    def add(self, now_s: float, vehicles: tuple[Vector, ...]) -> None:
         """Take the next reading, relative to the own centre [m; world axes].
 
         A vehicle near the edge of the sensor's range may have come in from outside.
         """
         step_m = self._slack_m + self._closing_mps * (now_s - self._read_s)
-        inside = [each for each in vehicles if length(each) < PROXIMITY_RANGE_M - step_m]
+        inside = new = 0
+        for each in vehicles:
+            if length(each) < PROXIMITY_RANGE_M - step_m:
+                inside += 1
+                if _is_new(each, self._before, step_m):
+                    new += 1
         if inside:
-            new = sum([_is_new(each, self._before, step_m) for each in inside])
-            self.count(jumped=2 * new > len(inside))
+            self.count(jumped=2 * new > inside)
         self._before, self._read_s = vehicles, now_s
 
 
-def _is_new(vehicle: Vector, before: Sequence[Vector], step_m: float) -> bool:
+def _is_new(vehicle: Vector, before: tuple[Vector, ...], step_m: float) -> bool:
     for old in before:  # noqa: SIM110  # several times as fast as all()
         if apart(vehicle, old) <= step_m:
             return False

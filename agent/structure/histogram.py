@@ -8,13 +8,13 @@ BINS: Final = 16
 EDGES_M = tuple(0.75 * 1.31**k for k in range(BINS - 1))
 """Upper edge of each bin but the last [m]."""
 EMPTY = bytes(BINS)
+OF_ONE = tuple(bytes([k == filled for k in range(BINS)]) for filled in range(BINS))
+"""The histogram of one member in each bin."""
 
 
 def of_one(away_m: float) -> bytes:
     """Return the histogram of one member at a distance from the vertex [m]."""
-    bins = bytearray(BINS)
-    bins[bisect_left(EDGES_M, away_m)] = 1
-    return bytes(bins)
+    return OF_ONE[bisect_left(EDGES_M, away_m)]
 
 
 def total(histograms: Iterable[bytes]) -> bytes:

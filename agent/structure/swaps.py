@@ -145,7 +145,8 @@ def _gain(view: View, mine: Vector | None, other: Heard) -> float:
 
     mine: the own place [m; world frame], None where there is none.
     """
-    theirs = view.point(*_numbered(view, other))
+    place = other.place
+    theirs = view.point(place.queue, view.number_of(other)) if place is not None else None
     if mine is None or theirs is None:
         return 0.0
     (x, y, z), (u, v, w), (a, b, c), (d, e, f) = view.here, other.position, mine, theirs
@@ -154,9 +155,5 @@ def _gain(view: View, mine: Vector | None, other: Heard) -> float:
 
 def _apart(view: View, claim: Claim, other: Heard) -> bool:
     """Whether the two are of different queues, one of which is displaced: so is what they gain."""
-    queues = {claim.queue, _numbered(view, other)[0]}
+    queues = {claim.queue, other.place.queue if other.place is not None else 0}
     return len(queues) > 1 and not view.gathering.isdisjoint(queues)
-
-
-def _numbered(view: View, other: Heard) -> tuple[int, int]:
-    return (other.place.queue, view.number_of(other)) if other.place is not None else (0, 0)

@@ -98,8 +98,7 @@ class View:
     def latest(self) -> LeaderSummary | None:
         """The latest summary of a leader whose counts were steady."""
         if not self._knows_latest:
-            steady = [each for each in self.summaries if each is not None and each.go]
-            self._latest = max(steady, key=lambda each: each.version, default=None)
+            self._latest = _latest_of(self.summaries, steady=True)
             self._knows_latest = True
         return self._latest
 
@@ -124,8 +123,7 @@ class View:
     def _shared(self) -> tuple[int, ...]:
         if self.is_under_way:
             return self.map.members(self.expected, self.blocked)
-        known = [each for each in self.summaries if each is not None]
-        latest = max(known, key=lambda each: each.version, default=None)
+        latest = _latest_of(self.summaries, steady=False)
         return self.map.members(latest.total if latest is not None else 0, self.blocked)
 
     @property
@@ -190,7 +188,8 @@ class View:
         if self.blocked:
             for taken in sorted(self.map.blocked_numbers(queue, self.blocked)):
                 members += taken <= members
-        return max(members, number, 1)
+        least = max(number, 1)
+        return max(members, least)
 
     def distance(self, queue: int, number: int) -> float:
         """Return the own distance from a member's place [m]; infinite where there is none."""
@@ -226,6 +225,15 @@ class View:
         slot = self.map.slot(claim.queue, claim.number, self.extent(claim.queue, claim.number))
         place = self.map.place(claim.queue, claim.number)
         return OwnTarget(place, slot, claim.leads) if slot is not None else None
+
+
+def _latest_of(summaries: Sequence[LeaderSummary | None], *, steady: bool) -> LeaderSummary | None:
+    """Return the latest summary, None for none. steady: of those whose counts were steady."""
+    latest, version = None, -1
+    for each in summaries:
+        if each is not None and each.version > version and (each.go or not steady):
+            latest, version = each, each.version
+    return latest
 
 
 def queue_of(heard: Heard) -> int:

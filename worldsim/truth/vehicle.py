@@ -2,6 +2,7 @@
 
 from array import array
 from collections.abc import Sequence
+from itertools import chain
 from math import cos, inf, isnan, nan, sin, sqrt, tau
 from typing import Final, NamedTuple, assert_never, final
 
@@ -87,12 +88,12 @@ class Vehicles:
 
     def pose_bytes(self) -> bytes:
         """Return all positions, then all yaws, then all tilts, as doubles."""
-        row = [axis for each in self.positions for axis in each]
-        row += self.yaws
+        row = array("d", chain.from_iterable(self.positions))
+        row.extend(self.yaws)
         if not self._tilts:
-            return array("d", row).tobytes() + self._level
-        row += [angle for each in self.tilts for angle in each]
-        return array("d", row).tobytes()
+            return row.tobytes() + self._level
+        row.extend(chain.from_iterable(self.tilts))
+        return row.tobytes()
 
     def place(self, row: int, position: Vector, yaw: float) -> None:
         """Put a vehicle into the world [m; world frame, rad], at rest and level."""
@@ -167,7 +168,7 @@ class Vehicles:
 
 def _array(rows: list[Vector]) -> Floats:
     """Return vectors as an array; numpy reads one flat list far faster than many rows."""
-    return np.array([axis for each in rows for axis in each]).reshape(-1, 3)
+    return np.array(list(chain.from_iterable(rows))).reshape(-1, 3)
 
 
 def _within(value: float, most: float) -> float:

@@ -112,8 +112,7 @@ class World:
         slot, time_s, vehicles, clocks = self.slot, self.time_s, self.vehicles, self.clocks
         read = self._proximity.read(self.positions(), agents, slot, time_s)
         readings = [
-            each if self._has_proximity[agent] else NO_READING
-            for agent, each in zip(agents, read, strict=True)
+            read[k] if self._has_proximity[agent] else NO_READING for k, agent in enumerate(agents)
         ]
         scans = self._scans(agents)
         if self.sensor_faults:
@@ -129,12 +128,12 @@ class World:
                 vehicles.positions[agent],
                 vehicles.velocities[agent],
                 vehicles.yaws[agent],
-                each.vehicles,
-                each.obstacles,
+                readings[k].vehicles,
+                readings[k].obstacles,
                 (),
-                scans.get(agent, ()),
+                scans.get(agent, ()) if scans else (),
             )
-            for agent, each in zip(agents, readings, strict=True)
+            for k, agent in enumerate(agents)
         ]
 
     def _scans(self, agents: list[int]) -> dict[int, tuple[Scan, ...]]:
