@@ -22,6 +22,25 @@ check() {
     fi
 }
 
+# begin NAME COMMAND: run a check meanwhile, in the time that others leave; end_begun shows it.
+begin() {
+    begun=$1 begun_output=$(mktemp)
+    shift
+    nice "$@" >"$begun_output" 2>&1 &
+    begun_pid=$!
+}
+
+# end_begun: wait for the check that was begun; print its last line, and all where it failed.
+end_begun() {
+    if wait "$begun_pid"; then
+        printf '%-16s %s\n' "$begun" "$(tail -n 1 "$begun_output")"
+    else
+        printf '%-16s FAILED\n%s\n' "$begun" "$(<"$begun_output")"
+        failed=1
+    fi
+    rm "$begun_output"
+}
+
 set_up dev
 cd "$root"
 check format "$venv/bin/ruff" format --check .
@@ -34,10 +53,13 @@ if [ $# -gt 0 ]; then
 else
     # Virtual tests share the cores, one file per worker.
     "$venv/bin/pytest" -m "not processes" --numprocesses auto --dist loadfile || failed=1
-    # Processes mostly wait, so two such tests share the host; what a late host fails runs alone.
+    # Processes mostly wait, so two such tests share the host with the compiler; what a late host
+    # fails runs alone.
+    begin compiled "$venv/bin/python" -m tests.same_compiled
     processes=(tests/processes tests/tutorial)
     "$venv/bin/pytest" "${processes[@]}" -m "processes and not real_time" --numprocesses 2 \
         || failed=1
+    end_begun
     "$venv/bin/pytest" "${processes[@]}" -m "processes and real_time" || failed=1
 fi
 exit "$failed"

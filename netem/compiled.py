@@ -1,8 +1,9 @@
 """Compiled modules: they run instead of the pure ones for as long as they match them.
 
 ``deploy/compile.sh`` compiles what is hot, into ``build/compiled`` beside the packages, and writes
-a manifest last. The compiled modules run only if the manifest fits this Python and every source
-file: after an edit, or half a build, pure Python runs, and a line says why. It is never a mixture.
+a manifest last; a compiled wheel holds the same in a folder of its own. The compiled modules run
+only if the manifest fits this Python and every source file: after an edit, or half a build, pure
+Python runs, and a line says why. It is never a mixture.
 QSWARM_PURE=1 asks for pure Python.
 
 This module comes before all others, so it imports none of them.
@@ -22,7 +23,9 @@ from types import ModuleType
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-FOLDER = ROOT / "build" / "compiled"
+IN_WHEEL = Path(__file__).with_name("compiled_modules")
+"""Where a compiled wheel holds them."""
+FOLDER = IN_WHEEL if IN_WHEEL.is_dir() else ROOT / "build" / "compiled"
 MANIFEST = "manifest.json"
 PURE = "QSWARM_PURE"
 """The environment variable that asks for pure Python, here and in processes begun from here."""
