@@ -115,16 +115,32 @@ LOST_TO_PARTITION: Final = Verdict(Cause.DROPPED_PARTITION)
 LOST_TO_QUEUE: Final = Verdict(Cause.DROPPED_QUEUE)
 
 
+@final
+class PlainLaw:
+    """The law of a ``plain`` link, whose numbers are read once for all receivers of a frame."""
+
+    def __init__(self, link: LinkModel) -> None:
+        self._range_m: float = link.range_m
+        self._loss_percent: float = link.loss_percent
+        self._delay_ms: float = link.delay_ms
+        self._jitter_ms: float = link.jitter_ms
+        self._clean_delay_s: float = link.clean_delay_s
+
+    def verdict(self, distance_m: float, draws: PlainDraws | None) -> Verdict:
+        """Decide one frame; draws: None where the link's ``draws`` is False."""
+        if not distance_m <= self._range_m:
+            return LOST_TO_RANGE
+        if draws is None:
+            return Verdict(Cause.DELIVERED, self._clean_delay_s)
+        if draws.loss * 100.0 < self._loss_percent:
+            return LOST
+        delay_ms = self._delay_ms + self._jitter_ms * (2.0 * draws.delay - 1.0)
+        return Verdict(Cause.DELIVERED, delay_ms / 1000.0 if delay_ms > 0.0 else 0.0)
+
+
 def plain_verdict(link: LinkModel, distance_m: float, draws: PlainDraws | None) -> Verdict:
     """Decide one frame on a ``plain`` link; draws: None where ``link.draws`` is False."""
-    if not distance_m <= link.range_m:
-        return LOST_TO_RANGE
-    if draws is None:
-        return Verdict(Cause.DELIVERED, link.clean_delay_s)
-    if draws.loss * 100.0 < link.loss_percent:
-        return LOST
-    delay_ms = link.delay_ms + link.jitter_ms * (2.0 * draws.delay - 1.0)
-    return Verdict(Cause.DELIVERED, delay_ms / 1000.0 if delay_ms > 0.0 else 0.0)
+    return PlainLaw(link).verdict(distance_m, draws)
 
 
 def full_verdict(
@@ -204,9 +220,10 @@ class Links:
 
     def plain(self, link: LinkModel, sending: Sending, in_range: InRange) -> list[Verdict]:
         """Decide a frame for all receivers in range, whose links are alike and plain; in order."""
+        law = PlainLaw(link)
         if not link.draws:
             return [
-                _delayed(plain_verdict(link, distance_m, None), sending.waited_s)
+                _delayed(law.verdict(distance_m, None), sending.waited_s)
                 for _, distance_m in in_range
             ]
         verdicts: list[Verdict] = []
@@ -216,7 +233,7 @@ class Links:
                 group = receiver // GROUP_SIZE
                 group_draw = draw_group(self._seed, sending.frame, group)
             draws = plain_draws(group_draw, receiver)
-            verdicts.append(plain_verdict(link, distance_m, draws))
+            verdicts.append(law.verdict(distance_m, draws))
         waited_s = sending.waited_s
         return [_delayed(verdict, waited_s) for verdict in verdicts] if waited_s else verdicts
 

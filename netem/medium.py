@@ -300,7 +300,9 @@ class Medium:
         head = HEAD(source, incarnation, channel, count)
         queues, pages = self._queues, self._delivery_log.pages
         fates, delivered = self._fates, 0
-        for (receiver, _), fate in zip(near, self._links.plain(link, sending, near), strict=True):
+        verdicts = self._links.plain(link, sending, near)
+        for k, (receiver, _) in enumerate(near):
+            fate = verdicts[k]
             pages[receiver] += head + FATE(0, fate.cause, fate.delay_s, fate.flipped_at)
             if fate.cause:
                 fates[fate.cause] += 1

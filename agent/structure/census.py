@@ -83,6 +83,8 @@ class Census:
         """How often a member's code changed, or a new member became known."""
         self._deadline_s: list[float] = []
         """T_lost before a member is late, by member [s]; infinite for one that is unknown."""
+        self._earliest_s = inf
+        """None of these is earlier [s]."""
 
     @property
     def most(self) -> int:
@@ -152,7 +154,10 @@ class Census:
     def ask(self, now_s: float, lost_s: float) -> None:
         """Ask for members whose labels are late. lost_s: T_lost of a neighbour [s]."""
         oldest_s = now_s - lost_s
-        if not self._deadline_s or min(self._deadline_s) >= oldest_s:
+        if self._earliest_s >= oldest_s:
+            return
+        self._earliest_s = min(self._deadline_s)
+        if self._earliest_s >= oldest_s:
             return
         forgotten = int((oldest_s - FORGOTTEN_S) / QUANTUM_S) * CODES
         for member in [m for m, each_s in enumerate(self._deadline_s) if each_s < oldest_s]:
@@ -190,7 +195,9 @@ class Census:
             if member != self._own and now_s > self._changed_s:
                 self._changed_s = now_s
         self._labels[member] = label
-        self._deadline_s[member] = label * LABEL_S + LAGS * self._lag_s[member]
+        deadline_s = label * LABEL_S + LAGS * self._lag_s[member]
+        self._deadline_s[member] = deadline_s
+        self._earliest_s = min(self._earliest_s, deadline_s)
 
     def population(self, now_s: float, lost_s: float, queues: int, vertices: int) -> Population:
         """Return who is there now. lost_s: T_lost of a neighbour, and time for an answer [s]."""
