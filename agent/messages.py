@@ -69,7 +69,8 @@ MAX_PLACES: Final = 12
 Places = Annotated[tuple[tuple[Index, Index], ...], Meta(max_length=MAX_PLACES)]
 """Some places, each (queue, rank)."""
 
-ROLES = ("member", "sub-vertex", "vertex", "distress")
+Role = Literal["member", "sub-vertex", "vertex", "distress"]
+ROLES: tuple[Role, ...] = ("member", "sub-vertex", "vertex", "distress")
 MEMBER, SUB_VERTEX, VERTEX, DISTRESS = range(len(ROLES))
 """Roles of an agent in its queue. A sub-vertex is a member that another agent follows."""
 

@@ -39,6 +39,8 @@ SENTENCES: list[tuple[dict[str, Any], str]] = [
     ({"kind": "queue", "agent": 3, "queue": 0}, "a3 enters queue Q1"),
     ({"kind": "queue", "agent": 3, "queue": None}, "a3 leaves its queue"),
     ({"kind": "role", "agent": 3, "role": "vertex"}, "a3 becomes a vertex agent"),
+    ({"kind": "role", "agent": 3, "role": "member"}, "a3 becomes a member"),
+    ({"kind": "role", "agent": 3, "role": "distress"}, "a3 is in distress"),
     (
         {"kind": "clock", "agent": 3, "number": 1, "offset_s": -3.0, "drift_ppm": 9.0, **SCHEDULED},
         "the clock of a3 goes wrong by -3 s, +9 ppm (scheduled)",

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from agent.config import Comms
+from agent.messages import Role
 from netem.link_parameters import Conditions
 from tests.recording.flights import straight_flight, wedge
 from worldsim.judge.connectivity import Connectivity, rounds_to_all
@@ -129,11 +130,18 @@ def test_a_change_of_place_in_a_quiet_team_violates_i7_unless_a_fault_precedes_i
 
 
 def test_a_fourth_change_of_role_without_a_fault_violates_i6() -> None:
-    flips = [RoleChanged(t_s=10.0 + k, agent=3, role="member") for k in range(4)]
+    roles: tuple[Role, ...] = ("vertex", "member", "vertex", "distress")
+    flips = [RoleChanged(t_s=10.0 + k, agent=3, role=role) for k, role in enumerate(roles)]
     assert judged(flight(), *flips[:3])["I6"][1] == 0
     assert judged(flight(), *flips)["I6"][1] == 1
     fault = msgspec.structs.replace(HEALED, t_s=12.5)
     assert judged(flight(), *flips[:3], fault, flips[3])["I6"][1] == 0
+
+
+def test_i6_counts_leads_and_not_who_follows_whom() -> None:
+    roles: tuple[Role, ...] = ("distress", "member", "sub-vertex", "member", "vertex", "member")
+    following = [RoleChanged(t_s=10.0 + k, agent=3, role=role) for k, role in enumerate(roles)]
+    assert judged(flight(), *following)["I6"][1] == 0
 
 
 def test_agents_have_time_to_act_however_fast_the_radio() -> None:

@@ -12,7 +12,7 @@ from typing import Protocol, final
 import msgspec
 import numpy as np
 
-from agent.messages import Command, Mission, Observation, Vector
+from agent.messages import ROLES, Command, Mission, Observation, Vector
 from worldsim.engine.counters import RadioUse, RejectionCounters
 from worldsim.engine.operations import Operation, StartProcesses, StopWorldProcess
 from worldsim.engine.queue_neighbours import QueueNeighbours
@@ -172,6 +172,7 @@ class SlotLoop:
             self.radio_use.count_step(agent, len(telemetry.heard), needed)
             self.effects.missions.report(agent, telemetry.mission, self.world.time_s)
             self._report_place(agent, telemetry.place)
+            self._report_role(agent, telemetry.role)
             if telemetry.rejected:
                 self.rejections.update(agent, command)
 
@@ -220,10 +221,13 @@ class SlotLoop:
         self.emit(SlotChanged(t_s=t_s, agent=agent, place=now, before=before))
         if before is None or now is None or before[0] != now[0]:
             self.emit(QueueChanged(t_s=t_s, agent=agent, queue=now[0] if now else None))
-        if _is_vertex(before) != _is_vertex(now):
-            self.emit(
-                RoleChanged(t_s=t_s, agent=agent, role="vertex" if _is_vertex(now) else "member")
-            )
+
+    def _report_role(self, agent: int, now: int) -> None:
+        """Emit an event for a change of an agent's role in the hierarchy of its queue."""
+        if now != self.effects.roles[agent]:
+            self.effects.roles[agent] = now
+            t_s = round(self.world.time_s, 6)
+            self.emit(RoleChanged(t_s=t_s, agent=agent, role=ROLES[now]))
 
     def _judge_tick(self) -> None:
         """Judge and record the present tick."""
@@ -238,7 +242,3 @@ class SlotLoop:
 
 def _is_pause_of_world(operation: Operation) -> bool:
     return isinstance(operation, StopWorldProcess) and operation.cause == "pause"
-
-
-def _is_vertex(place: tuple[int, int] | None) -> bool:
-    return place is not None and place[1] == 0

@@ -7,7 +7,7 @@ Then it is applied here: to the members, the radio's conditions, the sensors and
 from collections.abc import Callable, Iterator
 from typing import Literal, assert_never
 
-from agent.messages import NO_MISSION
+from agent.messages import MEMBER, NO_MISSION
 from agent.qstructure.formation import FormationSpec, formation_of
 from netem.conditions import NetworkConditions
 from netem.faults import FaultOrder, RadioFault, Sabotage
@@ -78,6 +78,8 @@ class TimelineEffects:
         self.faults = FaultReports()
         self.places: list[tuple[int, int] | None] = [None] * scenario.rows
         """The place (queue, rank) that each agent claims, as last reported; row i = agent i."""
+        self.roles = [MEMBER] * scenario.rows
+        """The role of each agent, as last reported: an index of ROLES."""
         self._spacing_m = scenario.control.spacing_m
         self._formation = formation_of(scenario.formation, self._spacing_m)
         self._agent_faults = AgentFaultEffects(world)
@@ -249,7 +251,7 @@ class TimelineEffects:
             self._world.enter(agent, pose.position, pose.yaw)
         event = _start_event(operation.kind)
         for agent, incarnation in operation.incarnations.items():
-            self.places[agent] = None
+            self.places[agent], self.roles[agent] = None, MEMBER
             self.missions.report(agent, NO_MISSION, self._world.time_s)
             self._emit(
                 event(t_s=self._t_s, agent=agent, planned=True, by=by, incarnation=incarnation)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import assert_never
 
+from agent.messages import Role
 from worldsim.judge.event import PlannedEvent
 from worldsim.judge.radio_events import (
     ConditionsChanged,
@@ -38,6 +39,12 @@ from worldsim.judge.run_events import (
 )
 
 Queues = Sequence[str]
+ROLE_WORDS: dict[Role, str] = {
+    "member": "becomes a member",
+    "sub-vertex": "becomes a sub-vertex agent",
+    "vertex": "becomes a vertex agent",
+    "distress": "is in distress",
+}
 WARNINGS = (
     Killed,
     Left,
@@ -157,7 +164,7 @@ def _place(event: SlotChanged | QueueChanged | RoleChanged, queues: Queues) -> s
         case QueueChanged():
             return f"{agent} leaves its queue"
         case RoleChanged(role=role):
-            return f"{agent} becomes a {role} agent"
+            return f"{agent} {ROLE_WORDS[role]}"
     assert_never(event)
 
 

@@ -6,7 +6,8 @@ Premise of both: T_d + 2B have passed since the last fault, and the judge can te
 which hovering vehicles the component's agents know.
 I4: no two agents of a component claim one place for longer than 2B; under leaders and trees, no two
 that hear each other.
-I6: no agent that news reaches within a bound changes its role more than 3 times after a fault.
+I6: no agent that news reaches within a bound takes up or gives up the lead of a vertex more than 3
+times after a fault.
 I7: no agent changes its place in a settled team in which every agent is in its place; where frames
 are lost, each agent may once.
 A fault is an event of the timeline, an exit, a change of the connected components, a vehicle that
@@ -30,6 +31,7 @@ from worldsim.judge.blocked_places import BlockedPlaces
 from worldsim.judge.connectivity import Components, Connectivity
 from worldsim.judge.finding import InvariantTally
 from worldsim.judge.hovering_vehicles import HoveringVehicles
+from worldsim.judge.lead_changes import LeadChanges
 from worldsim.judge.phase import Phase
 from worldsim.judge.radio_events import NetemOutage, RadioRunEvent, Sabotaged
 from worldsim.judge.radio_load import RadioLoad
@@ -58,7 +60,6 @@ from worldsim.scenario.tables import CONVERGED_S, Scenario
 
 COMPONENTS_EVERY_S = 1.0
 """Interval at which connectivity is computed anew [s]."""
-MAX_ROLE_CHANGES = 3
 
 
 class Breaches(NamedTuple):
@@ -97,10 +98,7 @@ class Invariants:
         """For each component, the places in which others hover."""
         self._breaches: Breaches | None = None
         """None where it is clear of no component whom its agents know."""
-        self._role_changes: Counter[int] = Counter()
-        """Of each agent since the last fault."""
-        self._excess_role_changes = 0
-        """Above MAX_ROLE_CHANGES, since the last tick."""
+        self._leads = LeadChanges()
         self._moves: Counter[int] = Counter()
         """Changes of place of each agent since the last fault, in a quiet team."""
         self._quiet_since_s: float | None = None
@@ -121,10 +119,11 @@ class Invariants:
                 self._connectivity.handle_clock(event)
                 self._fault(event.t_s, event.t_s)
             case RoleChanged():
-                self._count_role_change(event)
+                self._leads.take(event, informed=self._is_informed(event.agent))
             case Restarted() | Joined():
                 if event.agent is not None:
                     self._places.restart(event.agent)
+                    self._leads.forget(event.agent)
                 self._fault(event.t_s, event.t_s + self._boot_s)
             case Killed() | Left() | Paused() | Resumed() | FormationGiven() | FrameGiven():
                 self._fault(event.t_s, event.t_s)
@@ -158,8 +157,7 @@ class Invariants:
         if self._load.is_overloaded(tick, self._connectivity.longest_s) or self._unobserved:
             self._excuse(tick.time_s)
             return
-        self.tallies["I6"].count(self._excess_role_changes)
-        self._excess_role_changes = 0
+        self.tallies["I6"].count(self._leads.take_excess())
         self.tallies["I4"].count(self._shared.count_lasting(tick.time_s, self._twice_s))
         if tick.time_s >= self._settled_s and self._breaches is not None:
             self.tallies["I2"].count(self._breaches.vertices)
@@ -180,14 +178,9 @@ class Invariants:
         moved = self._quiet_since_s is not None and last_claims is not self._claims
         return moved or (self._breaches is not None and any(self._breaches))
 
-    def _count_role_change(self, event: RoleChanged) -> None:
-        if event.agent is not None and self._is_informed(event.agent):
-            self._role_changes[event.agent] += 1
-            self._excess_role_changes += self._role_changes[event.agent] > MAX_ROLE_CHANGES
-
-    def _is_informed(self, agent: int) -> bool:
+    def _is_informed(self, agent: int | None) -> bool:
         """Return whether news reaches an agent within a bound, and both ways."""
-        if self._components is None:
+        if self._components is None or agent is None:
             return True
         label = int(self._components.label[agent])
         return self._twice_s < inf and label >= 0 and bool(self._components.closed[label])
@@ -201,12 +194,12 @@ class Invariants:
         """Evaluate nothing at a tick at which news takes no bounded time, and start anew then."""
         self._restart_premises(time_s)
         self._shared.forget()
-        self._excess_role_changes = 0
+        self._leads.take_excess()
 
     def _restart_premises(self, time_s: float) -> None:
         self._fault_s = max(self._fault_s, time_s)
         self._quiet_since_s = None
-        self._role_changes.clear()
+        self._leads.restart()
         self._moves.clear()
 
     def _find_components(self, tick: Tick) -> None:

@@ -3,11 +3,11 @@
 ``kind`` is the event's key. The judge, the recorder and readers of a run get the same events.
 """
 
-from typing import Literal, get_args
+from typing import get_args
 
 import msgspec
 
-from agent.messages import FramePath
+from agent.messages import FramePath, Role
 from agent.qstructure.formation import FormationSpec
 from netem.faults import OutageCause
 from worldsim.judge.event import Event, PlannedEvent
@@ -125,9 +125,9 @@ class QueueChanged(Event, frozen=True, kw_only=True, tag="queue"):
 
 
 class RoleChanged(Event, frozen=True, kw_only=True, tag="role"):
-    """An agent became a vertex agent, or a member again."""
+    """An agent took another role in the hierarchy of its queue."""
 
-    role: Literal["vertex", "member"]
+    role: Role
 
 
 class WorldStopped(PlannedEvent, frozen=True, kw_only=True, tag="world_outage"):

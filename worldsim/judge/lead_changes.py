@@ -1,0 +1,43 @@
+"""Changes of who leads a vertex, for I6: no agent takes the lead up, or gives it up, too often.
+
+Whether others follow a member is their choice, and distress is a search: neither counts.
+"""
+
+from collections import Counter
+
+from worldsim.judge.run_events import RoleChanged
+
+MAX_CHANGES = 3
+"""An agent may change so often after each fault."""
+
+
+class LeadChanges:
+    """Counts each agent's changes since the last fault."""
+
+    def __init__(self) -> None:
+        self._leading: set[int] = set()
+        self._changes: Counter[int] = Counter()
+        self._excess = 0
+
+    def take(self, event: RoleChanged, *, informed: bool) -> None:
+        """Take a change of role; informed: whether it counts, as news reaches the agent."""
+        agent, leads = event.agent, event.role == "vertex"
+        if agent is None or leads == (agent in self._leading):
+            return
+        self._leading ^= {agent}
+        if informed:
+            self._changes[agent] += 1
+            self._excess += self._changes[agent] > MAX_CHANGES
+
+    def forget(self, agent: int) -> None:
+        """Take the start of an agent's new process, which leads nothing."""
+        self._leading.discard(agent)
+
+    def restart(self) -> None:
+        """Start anew after a fault."""
+        self._changes.clear()
+
+    def take_excess(self) -> int:
+        """Return how many changes beyond the allowed ones there were since the last call."""
+        excess, self._excess = self._excess, 0
+        return excess
