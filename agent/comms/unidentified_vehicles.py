@@ -106,16 +106,27 @@ class DepartedMember(NamedTuple):
     stamp_s: float  # time of the report [s]
 
 
-class Surroundings(NamedTuple):
+@final
+class Surroundings:
     """What an agent senses and knows of vehicles near by at one time."""
 
-    now_s: float  # [s]
-    position: Vector  # own [m; world frame]
-    sensed: Sequence[Vector]  # vehicles, relative to ``position`` [m; world axes]
-    beacons: Sequence[HeardBeacon]  # the last one of each neighbour
-    team: Sequence[MemberPosition]  # all known members
-    departed: Sequence[DepartedMember] = ()  # members that fell silent since the last update
-    reports_vehicle: ReportsVehicle = _always
+    def __init__(  # noqa: PLR0913, PLR0917
+        self,
+        now_s: float,  # [s]
+        position: Vector,  # own [m; world frame]
+        sensed: Sequence[Vector],  # vehicles, relative to ``position`` [m; world axes]
+        beacons: Sequence[HeardBeacon],  # the last one of each neighbour
+        team: Sequence[MemberPosition],  # all known members
+        departed: Sequence[DepartedMember] = (),  # members that fell silent since the last update
+        reports_vehicle: ReportsVehicle = _always,
+    ) -> None:
+        self.now_s = now_s
+        self.position = position
+        self.sensed = sensed
+        self.beacons = beacons
+        self.team = team
+        self.departed = departed
+        self.reports_vehicle = reports_vehicle
 
 
 class UnidentifiedVehicles:

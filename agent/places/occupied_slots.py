@@ -45,6 +45,11 @@ class OccupiedSlots:
         self._agents, self._grown_s = 0, 0.0
         self._mission: Flown | None = None  # of the recent places, with its frame at that time
 
+    @property
+    def remembers(self) -> bool:
+        """Whether places were taken until just now."""
+        return bool(self._recent)
+
     def update(
         self,
         senses: Senses,
@@ -55,8 +60,9 @@ class OccupiedSlots:
     ) -> frozenset[Place]:
         """Return the places that are not available, by own sight and by others' reports.
 
-        holders: the known members; agents: size of the team; reported: places that others see
-        taken.
+        holders: the known members; they do not matter where no place is reported, or was taken of
+        late, and no vehicle is unidentified. agents: size of the team; reported: places that others
+        see taken.
         """
         if agents > self._agents:
             self._grown_s = senses.now_s

@@ -117,6 +117,28 @@ def _cheapest(candidates: set[Candidate]) -> tuple[Candidate, ...]:
     return tuple([each for _, each in in_turn[:MAX_CANDIDATES]])
 
 
+class OwnPart:
+    """One agent's own part in one tree: the same one until it says something else.
+
+    queues: those of the vertex.
+    """
+
+    def __init__(self, queues: Sequence[int]) -> None:
+        self._queues = queues
+        self._says: tuple[int, int, bytes, tuple[Candidate, ...]] | None = None
+        self._part: Subtree | None = None
+
+    def of(
+        self, queue: int, number: int, away_m: float, candidates: tuple[Candidate, ...]
+    ) -> Subtree:
+        """Return the part; see :func:`own_part`."""
+        says = queue, number, histogram.of_one(away_m), candidates
+        if self._part is None or says != self._says:
+            self._says = says
+            self._part = own_part(self._queues, queue, number, away_m, candidates)
+        return self._part
+
+
 def own_part(
     queues: Sequence[int],
     queue: int,

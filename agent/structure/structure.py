@@ -24,10 +24,10 @@ from agent.messages import (
     Subtree,
     Summary,
 )
-from agent.places.occupied_slots import OccupiedSlots
+from agent.places.occupied_slots import Holder, OccupiedSlots
 from agent.places.place_points import OwnTarget
 from agent.structure.claim import NO_QUEUE, Claim
-from agent.structure.convergecast import own_part
+from agent.structure.convergecast import OwnPart
 from agent.structure.destination import Destination
 from agent.structure.direct_rule import DirectRule
 from agent.structure.election import Election
@@ -80,6 +80,7 @@ class Structure:
         self._slow = SlowLayer(
             own_id, mission.key, formation, census, self._round_s, gathering=self._gathering
         )
+        self._own_parts = [OwnPart(homed) for homed in formation.homed]
         self._queue_choice = QueueChoice(own_id)
         self._election = Election(own_id, now_s)
         self._numbers = Numbers(own_id, now_s)
@@ -240,9 +241,11 @@ class Structure:
         for summary in view.summaries:
             if summary is not None:
                 reported.update(Place(*place) for place in summary.blocked)
-        own = view.target(self.claim)
-        peers = [(h.place, h.position) for h in view.heard]
-        peers.append((own.place if own is not None else None, view.here))
+        peers: list[Holder] = []
+        if reported or senses.silent or self._blocked or self._occupied.remembers:
+            own = view.target(self.claim)
+            peers = [(h.place, h.position) for h in view.heard]
+            peers.append((own.place if own is not None else None, view.here))
         self._blocked = view.blocked = self._occupied.update(
             senses, mission, peers, self.agents, frozenset(reported)
         )
@@ -277,7 +280,8 @@ class Structure:
         if claim.queue not in homed or (claim.leads and claim.number < 1):
             return None
         offers = () if self._direct.applies else self._queue_choice.candidates(view, claim)
-        return own_part(homed, claim.queue, claim.number, view.to_vertex(vertex), offers)
+        away_m = view.to_vertex(vertex)
+        return self._own_parts[vertex].of(claim.queue, claim.number, away_m, offers)
 
     def summary(self, now_s: float) -> Summary | None:
         """Return what is due on the multihop channel, None where nothing is."""
