@@ -118,7 +118,7 @@ def _setup(bus: Bus, agent: int, run: str, stop: StopRequest) -> AgentSetup | No
     while not stop.requested:
         answer = bus.query("setup", agent, b"", timeout_s=2.0)
         if answer is not None:
-            return _checked_setup(answer)
+            return checked_setup(answer)
         if time.monotonic() > deadline:
             raise WorldGoneError(
                 f"the world of run {run!r} did not answer within {SETUP_WITHIN_S:g} s"
@@ -128,7 +128,8 @@ def _setup(bus: Bus, agent: int, run: str, stop: StopRequest) -> AgentSetup | No
     return None
 
 
-def _checked_setup(answer: bytes) -> AgentSetup:
+def checked_setup(answer: bytes) -> AgentSetup:
+    """Decode the world's answer to an agent that asked for its setup. Raises WorldGoneError."""
     if len(answer) > MAX_SETUP_B:
         raise WorldGoneError(
             f"the world sent a setup of {len(answer)} B; {MAX_SETUP_B} B are allowed"

@@ -6,9 +6,12 @@ by itself does it on memory pages of its own, and when all agents start.
 
 from math import sin
 
+import msgspec
+
 from agent.codec import decode_observation, encode
 from agent.core import Agent, Outbox
 from agent.messages import Command, Observation
+from agent.process import checked_setup
 from agent.qstructure.formation import FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
 from netem.wire.channels import Channel
@@ -39,7 +42,8 @@ def warm_up() -> list[Command]:
     scenario = Scenario(
         name="warm-up", fleet=Fleet(agents=AGENTS), formation=FORMATION, duration_s=1.0
     )
-    agents = [Agent(scenario.agent_setup(agent, 0, 1)) for agent in range(AGENTS)]
+    setups = [msgspec.json.encode(scenario.agent_setup(agent, 0, 1)) for agent in range(AGENTS)]
+    agents = [Agent(checked_setup(setup)) for setup in setups]
     outboxes: list[Outbox] = []
     for step in range(STEPS):
         frames = [
