@@ -79,11 +79,13 @@ class Potential:
         q, q_tg: own position and immediate target [m; world frame]; others: the neighbours.
         """
         x, y, z = q[0] - q_tg[0], q[1] - q_tg[1], q[2] - q_tg[2]
+        here: Sequence[float] = q
+        target: Sequence[float] = q_tg
         for other in others:
             there = other.position
             if self._is_surely_apart(apart(q, there), apart(q_tg, other.target)):
                 continue
-            push = self._push(dist(q, there), dist(q_tg, other.target))
+            push = self._push(dist(here, there), dist(target, other.target))
             if push != 0.0:
                 x += push * (q[0] - there[0])
                 y += push * (q[1] - there[1])

@@ -5,7 +5,7 @@ from functools import lru_cache
 from math import log
 from typing import Final, final
 
-from agent.controller import Link
+from agent.controller import UNHEARD, Link
 
 LEAST_SILENCE_S: Final = 1.5
 LEAST_PARENT_S: Final = 0.25
@@ -62,3 +62,21 @@ def timing_of(link: Link, beacon_period_s: float) -> Timing:
         answer_s=2.0 * (ANSWER_S + latency) / (1.0 - loss),
         resettle_s=1.0 + 4.0 * latency,
     )
+
+
+class LinkTiming:
+    """The time limits of one agent, found anew only once it has measured the radio again.
+
+    beacon_period_s: of the local channel.
+    """
+
+    def __init__(self, beacon_period_s: float) -> None:
+        self._beacon_period_s = beacon_period_s
+        self._link = UNHEARD
+        self._timing = timing_of(UNHEARD, beacon_period_s)
+
+    def of(self, link: Link) -> Timing:
+        """Return the time limits for a radio as measured."""
+        if link is not self._link:
+            self._link, self._timing = link, timing_of(link, self._beacon_period_s)
+        return self._timing

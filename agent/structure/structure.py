@@ -35,7 +35,7 @@ from agent.structure.gathering import Gathering
 from agent.structure.head_count import HeadCount
 from agent.structure.leader import Leader
 from agent.structure.leader_place import LeaderPlace
-from agent.structure.link_timing import timing_of
+from agent.structure.link_timing import LinkTiming
 from agent.structure.numbers import Numbers
 from agent.structure.queue_choice import QueueChoice
 from agent.structure.queue_map import map_of
@@ -67,7 +67,7 @@ class Structure:
     ) -> None:
         own_id, formation = setup.id, map_of(mission.formation)
         self._own_id, self._map, self._occupied = own_id, formation, occupied
-        self._beacon_s = 1.0 / setup.comms.local_hz
+        self._timing = LinkTiming(1.0 / setup.comms.local_hz)
         self._round_s = 1.0 / setup.comms.multihop_hz if setup.comms.multihop_hz > 0.0 else inf
         self.claim = Claim(now_s)
         self.trees = [Tree(own_id, now_s) for _ in range(formation.vertices)]
@@ -145,7 +145,7 @@ class Structure:
     def _look(self, senses: Senses, mission: Flown) -> View:
         around, frame = senses.neighbours, mission.frame
         view = View(senses.now_s, senses.position, around, mission.key, self._map, frame)
-        view.timing = timing_of(senses.link, self._beacon_s)
+        view.timing = self._timing.of(senses.link)
         view.blocked = self._blocked
         if self._gathering is not None:
             view.gathering = self._gathering.queues(senses.now_s)

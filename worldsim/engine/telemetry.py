@@ -1,5 +1,6 @@
 """The newest telemetry of each agent, and the tick that truth and telemetry make together."""
 
+from array import array
 from math import atan2, degrees, hypot, nan, pi
 from typing import Final, TypeVar, final
 
@@ -114,10 +115,11 @@ def _reasons(rows: list[Telemetry]) -> NDArray[np.float32]:
 
 
 def _attitude(world: World) -> NDArray[np.float32]:
-    row: list[float] = []
-    for yaw, (pitch, roll) in zip(world.vehicles.yaws, world.vehicles.tilts, strict=True):
-        row += (yaw, pitch, roll)
-    return np.array(row, dtype=np.float32).reshape(-1, 3)
+    row, tilts = array("f"), world.vehicles.tilts
+    for agent, yaw in enumerate(world.vehicles.yaws):
+        row.append(yaw)
+        row.extend(tilts[agent])
+    return np.frombuffer(row, dtype=np.float32).reshape(-1, 3)
 
 
 def _links(rows: list[Telemetry]) -> NDArray[np.int32]:

@@ -209,7 +209,8 @@ class Judge:
         self._check_packets(tick.packets)
         self._missions.see(tick)
         self._count_turns(tick)
-        phase, team = self.phases[-1], np.flatnonzero(tick.alive).tolist()
+        phase = self.phases[-1]
+        team = [row for row, runs in enumerate(tick.alive.tolist()) if runs]
         error = phase.slot_error(tick, self._hovering.occupied_places(tick, phase, team))
         in_place = phase.see(tick.time_s, [error[row] for row in team])
         slot_error = np.array(error)

@@ -167,8 +167,8 @@ class Vehicles:
 
 
 def _array(rows: list[Vector]) -> Floats:
-    """Return vectors as an array; numpy reads one flat list far faster than many rows."""
-    return np.array(list(chain.from_iterable(rows))).reshape(-1, 3)
+    """Return vectors as an array; numpy reads one flat row far faster than many."""
+    return np.frombuffer(array("d", chain.from_iterable(rows))).reshape(-1, 3)
 
 
 def _within(value: float, most: float) -> float:
