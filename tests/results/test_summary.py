@@ -135,6 +135,22 @@ def test_few_late_ticks_leave_a_pass(run: FinishedRun, late: float | None) -> No
     assert summary(run, late_tick_fraction=late)["outcome"] == "pass"
 
 
+def test_on_a_slow_host_agents_that_were_late_are_not_blamed_for_a_collision(
+    run: FinishedRun,
+) -> None:
+    run.loop.judge.invariants()["I1"].violations = 1
+    detail = "most often those of agent-3 (21 %)"
+    late = {"late_tick_fraction": 0.5, "unsafe_on_time": False, "late_detail": detail}
+    made = summary(run, **late)
+    assert made["outcome"] == "inconclusive"
+    assert made["reason"] == (
+        f"the host was too slow: 50.0 % of ticks were late, {detail};"
+        " violated meanwhile: I1 (two vehicles, or a vehicle and an obstacle, were too near)"
+    )
+    in_time = summary(run, **{**late, "late_tick_fraction": 0.001})
+    assert in_time["outcome"] == "fail"
+
+
 def test_a_slow_host_does_not_excuse_a_collision(run: FinishedRun) -> None:
     run.loop.judge.invariants()["I1"].violations = 1
     made = summary(run, late_tick_fraction=0.5, cut_off_by="interrupted")

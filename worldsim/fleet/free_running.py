@@ -18,6 +18,7 @@ from netem.faults import FaultOrder
 from netem.messages import MediumCounters, Truth
 from netem.wire.bus import Bus
 from netem.wire.frame import WireError, pack, unpack
+from netem.wire.keys import agent_name
 from worldsim.engine.operations import (
     AdmitAgents,
     DisturbAgents,
@@ -38,12 +39,13 @@ from worldsim.fleet.delivery_latency import DeliveryLatency, LatencyCollector
 from worldsim.fleet.ipc import AgentProcess
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.netem_process import NetemProcess
-from worldsim.fleet.overload import Overload
+from worldsim.fleet.overload import REMEDIES, Overload, percent
 from worldsim.fleet.pacing import LatenessCounter, Pacer
 from worldsim.fleet.progress import ProgressReporter
 from worldsim.fleet.reconnection import Reconnection
 from worldsim.fleet.resources import ResourceMeter
 from worldsim.fleet.startup import Startup
+from worldsim.fleet.unsafe_agents import ON_TIME_FOR_S, UnsafeAgents
 from worldsim.fleet.world_stop import stop_world
 from worldsim.judge.event import By
 from worldsim.judge.run_events import LateStart
@@ -55,6 +57,8 @@ START_WITHIN_S = 5.0
 """How long before the end of a long boot the process starts: it waits at most 30 s for messages."""
 REPORTS_RING = 4
 POLL_S = 0.25
+BEHIND_S = 0.1
+"""The world is said to have fallen behind where it did so by more [s; wall time]."""
 FINAL_VERDICTS_WITHIN_S = 1.0
 MAX_VERDICTS_B = 64 * 1024
 
@@ -82,6 +86,7 @@ class FreeRunningFleet:
         )
         self.medium_counters: MediumCounters | None = None
         self.lateness = LatenessCounter(len(rows))
+        self._unsafe = UnsafeAgents(scenario.control.separation_m, scenario.obstacle_bound_m)
         self.overload = overload
         self.real_time_factor: float | None = None
         self.resources = ResourceMeter(launcher.steps)
@@ -129,6 +134,21 @@ class FreeRunningFleet:
         """Who but the host makes ticks late; None: nobody else is known."""
         ticks = self.loop.world.time_s * self._scenario.fleet.tick_hz
         return self._culprits.stop or self._culprits.slow(ticks)
+
+    @property
+    def late_detail(self) -> str | None:
+        """Who was late on a host that was too slow, and what to do; None: nobody was."""
+        latest, behind_s = self.lateness.latest, self._pacer.behind_s
+        if latest is None:
+            return None
+        agent, share = latest
+        world = f"; the world fell behind by {behind_s:.1f} s" if behind_s >= BEHIND_S else ""
+        return f"most often those of {agent_name(agent)} ({percent(share)}){world}; {REMEDIES}"
+
+    @property
+    def unsafe_on_time(self) -> bool:
+        """Whether agents that were on time have broken safety."""
+        return self._unsafe.on_time
 
     @property
     def ended_by(self) -> str | None:
@@ -207,6 +227,7 @@ class FreeRunningFleet:
         self._handle_exits()
         self._culprits.look(self._late_agents, self.loop.world.time_s)
         self._note_late_ticks(slot)
+        self._unsafe.see(self.loop.figures, self._was_on_time)
         while (left_s := self._pacer.left_s(slot + 1)) > 0.0 and not should_stop():
             self._launcher.wait(min(left_s, POLL_S))
             self._handle_exits()
@@ -226,6 +247,11 @@ class FreeRunningFleet:
         self._stop_world(should_stop)
         slowed_to = self.overload.speed if self.overload.slowed else None
         self._progress_reporter.report(self._pacer.elapsed_s, self.late_fraction, slowed_to)
+
+    def _was_on_time(self, agent: int) -> bool:
+        """Return whether an agent has been on time lately; one that does not step is never late."""
+        on_time_slots = round(ON_TIME_FOR_S * self._scenario.slot_hz)
+        return self.lateness.on_time_since(agent, self.loop.world.slot - on_time_slots)
 
     def _note_late_ticks(self, slot: int) -> None:
         """Follow the overload; an agent that hangs or was stopped tells nothing of the host."""

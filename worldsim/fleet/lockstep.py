@@ -68,6 +68,8 @@ class LockstepFleet:
 
     late_fraction: float | None = None
     late_because: None = None
+    late_detail: None = None
+    unsafe_on_time = True
     overload_row: None = None
     ended_by: None = None
     delivery: None = None

@@ -17,6 +17,8 @@ class Pacer:
         self._slot_s = slot_s
         self._clock = clock
         self._epoch_slot = 0
+        self.behind_s = 0.0
+        """How far slots have begun late so far, in all, where that was not caught up [s]."""
         self._started_s = self._epoch_s = clock()
 
     def start(self) -> None:
@@ -37,6 +39,7 @@ class Pacer:
         late_s = -self.left_s(slot)
         if late_s > self._slot_s:
             self._epoch_s += late_s
+            self.behind_s += late_s
 
     def stand_still(self, seconds: float) -> None:
         """Take this much wall time out of the reckoning [s]: the world stood still as planned."""
@@ -54,6 +57,9 @@ class LatenessCounter:
 
     def __init__(self, agents: int) -> None:
         self._observed_slot: list[int | None] = [None] * agents
+        self._late_slot: list[int | None] = [None] * agents
+        """The last slot in which each agent was found late; None: it never was."""
+        self._ticks_of, self._late_of = [0] * agents, [0] * agents
         self.ticks = 0
         """Number of ticks whose command was expected, in time or late."""
         self._late = 0
@@ -70,7 +76,29 @@ class LatenessCounter:
         late = latest is None or latest.slot < observed_slot
         self.ticks += 1
         self._late += late
+        self._ticks_of[agent] += 1
+        self._late_of[agent] += late
+        if late:
+            self._late_slot[agent] = slot
         return late
+
+    def on_time_since(self, agent: int, slot: int) -> bool:
+        """Return whether an agent has answered in time since a slot."""
+        late_slot = self._late_slot[agent]
+        return late_slot is None or late_slot < slot
+
+    @property
+    def latest(self) -> tuple[int, float] | None:
+        """The agent that was late most often, and in which share of its ticks; None: none was."""
+        shares = [
+            (late / ticks, -agent)
+            for agent, (late, ticks) in enumerate(zip(self._late_of, self._ticks_of, strict=True))
+            if late
+        ]
+        if not shares:
+            return None
+        share, agent = max(shares)
+        return -agent, share
 
     def drop_pending(self, agents: Iterable[int]) -> None:
         """Expect no more commands for earlier observations: the agents stopped, or start anew."""

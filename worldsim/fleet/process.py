@@ -151,6 +151,8 @@ def _finished(
         medium_counters=fleet.medium_counters,
         late_tick_fraction=fleet.late_fraction,
         late_because=fleet.late_because,
+        late_detail=fleet.late_detail,
+        unsafe_on_time=fleet.unsafe_on_time,
         overload=fleet.overload_row,
         resources=resources,
         real_time_factor=fleet.real_time_factor,

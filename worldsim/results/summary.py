@@ -42,6 +42,8 @@ TOO_LATE_FRACTION = 0.01
 
 TIMELESS = ("I1", "I5", "I8")
 """Invariants that hold however late messages come."""
+TIMELESS_IF_LATE = ("I5", "I8")
+"""Those of them where only agents that the host made late have broken safety."""
 
 INVARIANT_WORDS = {
     "I1": "two vehicles, or a vehicle and an obstacle, were too near",
@@ -71,6 +73,8 @@ class FinishedRun:
     cut_off_by: str | None = None  # what ended the run before its time; None: it is complete
     failure: str | None = None  # an error during the run
     late_because: str | None = None  # the process that made ticks late, if not the host
+    late_detail: str | None = None  # whose ticks were late on a slow host, and what to do
+    unsafe_on_time: bool = True  # whether agents that were on time broke I1, if it is broken
     overload: "OverloadRow | None" = None  # None under a clock where no tick can be late
     resources: "ResourcesRow | None" = None  # of the processes of a launched fleet
     rejected_by_world: Mapping[str, int] = field(default_factory=dict)  # messages by cause
@@ -252,14 +256,16 @@ def _outcome(
     """Return the outcome and its reason.
 
     A violated invariant is a failure also in a run that was cut off. On a host that was too slow,
-    only those are that do not rest on news arriving in time: the others are named. idle: which
-    faults struck nothing; what would pass is inconclusive then.
+    only those are that do not rest on news arriving in time: the others are named. Safety rests on
+    it where an agent was late that broke it. idle: which faults struck nothing; what would pass is
+    inconclusive then.
     """
     if run.failure is not None:
         return "fail", run.failure
     found = run.loop.judge.shortcomings()
     late = _slowness(run)
-    excused = [name for name in found.violated if late is not None and name not in TIMELESS]
+    timeless = TIMELESS if run.unsafe_on_time else TIMELESS_IF_LATE
+    excused = [name for name in found.violated if late is not None and name not in timeless]
     violated = [name for name in found.violated if name not in excused]
     if violated:
         return "fail", f"violated: {_with_words(violated)}"
@@ -314,7 +320,10 @@ def _slowness(run: FinishedRun) -> str | None:
     late = run.late_tick_fraction
     if late is None or not run.host_too_slow:
         return None
-    return f"{run.late_because or 'the host was too slow'}: {100 * late:.1f} % of ticks were late"
+    share = f"{100 * late:.1f} % of ticks were late"
+    if run.late_because is not None:
+        return f"{run.late_because}: {share}"
+    return f"the host was too slow: {share}{f', {run.late_detail}' if run.late_detail else ''}"
 
 
 def _rejected(run: FinishedRun) -> dict[str, dict[str, int]]:
