@@ -9,6 +9,7 @@ from worldsim.fleet.overload import (
     LEAST_FACTOR,
     LOOK_EVERY_S,
     LateShare,
+    LateSpells,
     OnOverload,
     Overload,
     percent,
@@ -46,6 +47,24 @@ def test_the_share_is_that_of_the_last_seconds() -> None:
         share.add(float(second), 10, 10 if second <= 18 else 0)
     assert (share.of_last(2.0), share.of_last(10.0)) == (0.0, 0.8)
     assert (percent(0.1234), percent(0.0123), percent(1.0)) == ("12 %", "1.2 %", "100 %")
+
+
+def test_a_spell_of_late_ticks_excuses_what_is_violated_in_it_and_nothing_else() -> None:
+    spells = LateSpells()
+    for second in range(40):
+        slow = 10 <= second < 12
+        spells.add(float(second), 100, 30 if slow else 0, 2.0 * second)
+        if second == 5:
+            spells.note({"I4": 1, "I7": 0})
+        if second == 11:
+            spells.note({"I4": 1, "I7": 3})
+        if second == 35:
+            spells.note({"I4": 1, "I7": 3, "I2": 1})
+    assert spells.violated_in_time == {"I4", "I2"}
+    assert str(spells) == (
+        "the host was too slow for a while: 30 % of the ticks of 2 s were late, at 22.0 s"
+    )
+    assert not str(LateSpells())
 
 
 def test_an_overload_is_reported_at_once_with_the_remedy_and_only_once() -> None:

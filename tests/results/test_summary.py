@@ -151,6 +151,29 @@ def test_on_a_slow_host_agents_that_were_late_are_not_blamed_for_a_collision(
     assert in_time["outcome"] == "fail"
 
 
+@pytest.mark.parametrize(("in_time", "outcome"), [((), "inconclusive"), (("I4",), "fail")])
+def test_a_spell_of_late_ticks_excuses_what_it_may_have_caused(
+    run: FinishedRun, in_time: tuple[str, ...], outcome: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tallies = {"I1": InvariantTally(20), "I4": InvariantTally(20, 3), "I8": InvariantTally(20)}
+    monkeypatch.setattr(run.loop.judge, "invariants", lambda: tallies)
+    spell = {"late_spell": "the host was too slow for a while", "violated_in_time": in_time}
+    made = summary(run, late_tick_fraction=0.003, **spell)
+    assert made["outcome"] == outcome
+    reason = str(made["reason"])
+    assert reason.startswith("the host was too slow for a while; violated meanwhile") == (
+        outcome == "inconclusive"
+    )
+
+
+def test_an_expectation_missed_with_a_spell_of_late_ticks_is_no_failure(run: FinishedRun) -> None:
+    run.loop.judge.min_separation_m = 0.1
+    assert summary(run)["outcome"] == "fail"
+    made = summary(run, late_spell="the host was too slow for a while")
+    assert made["outcome"] == "inconclusive"
+    assert str(made["reason"]).startswith("the host was too slow for a while; missed: ")
+
+
 def test_a_slow_host_does_not_excuse_a_collision(run: FinishedRun) -> None:
     run.loop.judge.invariants()["I1"].violations = 1
     made = summary(run, late_tick_fraction=0.5, cut_off_by="interrupted")

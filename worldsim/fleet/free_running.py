@@ -39,7 +39,7 @@ from worldsim.fleet.delivery_latency import DeliveryLatency, LatencyCollector
 from worldsim.fleet.ipc import AgentProcess
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.netem_process import NetemProcess
-from worldsim.fleet.overload import REMEDIES, Overload, percent
+from worldsim.fleet.overload import REMEDIES, LateSpells, Overload, percent
 from worldsim.fleet.pacing import LatenessCounter, Pacer
 from worldsim.fleet.progress import ProgressReporter
 from worldsim.fleet.reconnection import Reconnection
@@ -87,7 +87,7 @@ class FreeRunningFleet:
         self.medium_counters: MediumCounters | None = None
         self.lateness = LatenessCounter(len(rows))
         self._unsafe = UnsafeAgents(scenario.control.separation_m, scenario.obstacle_bound_m)
-        self.overload = overload
+        self.overload, self.late_spells = overload, LateSpells()
         self.real_time_factor: float | None = None
         self.resources = ResourceMeter(launcher.steps)
         self._agent_steps = 0
@@ -259,11 +259,18 @@ class FreeRunningFleet:
         self._late_agents.clear()
         ticks, self._ticks_seen = self.lateness.ticks - self._ticks_seen, self.lateness.ticks
         before = self.overload.speed
+        self._note_spell(ticks, late)
         report = self.overload.note(self._pacer.elapsed_s, ticks, late)
         if report is not None:
             self._launcher.report_notice(report)
         if self.overload.speed != before:
             self._pacer.change(slot, 1.0 / (self._scenario.slot_hz * self.overload.speed))
+
+    def _note_spell(self, ticks: int, late: int) -> None:
+        """Note how late ticks are, and which invariants are violated meanwhile."""
+        self.late_spells.add(self._pacer.elapsed_s, ticks, late, self.loop.world.time_s)
+        tallies = self.loop.judge.invariants()
+        self.late_spells.note({name: tally.violations for name, tally in tallies.items()})
 
     def _carry_out(self, operation: Operation, by: By = None) -> None:
         """Carry out an operation between slots, and apply it to the world at once."""

@@ -70,6 +70,7 @@ class LockstepFleet:
     late_because: None = None
     late_detail: None = None
     unsafe_on_time = True
+    late_spells: None = None
     overload_row: None = None
     ended_by: None = None
     delivery: None = None

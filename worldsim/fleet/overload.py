@@ -5,6 +5,7 @@ time, and raises it again. ``abort`` ends the run.
 """
 
 from collections import deque
+from collections.abc import Mapping
 from typing import Literal, assert_never
 
 OnOverload = Literal["go", "slow", "abort"]
@@ -46,6 +47,41 @@ class LateShare:
         since_s = self._looks[-1][0] - seconds if self._looks else 0.0
         found = [(ticks, late) for at_s, ticks, late in self._looks if at_s > since_s]
         return sum(late for _, late in found) / max(1, sum(ticks for ticks, _ in found))
+
+
+class LateSpells:
+    """Times in which the host made ticks late, though perhaps few of the whole run's.
+
+    Agents that get their news late may for a while break an invariant that rests on it.
+    """
+
+    def __init__(self) -> None:
+        self._share = LateShare()
+        self._worst = 0.0, 0.0
+        self._noted: dict[str, int] = {}
+        self.violated_in_time: set[str] = set()
+        """The invariants of which a violation was found while no ticks were late."""
+
+    def add(self, now_s: float, ticks: int, late: int, time_s: float) -> None:
+        """Take the ticks since the last call, by a wall time and a simulated time [s]."""
+        self._share.add(now_s, ticks, late)
+        self._worst = max(self._worst, (self._share.of_last(SHORT_S), time_s))
+
+    def note(self, violations: Mapping[str, int]) -> None:
+        """Take the number of violations of each invariant so far."""
+        if violations != self._noted:
+            late = max(self._share.of_last(SHORT_S), self._share.of_last(LONG_S))
+            if late < OVER_FRACTION:
+                more = (name for name, n in violations.items() if n > self._noted.get(name, 0))
+                self.violated_in_time.update(more)
+            self._noted = dict(violations)
+
+    def __str__(self) -> str:
+        share, time_s = self._worst
+        if share < SHORT_FRACTION:
+            return ""
+        share_text = f"{percent(share)} of the ticks of {SHORT_S:g} s were late"
+        return f"the host was too slow for a while: {share_text}, at {time_s:.1f} s"
 
 
 class SpeedLaw:

@@ -153,6 +153,8 @@ def _finished(
         late_because=fleet.late_because,
         late_detail=fleet.late_detail,
         unsafe_on_time=fleet.unsafe_on_time,
+        late_spell=str(fleet.late_spells or "") or None,
+        violated_in_time=fleet.late_spells.violated_in_time if fleet.late_spells else None,
         overload=fleet.overload_row,
         resources=resources,
         real_time_factor=fleet.real_time_factor,

@@ -3,7 +3,7 @@
 To add a key: declare it in Summary, fill it in summarise.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any, Literal, TypedDict
@@ -75,6 +75,8 @@ class FinishedRun:
     late_because: str | None = None  # the process that made ticks late, if not the host
     late_detail: str | None = None  # whose ticks were late on a slow host, and what to do
     unsafe_on_time: bool = True  # whether agents that were on time broke I1, if it is broken
+    late_spell: str | None = None  # when the host was too slow for a while; None: it never was
+    violated_in_time: Collection[str] | None = None  # while no tick was late; None: all that are
     overload: "OverloadRow | None" = None  # None under a clock where no tick can be late
     resources: "ResourcesRow | None" = None  # of the processes of a launched fleet
     rejected_by_world: Mapping[str, int] = field(default_factory=dict)  # messages by cause
@@ -264,12 +266,11 @@ def _outcome(
         return "fail", run.failure
     found = run.loop.judge.shortcomings()
     late = _slowness(run)
-    timeless = TIMELESS if run.unsafe_on_time else TIMELESS_IF_LATE
-    excused = [name for name in found.violated if late is not None and name not in timeless]
+    excused = [name for name in found.violated if _is_excused(run, name)]
     violated = [name for name in found.violated if name not in excused]
     if violated:
         return "fail", f"violated: {_with_words(violated)}"
-    doubt = _cut(run) or late
+    doubt = _cut(run) or late or (run.late_spell if excused else None)
     if doubt is not None:
         meanwhile = f"; violated meanwhile: {_with_words(excused)}" if excused else ""
         return "inconclusive", f"{doubt}{meanwhile}"
@@ -285,6 +286,8 @@ def _of_expectations(
     texts = expectation_texts(expectations, _circumstances(run))
     rows = list(zip(texts, expectations, strict=True))
     missed = [text for text, row in rows if row["held"] is False]
+    if missed and run.late_spell is not None:
+        return "inconclusive", f"{run.late_spell}; missed: {'; '.join(missed)}"
     if missed:
         return "fail", "; ".join(missed)
     unjudged = [text for text, row in rows if row["held"] is None]
@@ -296,6 +299,14 @@ def _of_expectations(
 def _of_faults(idle: str | None) -> tuple[Outcome, str | None]:
     """Return the outcome of a run that meets everything. idle: which faults struck nothing."""
     return ("inconclusive", idle) if idle is not None else ("pass", None)
+
+
+def _is_excused(run: FinishedRun, name: str) -> bool:
+    """Return whether a violated invariant may be the host's fault."""
+    if name not in (TIMELESS if run.unsafe_on_time else TIMELESS_IF_LATE):
+        in_time = run.violated_in_time is None or name in run.violated_in_time
+        return run.host_too_slow or (run.late_spell is not None and not in_time)
+    return False
 
 
 def _with_words(invariants: list[str]) -> str:
