@@ -74,6 +74,8 @@ class Timeline:
 
     def _other_process(self) -> Tables:
         """Netem down, or the world paused: its kill would leave nothing to look at."""
+        if self._draw.chance(0.2):
+            return {"disk_full": True}
         made: Tables = {self._draw.among(("kill", "pause")): ["netem"]}
         return made if self._draw.chance(0.8) else {"pause": ["world"], "for_s": 0.1}
 

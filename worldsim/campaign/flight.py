@@ -85,6 +85,7 @@ def _fly(scenario: Scenario, directory: RunDirectory, recording: bool, pulse: Pu
         _close(sinks)
         raise
     _close(sinks)
+    flight.loop.note_writes()
     directory.write_summary(summarise(scenario, finished(flight, scenario)))
 
 

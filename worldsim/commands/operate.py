@@ -14,7 +14,12 @@ from worldsim.commands.options import RunFolder, examples
 from worldsim.results.exit_status import PASS
 
 AGENT_FAULTS = ("clock",)
-FAULTS = ("kill", "leave", "restart", "pause", "resume", "join", *AGENT_FAULTS, "end")
+FAULTS = (
+    *("kill", "leave", "restart", "pause", "resume", "join"),
+    *AGENT_FAULTS,
+    "disk_full",
+    "end",
+)
 RADIO_ACTIONS = ("show", "set", "partition", "heal", "jam", "flap", "sabotage", "end")
 ForSeconds = Annotated[
     float | None, typer.Option("--for", metavar="S", help="Undo it after S simulated seconds.")
@@ -100,7 +105,8 @@ def fault(
         list[str],
         typer.Argument(
             metavar="SELECTOR",
-            help="Agents: ids, vertex:V1, queue:Q1, random:2 or all. With join: how many."
+            help="Agents: ids, vertex:V1, queue:Q1, random:2 or all; netem or world."
+            " With join: how many. With disk_full: now."
             f" With end: a fault's name. With {', '.join(AGENT_FAULTS)}: KEY=VALUE too.",
         ),
     ],
@@ -112,8 +118,9 @@ def fault(
 
     kill ends processes, leave removes the vehicles too, restart brings them back; pause stops
     processes until resume; join adds new agents. clock lets agents' clocks be wrong (offset_s,
-    drift_ppm). end ends a fault of any kind before its time, by
-    its name: its kind and number, as in "kill-2", unless --name gave it another one.
+    drift_ppm). disk_full lets nothing more of recording and events be written. end ends a fault of
+    any kind before its time, by its name: its kind and number, as in "kill-2", unless --name
+    gave it another one.
     """
     if action not in FAULTS:
         raise _bad(action, "ACTION", f"allowed: {', '.join(FAULTS)}")
@@ -122,6 +129,8 @@ def fault(
             event: dict[str, Any] = {"join": _number(" ".join(selectors), "SELECTOR")}
         case "end":
             event = _end(selectors)
+        case "disk_full":
+            event = {"disk_full": selectors == ["now"]}
         case _ if action in AGENT_FAULTS:
             keys = [word for word in selectors if "=" in word]
             agents = [word for word in selectors if "=" not in word]

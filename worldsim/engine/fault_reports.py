@@ -11,6 +11,7 @@ from netem.faults import FaultOrder, Heal, RadioEvent
 from worldsim.engine.operations import (
     DisturbAgents,
     EndProcesses,
+    FillDisk,
     Operation,
     PauseProcesses,
     ResumeProcesses,
@@ -28,7 +29,8 @@ class FaultReport:
     number: of its event, as in events.jsonl; kind: the event's key; from_s: when it began [s];
     to_s: when it ended [s], None while it is in force; agents: those that it struck, ascending;
     process: netem's or the world's, of a fault that struck that one. observations: how many did not
-    pass while netem was down; stopped_s: how long the world stood still [s; wall time].
+    pass while netem was down; stopped_s: how long the world stood still [s; wall time]; writes: how
+    many failed.
     """
 
     def __init__(
@@ -44,7 +46,7 @@ class FaultReport:
         self.agents = sorted(agents)
         self.process = process
         self.to_s: float | None = None
-        self.observations, self.stopped_s = 0, 0.0
+        self.observations, self.stopped_s, self.writes = 0, 0.0, 0
         self._held = set(agents)
 
     def release(self, agents: Collection[int], t_s: float) -> None:
@@ -110,6 +112,8 @@ class FaultReports:
                 # The world's clock stands still meanwhile: by it a pause takes no time.
                 report.to_s = t_s if cause == "pause" else None
                 self.all.append(report)
+            case FillDisk(number=number, full=True):
+                self.all.append(FaultReport(number, "disk_full", t_s, by, ()))
             case FaultOrder(number=number, outage=cause) if cause is not None:
                 self.all.append(FaultReport(number, cause, t_s, by, (), "netem"))
 
@@ -118,6 +122,12 @@ class FaultReports:
         for each in self.all:
             if each.number in numbers:
                 each.observations += observations
+
+    def note_writes(self, number: int, failed: int) -> None:
+        """Note that writes failed while a fault of this number let the disk be full."""
+        for each in self.all:
+            if each.number == number:
+                each.writes += failed
 
     def note_standstill(self, number: int, stopped_s: float) -> None:
         """Note that the world stood still for a pause [s; wall time]."""

@@ -121,6 +121,14 @@ class StopWorldProcess(NamedTuple):
     """How long a pause lasts [s]; of wall time at speed 1."""
 
 
+class FillDisk(NamedTuple):
+    """Let the disk be full for the run's recording and events, or no longer."""
+
+    number: int
+    """The event's number."""
+    full: bool
+
+
 class GiveMission(NamedTuple):
     """Give the team a mission, by way of one agent."""
 
@@ -137,4 +145,5 @@ class GiveMission(NamedTuple):
 
 ProcessOperation = EndProcesses | PauseProcesses | ResumeProcesses | StartProcesses | AdmitAgents
 AgentOperation = ProcessOperation | SetSensorMode | DisturbAgents
-Operation = AgentOperation | StopWorldProcess | FaultOrder | GiveMission
+WorldOperation = StopWorldProcess | FillDisk
+Operation = AgentOperation | WorldOperation | FaultOrder | GiveMission

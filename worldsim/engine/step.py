@@ -14,7 +14,12 @@ import numpy as np
 
 from agent.messages import ROLES, Command, Mission, Observation, Vector
 from worldsim.engine.counters import RadioUse, RejectionCounters
-from worldsim.engine.operations import Operation, StartProcesses, StopWorldProcess
+from worldsim.engine.operations import (
+    FillDisk,
+    Operation,
+    StartProcesses,
+    StopWorldProcess,
+)
 from worldsim.engine.queue_neighbours import QueueNeighbours
 from worldsim.engine.telemetry import FleetTelemetry
 from worldsim.engine.timeline_effects import TimelineEffects
@@ -44,6 +49,13 @@ class Recorder(Protocol):
 
     def event(self, event: RunEvent) -> None:
         """Record one event."""
+
+    def fill_disk(self, full: bool) -> None:
+        """Let every write fail as on a full disk, or no longer."""
+
+    @property
+    def failed_writes(self) -> int:
+        """Number of writes that failed so far."""
 
 
 @final
@@ -117,6 +129,8 @@ class SlotLoop:
         self._queue_neighbours = QueueNeighbours(scenario.rows, self.judge.phases)
         self.rejections = RejectionCounters()
         self._recorder = recorder
+        self._disk_full: dict[int, int] = {}
+        """The faults that let the disk be full: the writes that had failed before each."""
         self._records_ticks = recorder is not None and recorder.records_ticks
         self._packets = packets
         self._headings = list(world.vehicles.yaws)
@@ -130,9 +144,13 @@ class SlotLoop:
     def apply(self, operation: Operation, by: By = None) -> None:
         """Apply an operation that was carried out, and report its events, requested ``by``."""
         stopped = bool(self.network.outages) or _is_pause_of_world(operation)
+        if isinstance(operation, FillDisk) and not operation.full:
+            self._fill_disk(operation)  # so that its end can be written
         self.effects.apply(operation, by)
         if stopped and not self.network.outages and not self._real_outages:
             self.effects.reconnect()
+        if isinstance(operation, FillDisk) and operation.full:
+            self._fill_disk(operation)
         if isinstance(operation, StartProcesses):
             for agent in operation.incarnations:
                 self._telemetry.forget(agent)
@@ -181,6 +199,14 @@ class SlotLoop:
         self.trace.verdicts(digest)
         self.world.advance()
 
+    def note_writes(self) -> None:
+        """Note the writes that failed during faults that are in force to the end of the run.
+
+        Call it once the recorder has written the rest.
+        """
+        for number in list(self._disk_full):
+            self._note_writes(number)
+
     def finish(self) -> None:
         """Judge and record the last tick, at the end of the run."""
         if self.world.slot % self.world.clock.slots_per_tick == 0:
@@ -192,6 +218,21 @@ class SlotLoop:
         self.judge.handle_event(event)
         if self._recorder is not None:
             self._recorder.event(event)
+
+    def _fill_disk(self, operation: FillDisk) -> None:
+        """Let the recorder's disk be full while any fault asks for it."""
+        if self._recorder is None:
+            return
+        if operation.full:
+            self._disk_full[operation.number] = self._recorder.failed_writes
+        else:
+            self._note_writes(operation.number)
+        self._recorder.fill_disk(bool(self._disk_full))
+
+    def _note_writes(self, number: int) -> None:
+        before = self._disk_full.pop(number, None)
+        if before is not None and self._recorder is not None:
+            self.effects.faults.note_writes(number, self._recorder.failed_writes - before)
 
     def _with_mission(
         self, mission: Mission, agent: int, observation: Observation

@@ -19,6 +19,7 @@ from worldsim.engine.operations import (
     AdmitAgents,
     DisturbAgents,
     EndProcesses,
+    FillDisk,
     GiveMission,
     Operation,
     PauseProcesses,
@@ -32,6 +33,7 @@ from worldsim.judge.event import By
 from worldsim.judge.radio_events import applied
 from worldsim.judge.run_events import (
     NOBODY_TO_RESTART,
+    DiskFilled,
     FormationGiven,
     FrameGiven,
     Joined,
@@ -47,6 +49,7 @@ from worldsim.judge.run_events import (
 )
 from worldsim.scenario.faults import (
     AgentFault,
+    DiskFull,
     EndFault,
     Join,
     Kill,
@@ -129,9 +132,9 @@ class TimelineEffects:
                 return self.members.sensor_fault(number, action, step.ends, self._claims)
             case FormationSpec() | FrameChange() if not step.ends:
                 return self.missions.changed(action, step.at_s)
-            case FormationSpec() | FrameChange() | EndFault() | StopWorld():
+            case FormationSpec() | FrameChange() | EndFault() | StopWorld() | DiskFull():
                 # An event that ends a fault put the fault's end into the timeline.
-                return _stop_world(step)
+                return _of_world(step)
         assert_never(action)
 
     def apply(self, operation: Operation, by: By = None) -> None:
@@ -153,17 +156,20 @@ class TimelineEffects:
                 self._set_sensors(operation, by)
             case DisturbAgents():
                 self._disturb(operation, by)
-            case FaultOrder() | StopWorldProcess():
+            case FaultOrder() | StopWorldProcess() | FillDisk():
                 self._emit(self._applied(operation, by))
             case GiveMission():
                 self._give(operation, by)
             case _:
                 assert_never(operation)
 
-    def _applied(self, operation: FaultOrder | StopWorldProcess, by: By) -> RunEvent:
-        """Apply an order to the radio; return the event that reports it, or a stop of the world."""
+    def _applied(self, operation: FaultOrder | StopWorldProcess | FillDisk, by: By) -> RunEvent:
+        """Apply an order to the radio, or a fault of the world; return its event."""
         if isinstance(operation, FaultOrder):
             return applied(operation, self.network, self._t_s, by)
+        if isinstance(operation, FillDisk):
+            over = not operation.full
+            return DiskFilled(t_s=self._t_s, agent=None, planned=True, by=by, over=over)
         cause = operation.cause
         return WorldStopped(t_s=self._t_s, agent=None, planned=True, by=by, cause=cause)
 
@@ -297,9 +303,11 @@ class TimelineEffects:
         )
 
 
-def _stop_world(step: Step) -> StopWorldProcess | None:
-    """Return the operation of the beginning of a stop of the world; None for other steps."""
+def _of_world(step: Step) -> StopWorldProcess | FillDisk | None:
+    """Return the operation of a fault of the world or its disk; None for other steps."""
     action = step.event.action
+    if isinstance(action, DiskFull):
+        return FillDisk(step.number, not step.ends)
     if step.ends or not isinstance(action, StopWorld):
         return None
     return StopWorldProcess(step.number, action.cause, action.for_s or 0.0)

@@ -33,6 +33,7 @@ from worldsim.engine.operations import (
     AdmitAgents,
     DisturbAgents,
     EndProcesses,
+    FillDisk,
     GiveMission,
     Operation,
     PauseProcesses,
@@ -153,7 +154,7 @@ class VirtualFleet:
                 self.ended_by = WORLD_KILLED if cause == "kill" else None
             case PauseProcesses() | ResumeProcesses() | AdmitAgents():
                 pass  # the slot loop decides which agents step
-            case SetSensorMode() | DisturbAgents() | GiveMission():
+            case SetSensorMode() | DisturbAgents() | GiveMission() | FillDisk():
                 pass  # the slot loop applies what the world shows, and missions
             case _:
                 assert_never(operation)

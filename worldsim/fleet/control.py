@@ -19,6 +19,7 @@ from worldsim.engine.operations import (
     AdmitAgents,
     DisturbAgents,
     EndProcesses,
+    FillDisk,
     GiveMission,
     Operation,
     PauseProcesses,
@@ -202,7 +203,7 @@ class Control:
                 return operation._replace(to=request.to, version=request.version)
             case FaultOrder(event=RadioEvent(sabotage=Sabotage(agents=()))):
                 raise RequestError(f"{kind}: no such agent has a radio now")
-            case FaultOrder() | SetSensorMode() | AdmitAgents() | StopWorldProcess():
+            case FaultOrder() | SetSensorMode() | AdmitAgents() | StopWorldProcess() | FillDisk():
                 return operation
         assert_never(operation)
 

@@ -23,6 +23,7 @@ from worldsim.engine.operations import (
     AdmitAgents,
     DisturbAgents,
     EndProcesses,
+    FillDisk,
     GiveMission,
     Operation,
     PauseProcesses,
@@ -426,8 +427,10 @@ class ProcessActions:
                 return self._startup.absent(agents)
             case FaultOrder():
                 self._netem.order(operation, slot)
-            case SetSensorMode() | DisturbAgents() | GiveMission() | StopWorldProcess():
-                pass  # what the world shows, missions and its own process are its own matter
+            case SetSensorMode() | DisturbAgents() | GiveMission():
+                pass  # what the world shows, and missions, are its own
+            case StopWorldProcess() | FillDisk():
+                pass  # a stop waits for the slot's end, and the disk is the world's own
             case _:
                 assert_never(operation)
         return []

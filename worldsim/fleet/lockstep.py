@@ -38,6 +38,7 @@ from worldsim.engine.operations import (
     AdmitAgents,
     DisturbAgents,
     EndProcesses,
+    FillDisk,
     GiveMission,
     Operation,
     PauseProcesses,
@@ -288,8 +289,8 @@ class AwaitedActions:
                 self._orders.append(operation)
             case StartProcesses() | SetSensorMode() | DisturbAgents() | GiveMission():
                 pass  # nothing is to be done in other processes, or before they have booted
-            case StopWorldProcess():
-                pass  # it waits for the slot's end
+            case StopWorldProcess() | FillDisk():
+                pass  # a stop waits for the slot's end, and the disk is the world's own
             case _:
                 assert_never(operation)
 

@@ -83,6 +83,7 @@ def conduct(
     bus.declare_alive("world")
     startup = Startup(bus, scenario, options.lockstep, options.shards)
     launcher = link_of(startup)
+    directory.on_loss = launcher.report_notice
     sinks = open_sinks(directory, scenario, directory.path.name, options.mode, options.recording)
     fleet = _fleet(scenario, bus, sinks, launcher, startup, options)
     complete, up_s = False, None
@@ -97,6 +98,7 @@ def conduct(
     finally:
         fleet.land()
         sinks.close()
+        fleet.loop.note_writes()
         launcher.wait(0.0)  # reads the reason that the launcher sends before its SIGTERM
         ended_by = None if complete else launcher.stop_reason or fleet.ended_by or "interrupted"
         summary = summarise(scenario, _finished(fleet, options, ended_by, up_s))

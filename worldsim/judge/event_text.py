@@ -17,6 +17,7 @@ from worldsim.judge.radio_events import (
 from worldsim.judge.run_events import (
     AgentFaultRunEvent,
     ClockChanged,
+    DiskFilled,
     FormationGiven,
     FrameGiven,
     Joined,
@@ -83,7 +84,7 @@ def _words(event: RunEvent, queues: Queues) -> str:
             words = _mission(event)
         case SlotChanged() | QueueChanged() | RoleChanged():
             words = _place(event, queues)
-        case LateStart() | WorldStopped() | Reconnected():
+        case LateStart() | WorldStopped() | Reconnected() | DiskFilled():
             words = _of_processes(event)
         case _:
             assert_never(event)
@@ -189,7 +190,9 @@ def _origin(event: RunEvent) -> str:
     return " (scheduled)" if event.planned else " (unplanned)"
 
 
-def _of_processes(event: LateStart | WorldStopped | Reconnected) -> str:
+def _of_processes(event: LateStart | WorldStopped | Reconnected | DiskFilled) -> str:
+    if isinstance(event, DiskFilled):
+        return "the disk has room again" if event.over else "the disk is full"
     if isinstance(event, LateStart):
         return f"a{event.agent} starts late: {event.detail}"
     if isinstance(event, WorldStopped):

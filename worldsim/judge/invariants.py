@@ -37,6 +37,7 @@ from worldsim.judge.radio_events import NetemOutage, RadioRunEvent, Sabotaged
 from worldsim.judge.radio_load import RadioLoad
 from worldsim.judge.run_events import (
     ClockChanged,
+    DiskFilled,
     FormationGiven,
     FrameGiven,
     Joined,
@@ -130,7 +131,7 @@ class Invariants:
             case WorldStopped() | Reconnected():
                 self._unobserved = isinstance(event, WorldStopped)
                 self._fault(event.t_s, event.t_s)
-            case SlotChanged() | QueueChanged() | SensorChanged() | LateStart():
+            case SlotChanged() | QueueChanged() | SensorChanged() | LateStart() | DiskFilled():
                 pass
             case _:
                 assert_never(event)

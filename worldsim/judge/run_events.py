@@ -136,6 +136,12 @@ class WorldStopped(PlannedEvent, frozen=True, kw_only=True, tag="world_outage"):
     cause: OutageCause
 
 
+class DiskFilled(PlannedEvent, frozen=True, kw_only=True, tag="disk_full"):
+    """Nothing more of recording and events can be written, or all can again."""
+
+    over: bool = False
+
+
 class Reconnected(Event, frozen=True, kw_only=True, tag="reconnect"):
     """Every running agent has been observed again since an outage of netem or a stop of the world.
 
@@ -171,6 +177,7 @@ RunEvent = (
     | RoleChanged
     | LateStart
     | WorldStopped
+    | DiskFilled
     | Reconnected
 )
 

@@ -31,6 +31,7 @@ from worldsim.judge.run_events import (
     NOBODY_TO_RESTART,
     AgentFaultRunEvent,
     ClockChanged,
+    DiskFilled,
     FormationGiven,
     FrameGiven,
     Joined,
@@ -160,7 +161,7 @@ class Judge:
                 self._held.open_window(event.t_s)
             case WorldStopped() | Reconnected():
                 self._handle_stop(event)
-            case SlotChanged() | QueueChanged() | RoleChanged() | LateStart():
+            case SlotChanged() | QueueChanged() | RoleChanged() | LateStart() | DiskFilled():
                 pass
             case _:
                 assert_never(event)

@@ -96,6 +96,17 @@ class RunRecorder:
         """Record one event."""
         self._events.append(event)
 
+    def fill_disk(self, full: bool) -> None:
+        """Let the file's disk be full, or no longer; what has been recorded is written before."""
+        if self._opened:
+            self._attempt(self._send_block)
+            self._sink.fill(full)
+
+    @property
+    def failed_writes(self) -> int:
+        """Number of writes that failed so far."""
+        return self._sink.failed_writes if self._opened else 0
+
     def close(self) -> None:
         """Record what is left, and finish the file."""
         self._attempt(self._send_block)

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from threading import Thread
 
+FULL = "/dev/full"
+"""A file on which the kernel lets every write fail as on a full disk."""
 CHUNK_B = 256 * 1024
 FINISH_TIMEOUT_S = 10.0
 
@@ -23,6 +25,10 @@ class TolerantSink:
     def __init__(self, file: Path, report: Callable[[str], None]) -> None:
         self._name = file.name
         self._report = report
+        self.failed_writes = 0
+        """Number of writes that failed: the first one ends the file."""
+        self._kept: int | None = None
+        """The file while a full one stands in for it."""
         self._file: int | None = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
         self._read_end, self._write_end = os.pipe()
         self._thread = Thread(target=self._drain, name="recording-sink", daemon=True)
@@ -32,6 +38,17 @@ class TolerantSink:
     def path(self) -> str:
         """The write end of the pipe, for the writer to open."""
         return f"/proc/self/fd/{self._write_end}"
+
+    def fill(self, full: bool) -> None:
+        """Let the file's disk be full, or no longer."""
+        if self._file is None:
+            return
+        if full and self._kept is None:
+            self._kept = os.dup(self._file)
+            _replace(self._file, os.open(FULL, os.O_WRONLY))
+        elif not full and self._kept is not None:
+            _replace(self._file, self._kept)
+            self._kept = None
 
     def release(self) -> None:
         """Close the own write end once the writer has opened it: the writer's close ends the pipe.
@@ -53,8 +70,9 @@ class TolerantSink:
         while data := os.read(self._read_end, CHUNK_B):
             self._write(data)
         os.close(self._read_end)
-        if self._file is not None:
-            os.close(self._file)
+        for descriptor in (self._file, self._kept):
+            if descriptor is not None:
+                os.close(descriptor)
 
     def _write(self, data: bytes) -> None:
         rest = memoryview(data)
@@ -64,4 +82,10 @@ class TolerantSink:
             except OSError as error:
                 os.close(self._file)
                 self._file = None
+                self.failed_writes += 1
                 self._report(f"{self._name} ends here, the run continues: {error.strerror}")
+
+
+def _replace(descriptor: int, by: int) -> None:
+    os.dup2(by, descriptor)
+    os.close(by)

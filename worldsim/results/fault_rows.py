@@ -32,6 +32,7 @@ class FaultRow(TypedDict):
     process: str | None  # "netem" or "world", of a fault that strikes no agent
     observations: int | None  # that no agent got while netem was down
     stopped_s: float | None  # wall time that the world stood still
+    writes: int | None  # of events and recording, that failed on a full disk
 
 
 def fault_rows(
@@ -54,13 +55,18 @@ def fault_rows(
             "process": each.process,
             "observations": each.observations if each.process == "netem" else None,
             "stopped_s": _stopped_s(each),
+            "writes": each.writes if each.kind == "disk_full" else None,
         }
         for each in faults
     ]
 
 
 def _strikes_agents(fault: FaultReport) -> bool:
-    return fault.process is None and (not fault.on_radio or fault.kind == "sabotage")
+    return (
+        fault.process is None
+        and fault.kind != "disk_full"
+        and (not fault.on_radio or fault.kind == "sabotage")
+    )
 
 
 def _stopped_s(fault: FaultReport) -> float | None:
@@ -78,7 +84,7 @@ def idle_text(rows: Sequence[FaultRow]) -> str | None:
 
 
 def _is_idle(row: FaultRow) -> bool:
-    counts = [row["frames"], row["readings"], row["observations"], row["stopped_s"]]
+    counts = [row["frames"], row["readings"], row["observations"], row["stopped_s"], row["writes"]]
     if row["readings"] is None and row["agents"] is not None:
         counts.append(len(row["agents"]))
     return any(count == 0 for count in counts)
@@ -104,7 +110,7 @@ def _what(row: FaultRow) -> str:
 def _struck(row: FaultRow) -> str:
     if _is_idle(row):
         return "struck nothing"
-    if row["process"] is not None:
+    if row["process"] is not None or row["writes"] is not None:
         return _stop(row)
     agents = _named(row["agents"] or [])
     if row["readings"] is not None:
@@ -118,7 +124,9 @@ def _struck(row: FaultRow) -> str:
 
 
 def _stop(row: FaultRow) -> str:
-    """Return what a fault of netem or the world did."""
+    """Return what a fault of netem, the world or its disk did."""
+    if row["writes"] is not None:
+        return f"let {_counted(row['writes'], 'write')} fail"
     if row["observations"] is not None:
         return f"kept {_counted(row['observations'], 'observation')} from agents"
     if row["stopped_s"] is not None:

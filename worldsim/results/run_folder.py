@@ -3,7 +3,7 @@
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -22,6 +22,10 @@ RESERVED_B = 128 * 1024
 Content = TypeVar("Content", bound=Mapping[str, Any])
 USERS = "users"
 """The file of the processes' passwords, there while the run lasts."""
+
+
+FULL = Path("/dev/full")
+"""A file on which the kernel lets every write fail as on a full disk."""
 
 
 class RunDirectoryError(Exception):
@@ -48,6 +52,12 @@ class RunDirectory:
         self.summary = path / SUMMARY_FILE
         self._events = path / "events.jsonl"
         self._events_lost = False
+        self._appended = self._events
+        """Where events are appended to."""
+        self.failed_writes = 0
+        """Number of events that could not be written."""
+        self.on_loss: Callable[[str], None] = _print_loss
+        """Gets what is lost, and why, in one line, the first time."""
         self.lost: str | None = None
         """What of the results was lost first, and why; None: nothing."""
 
@@ -75,12 +85,17 @@ class RunDirectory:
         A failing disk must not stop a running fleet: it is reported once, on stderr.
         """
         try:
-            with self._events.open("a", encoding="utf-8") as file:
+            with self._appended.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(event, allow_nan=False) + "\n")
         except OSError as error:
+            self.failed_writes += 1
             if not self._events_lost:
                 self._lose(f"{self._events}: {_reason(error)}; events are lost")
             self._events_lost = True
+
+    def fill_disk(self, full: bool) -> None:
+        """Let events meet a full disk, or no longer."""
+        self._appended = FULL if full else self._events
 
     def lose_recording(self, text: str) -> None:
         """Report on stderr that the recording ends, and why, in one line."""
@@ -122,9 +137,7 @@ class RunDirectory:
 
     def _lose(self, text: str) -> None:
         self.lost = self.lost or text
-        # Stderr may be a file on the same full disk: then nothing can be printed.
-        with suppress(OSError):
-            print(text, file=sys.stderr, flush=True)
+        self.on_loss(text)
 
 
 @contextmanager
@@ -145,6 +158,12 @@ def room_reserved(folder: Path, room_b: int) -> Iterator[None]:
         raise
     finally:
         _free_room(folder)
+
+
+def _print_loss(text: str) -> None:
+    # Stderr may be a file on the same full disk: then nothing can be printed.
+    with suppress(OSError):
+        print(text, file=sys.stderr, flush=True)
 
 
 def make_folder(path: Path | None, name: str) -> Path:

@@ -30,6 +30,18 @@ class Sinks:
         if self._recorder is not None:
             self._recorder.tick(tick, figures)
 
+    def fill_disk(self, full: bool) -> None:
+        """Let every write of events and recorder fail as on a full disk, or no longer."""
+        self._directory.fill_disk(full)
+        if self._recorder is not None:
+            self._recorder.fill_disk(full)
+
+    @property
+    def failed_writes(self) -> int:
+        """Number of writes that failed so far."""
+        recorder = self._recorder
+        return self._directory.failed_writes + (recorder.failed_writes if recorder else 0)
+
     def event(self, event: RunEvent) -> None:
         """Write one event."""
         self._directory.event(as_row(event))

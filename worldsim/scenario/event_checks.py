@@ -18,7 +18,9 @@ from worldsim.scenario.agent_fault_checks import agent_fault_problem
 from worldsim.scenario.events import ACTIONS, UNDOABLE, EventTable
 from worldsim.scenario.faults import (
     AgentFault,
+    DiskFull,
     EndFault,
+    FaultOfWorld,
     Join,
     Kill,
     Leave,
@@ -59,6 +61,8 @@ from worldsim.scenario.target_frame import (
 from worldsim.scenario.timeline import Step, occurrences, steps
 from worldsim.scenario.toml import ScenarioError
 
+ONLY_TRUE = {"heal": "a partition stays", "disk_full": "the disk has room"}
+"""Keys that are given or not, and what holds where they are not."""
 MAX_REPETITIONS = 1000
 """An event happens at most so often."""
 MAX_SLOTS_CHECKED = 50_000
@@ -147,8 +151,9 @@ def _one_action(event: EventTable) -> Problem | None:
     first, *others = event.keys
     if others:
         return Problem(others[0], f"not beside {first}; an event has one action")
-    if event.heal is False:
-        return Problem("heal", "only true is allowed; a partition stays without an event")
+    for key, without in ONLY_TRUE.items():
+        if getattr(event, key) is False:
+            return Problem(key, f"only true is allowed; {without} without an event")
     if event.netem == Conditions():
         return Problem("netem", "no key to set")
     return _times_problem(event, first)
@@ -224,7 +229,12 @@ class EventChecks:
     def _other_problems(
         self,
         event: EventTable,
-        action: ProcessFault | StopWorld | SensorFault | SabotageFault | MissionChange | EndFault,
+        action: ProcessFault
+        | FaultOfWorld
+        | SensorFault
+        | SabotageFault
+        | MissionChange
+        | EndFault,
     ) -> Iterator[Problem]:
         match action:
             case (
@@ -237,7 +247,7 @@ class EventChecks:
                 return self._frame_change(action, event.at_s)
             case FormationSpec():
                 return self._formation(action)
-            case StopWorld() | EndFault():
+            case StopWorld() | DiskFull() | EndFault():
                 return _world_problems(event)
         assert_never(action)
 

@@ -14,6 +14,7 @@ from worldsim.scenario.faults import (
     Action,
     AgentFault,
     ClockFault,
+    DiskFull,
     EndFault,
     Join,
     Joiners,
@@ -54,6 +55,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     up. netem: changes keys of [netem]. sabotage: somebody sends frames by agents' radios.
     sensor: lets sensors fail.
     clock: agents' clocks are wrong.
+    disk_full: nothing more of recording and events can be written.
     end: ends a fault by its name, which is its kind and the event's index, as in "jam-2", unless
     ``name`` gives another one. formation, frame: a mission for the team.
     """
@@ -70,6 +72,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     join: Joiners | Join | None = None
     sensor: SensorFault | None = None
     clock: ClockFault | None = None
+    disk_full: bool | None = None
     end: str | None = None
     formation: FormationSpec | None = None
     frame: FrameChange | None = None
@@ -94,7 +97,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
         """The action whose key is set. Raises LookupError without one."""
         of_agents = self.sensor or self.sabotage or self.agent_fault
         fault = self.radio_fault or self._stop or self._process_fault or of_agents
-        action = fault or self.formation or self.frame or self._end
+        action = fault or self.formation or self.frame or self._of_run
         if action is None:
             raise LookupError("the event has no action")
         return action
@@ -125,7 +128,9 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
         return None
 
     @property
-    def _end(self) -> EndFault | None:
+    def _of_run(self) -> DiskFull | EndFault | None:
+        if self.disk_full:
+            return DiskFull()
         return EndFault(self.end) if self.end is not None else None
 
     @property
@@ -153,7 +158,7 @@ _OTHERS = (key for key in EventTable.__struct_fields__ if key not in (*_NO_ACTIO
 ACTIONS = (*_OTHERS, *_RADIO)
 """The keys of all actions."""
 _LASTING = tuple(key for key in _RADIO if key != "heal")
-UNDOABLE = ("kill", "leave", "pause", *_LASTING, "sensor", "clock")
+UNDOABLE = ("kill", "leave", "pause", *_LASTING, "sensor", "clock", "disk_full")
 """The keys of the actions that ``for_s`` can undo."""
 FAULTS = UNDOABLE
 """The keys of the actions that are faults: each of them can be undone."""

@@ -53,6 +53,10 @@ class StopWorld(msgspec.Struct, frozen=True):
     """How long a pause lasts [s]; of wall time at speed 1. None for a kill."""
 
 
+class DiskFull(msgspec.Struct, frozen=True):
+    """Let nothing more fit on the disk, for the recording and the events of the run."""
+
+
 class Join(Table, frozen=True):
     """Add new agents, under the next free ids."""
 
@@ -96,5 +100,6 @@ AgentFault = ClockFault
 ProcessFault = Kill | Leave | Restart | Pause | Resume | Join
 MissionChange = FormationSpec | FrameChange
 FaultOfAgents = SensorFault | SabotageFault | AgentFault
-Action = RadioFault | ProcessFault | StopWorld | FaultOfAgents | MissionChange | EndFault
+FaultOfWorld = StopWorld | DiskFull
+Action = RadioFault | ProcessFault | FaultOfWorld | FaultOfAgents | MissionChange | EndFault
 """The action of one event."""

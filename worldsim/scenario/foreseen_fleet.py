@@ -10,6 +10,7 @@ from agent.qstructure.formation import Formation, FormationSpec, formation_of
 from netem.faults import Heal, Partition, RadioFault
 from worldsim.scenario.faults import (
     AgentFault,
+    DiskFull,
     EndFault,
     Join,
     Kill,
@@ -105,7 +106,7 @@ class ForeseenFleet:
                 self.frame = changed_frame(self.frame, action, step.at_s)
             case FormationSpec():
                 self.spec, self.formation = action, self.made(action)
-            case SensorFault() | SabotageFault() | StopWorld() | EndFault():
+            case SensorFault() | SabotageFault() | StopWorld() | DiskFull() | EndFault():
                 pass  # an event that ends a fault puts the fault's end into the timeline
             case _:
                 assert_never(action)
