@@ -127,13 +127,21 @@ class Medium:
         for outgoing in transmission.frames:
             channel, payload = outgoing.channel, outgoing.payload
             count_key = (source, incarnation, channel)
-            count = self._counts.get(count_key, self._first_count)
+            count = self._counts.get(count_key, -1)
+            if count < 0:
+                count = self._first_count
+                self._forget_older(source, incarnation)
             self._counts[count_key] = count + 1
             frame = Frame(source, incarnation, channel, count, payload)
             self._send(Sending(frame, (source, incarnation, channel, count), sent_s, 0.0))
         if self._saboteurs:
             for saboteur in self._saboteurs.values():
                 saboteur.overhear(source, sent_s, transmission)
+
+    def _forget_older(self, source: int, incarnation: int) -> None:
+        """Forget how many frames the earlier processes of an agent have sent."""
+        for key in [each for each in self._counts if each[0] == source and each[1] < incarnation]:
+            del self._counts[key]
 
     def sabotage(self, now_s: float) -> None:
         """Send the saboteurs' frames of the slot that began at ``now_s`` [s], after all agents'."""

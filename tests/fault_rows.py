@@ -28,6 +28,7 @@ CLEAN, BAD_S = "", 12.2 + 2.0 * 13.7
 """T_d + 2B of nine agents at one hop, with the radio of LOSSY [s]."""
 LOSSY = "loss_percent = 50\ndelay_ms = 200\njitter_ms = 40"
 AT_S = 15.0
+QSWARM = [sys.executable, "-c", "from worldsim.commands.app import main; main()"]
 
 
 class Row(NamedTuple):
@@ -105,6 +106,11 @@ ROWS = (
     Row("corruption", (radio("corrupt_percent = 30"),), 15.0, lasts_s=60.0),
     Row("a slow radio", (radio("rate_kbit = 100, limit = 20"),), 30.0, lasts_s=80.0),
     Row("a jam", (at("jam = { centre_m = [0, 0, 0], radius_m = 3 }", for_s=15.0),), 15.0),
+    Row("netem killed for 3 s", (at("kill = ['netem']", for_s=3.0),), 10.0, lasts_s=45.0),
+    Row("netem stopped for 3 s", (at("pause = ['netem']", for_s=3.0),), 10.0, lasts_s=45.0),
+    Row("netem stopped for 13 s", (at("pause = ['netem']", for_s=13.0),), 10.0, lasts_s=50.0),
+    Row("the world stopped for 5 s", (at("pause = ['world']", for_s=5.0),), 10.0,
+        more=(("expect.idle_faults", "true"),)),
 )  # fmt: skip
 
 
@@ -145,9 +151,8 @@ def processes(flights: list[Scenario], folder: Path) -> list[dict[str, Any]]:
     for n, flight in enumerate(flights):
         file, out = folder / f"{n}.toml", folder / str(n)
         file.write_text(dump(flight), "utf-8")
-        words = ["qswarm", "run", file, "--out", out, "--no-recording"]
-        made = subprocess.run([sys.executable, "-m", "worldsim", *map(str, words[1:])],
-                              check=False, capture_output=True, text=True)  # fmt: skip
+        words = [*QSWARM, "run", str(file), "--out", str(out), "--no-recording"]
+        made = subprocess.run(words, check=False, capture_output=True, text=True)
         summary = out / "summary.json"
         error = {"error": made.stderr or made.stdout}
         found.append(json.loads(summary.read_text()) if summary.exists() else error)

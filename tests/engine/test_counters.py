@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from agent.messages import CAUSES, Command, Telemetry
 from netem.messages import MediumCounters
-from worldsim.engine.counters import Links, RadioUse
+from worldsim.engine.counters import Links, RadioUse, RejectionCounters
 
 COUNTERS = MediumCounters(
     slot=0,
@@ -14,6 +15,13 @@ COUNTERS = MediumCounters(
     rejected={},
     sent_b=(100, 10, 400, 40, 0, 0),
 )
+
+
+def rejecting(incarnation: int, count: int) -> Command:
+    """Return a command of an agent that has rejected so many messages for the first cause."""
+    zero = (0.0, 0.0, 0.0)
+    telemetry = Telemetry(zero, 0.0, None, None, (), ((0, count),), 0, -1, -1, 0)
+    return Command(8, incarnation, 16, zero, 0.0, (0.0, 0.0), telemetry)
 
 
 def radio_use() -> RadioUse:
@@ -43,3 +51,11 @@ def test_bytes_count_per_second_in_which_an_agent_was_running() -> None:
 
 def test_without_counters_of_the_medium_there_are_no_bytes() -> None:
     assert radio_use().bytes_per_s(None) is None
+
+
+def test_rejections_of_replaced_processes_stay_counted() -> None:
+    counters = RejectionCounters()
+    for incarnation in range(50):
+        for count in (1, 2, 3):
+            counters.update(0, rejecting(incarnation, count))
+    assert counters.by_cause() == {CAUSES[0]: 150}

@@ -4,6 +4,7 @@ A direct link is an agent that is heard. Those that an agent needs are the paper
 """
 
 from collections import Counter
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -100,16 +101,25 @@ class RejectionCounters:
     """Messages that agents rejected, by cause; those of ended processes stay counted."""
 
     def __init__(self) -> None:
-        self._newest: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
-        """By agent and incarnation: pairs of an index of CAUSES and a count since its start."""
+        self._newest: dict[int, tuple[int, tuple[tuple[int, int], ...]]] = {}
+        """By agent: its incarnation, and pairs of an index of CAUSES and a count since then."""
+        self._ended: Counter[str] = Counter()
+        """Of processes that were replaced, by cause."""
 
     def update(self, agent: int, command: Command) -> None:
         """Take the counts in an agent's command."""
-        self._newest[agent, command.incarnation] = command.telemetry.rejected
+        incarnation, counts = self._newest.get(agent, (command.incarnation, ()))
+        if incarnation != command.incarnation:
+            self._ended.update(_named(counts))
+        self._newest[agent] = command.incarnation, command.telemetry.rejected
 
     def by_cause(self) -> dict[str, int]:
         """Return the number of rejected messages by cause, causes in alphabetical order."""
-        total: Counter[str] = Counter()
-        for counts in self._newest.values():
-            total.update({CAUSES[index]: count for index, count in counts})
+        total = Counter(self._ended)
+        for _, counts in self._newest.values():
+            total.update(_named(counts))
         return dict(sorted(total.items()))
+
+
+def _named(counts: Iterable[tuple[int, int]]) -> dict[str, int]:
+    return {CAUSES[index]: count for index, count in counts}

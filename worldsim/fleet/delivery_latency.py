@@ -46,7 +46,8 @@ class LatencyCollector:
         self._bound_bins = (1 + slots_per_tick) * BINS_PER_SLOT
         self._slot_s = slot_s
         self._bin_ms = 1e3 * slot_s / BINS_PER_SLOT
-        self._latest: dict[tuple[int, int], LatencyReport] = {}  # by agent and incarnation
+        self._latest: dict[int, LatencyReport] = {}  # by agent
+        self._ended: dict[int, LatencyReport] = {}  # of replaced processes together, by agent
 
     def add(self, agent: int, incarnation: int, data: bytes, now_s: float) -> None:
         """Take the encoded counts of an agent's current process at simulated time ``now_s`` [s].
@@ -58,17 +59,21 @@ class LatencyCollector:
             raise WireError("an extra delay that none of the counted frames can have")
         if report.incarnation != incarnation:
             raise WireError(f"of incarnation {report.incarnation}; {incarnation} is running")
-        previous = self._latest.get((agent, incarnation))
-        if previous is not None and _decreased(previous, report):
+        previous = self._latest.get(agent)
+        if previous is not None and previous.incarnation != incarnation:
+            ended = self._ended.get(agent)
+            self._ended[agent] = previous if ended is None else _together(ended, previous)
+        elif previous is not None and _decreased(previous, report):
             raise WireError("counts have decreased")
-        self._latest[agent, incarnation] = report
+        self._latest[agent] = report
 
     def summary(self, delivered: int) -> DeliveryLatency | None:
         """Return the distribution over all agents, None without a frame.
 
         delivered: number of frames that the radio delivered in total.
         """
-        counted = [each for each in self._latest.values() if _frames(each) <= delivered]
+        every = [*self._latest.values(), *self._ended.values()]
+        counted = [each for each in every if _frames(each) <= delivered]
         total = self._distribution(counted, range(len(CHANNELS)))
         if total is None:
             return None
@@ -113,6 +118,16 @@ def quantile(counts: Counts, percent: float) -> int:
     """
     wanted = percent / 100.0 * sum(counts)
     return next(at for at, so_far in enumerate(accumulate(counts)) if so_far and so_far >= wanted)
+
+
+def _together(one: LatencyReport, other: LatencyReport) -> LatencyReport:
+    """Return the counts of two processes of an agent together."""
+    counts = [
+        tuple(map(sum, zip(a, b, strict=True)))
+        for a, b in zip(one.counts, other.counts, strict=True)
+    ]
+    max_us = tuple(map(max, zip(one.max_us, other.max_us, strict=True)))
+    return LatencyReport(other.incarnation, tuple(counts), max_us)
 
 
 def _frames(report: LatencyReport) -> int:
