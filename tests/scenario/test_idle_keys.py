@@ -48,6 +48,7 @@ IDLE = {
     "expect.converge_within_s": {"expect.converge": "false", "expect.converge_within_s": "2"},
     "expect.attitude_within_deg": {"expect.attitude_within_deg": "5"},
     "event[0].at_s": {"event": "[{ at_s = 4.99, kill = [0] }]"},
+    "event[1].at_s": {"event": "[{ at_s = 1, kill = ['world'] }, { at_s = 2, kill = [0] }]"},
     "event[0].every_s": {"event": "[{ at_s = 1, kill = [0], every_s = 3.99 }]"},
     "expect.min_obstacle_distance_m": {"expect.min_obstacle_distance_m": "0.5"},
 }

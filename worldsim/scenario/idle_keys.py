@@ -4,11 +4,13 @@ A key counts as set where it differs from its default.
 """
 
 from collections.abc import Iterator
+from math import inf
 from typing import Any, NamedTuple
 
 from agent.config import SCANNERS, Control, Sensors, Vehicle
 from agent.qstructure.formation import FormationSpec
 from netem.link_parameters import Conditions, LinkKeys
+from worldsim.scenario.events import EventTable
 from worldsim.scenario.faults import SabotageFault
 from worldsim.scenario.obstacle_tables import Movable
 from worldsim.scenario.problem import Problem
@@ -181,13 +183,21 @@ def _of_expectations(scenario: Scenario) -> Iterator[Problem]:
 
 def _of_times(scenario: Scenario) -> Iterator[Problem]:
     last_s = (scenario.slots - 1) / scenario.slot_hz
+    killed_s = min((each.at_s for each in scenario.event if _kills_world(each)), default=inf)
     for index, event in enumerate(scenario.event):
         if round(event.at_s - last_s, 9) > 0.0:
             detail = f"no effect: the last slot begins at {last_s:g} s"
             yield Problem(f"event[{index}].at_s", detail)
+        elif event.at_s > killed_s:
+            detail = f"no effect: the world is killed at {killed_s:g} s"
+            yield Problem(f"event[{index}].at_s", detail)
         if event.every_s is not None and round(event.at_s + event.every_s - last_s, 9) > 0.0:
             detail = "no effect: the run is over before it happens again"
             yield Problem(f"event[{index}].every_s", detail)
+
+
+def _kills_world(event: EventTable) -> bool:
+    return event.kill is not None and event.process == "world"
 
 
 def _specs(scenario: Scenario) -> Iterator[FormationSpec]:
