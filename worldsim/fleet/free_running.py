@@ -199,9 +199,9 @@ class FreeRunningFleet:
         if self._landed:
             return
         self._landed = True
+        self._netem.wake()
         if self.begun:
             self._launcher.report_run_over()
-        self._netem.wake()
         self._over(b"")
         deadline = time.monotonic() + FINAL_VERDICTS_WITHIN_S
         while self._netem.state == "up" and (left_s := deadline - time.monotonic()) > 0.0:
