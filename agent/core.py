@@ -47,6 +47,7 @@ from agent.messages import (
 from agent.places.place_points import PlacePoints
 from agent.rejection import RejectedError
 from agent.sensing.obstacle_perception import ObstaclePerception
+from agent.sensing.own_pose import OwnPose
 from netem.wire.channels import LOCAL, MULTIHOP, Channel
 
 MAX_SUMMARIES: Final = 8
@@ -106,6 +107,7 @@ class Agent:
         )
         self._points = PlacePoints(setup.control.spacing_m)
         self._blocks_within_m = 0.5 * setup.control.spacing_m + SAME_VEHICLE_M
+        self._pose = OwnPose(setup.vehicle, tick_s / setup.slots_per_tick)
         self._clock = OwnClock(tick_s / setup.slots_per_tick, self._slack_s)
         self._begin(setup.incarnation > 0)
 
@@ -119,10 +121,8 @@ class Agent:
         self._neighbours = Neighbours(setup.id, comms.local_hz, self._slack_s)
         self._table = RecordTable(setup.id, comms.multihop_hz, setup.ids)
         self._safety_monitor = SafetyMonitor(setup, restarted)
-        self._perception = ObstaclePerception(setup)
+        self._forget_positions()
         self._summaries: dict[int, deque[HeardSummary]] = {}
-        self._unidentified_vehicles = UnidentifiedVehicles(setup.fleet_max_speed_mps)
-        self._unidentified: tuple[Vector, ...] = ()
         self._blocked: frozenset[Place] = frozenset()
         self._blocked_in = NO_MISSION  # key of the mission whose places these are
         self._intent: Intent | None = None
@@ -130,6 +130,12 @@ class Agent:
         self._housekeeping_at_s = 0.0
         self._record_age_s = 0.0
         self._link = UNHEARD
+
+    def _forget_positions(self) -> None:
+        """Know nothing of what was found where, nor of what that says of the sensors."""
+        self._perception = ObstaclePerception(self._setup)
+        self._unidentified_vehicles = UnidentifiedVehicles(self._setup.fleet_max_speed_mps)
+        self._unidentified: tuple[Vector, ...] = ()
 
     def receive(self, source: int, channel: Channel, payload: bytes, now_s: float) -> None:
         """Take a frame heard from ``source``; a rejected one is counted by its cause."""
@@ -154,6 +160,8 @@ class Agent:
             self._missions.forget_times()
             self._broadcast.forget_times()
             self._begin(restarted=True)
+        if self._pose.jumps(observation.slot, observation.position):
+            self._forget_positions()
         for mission in observation.orders:
             self._accept_order(mission)
         senses = self._senses(observation)

@@ -11,6 +11,7 @@ from typing import Final
 
 from agent.heard_beacon import HeardBeacon
 from agent.messages import Observation, Vector
+from agent.sensing.own_pose import JUMP_M
 from agent.sensing.ray_pattern import Pattern
 from agent.sensing.scan_jumps import ScanJumps, VehicleJumps
 from agent.vectors import apart
@@ -59,6 +60,8 @@ class SensorHealth:
         self._stuck = False
         self._missed = self._met = 0
         self._missed_s: dict[int, float] = {}
+        self._accusers: dict[int, HeardBeacon] = {}
+        """The last reports of those that were missed where they reported themselves."""
         self._blind = False
 
     def update(self, observation: Observation) -> bool:
@@ -72,9 +75,11 @@ class SensorHealth:
         if self._vehicle_jumps is None:
             return
         here = observation.position
+        self._discredit(neighbours)
         near = [beacon for beacon in neighbours if apart(here, beacon.position) <= NEAR_M]
         looks = [(beacon, self._is_missed(observation, beacon)) for beacon in near]
         missed = {beacon.id: beacon.stamp_s for beacon, missed in looks if missed}
+        self._accusers |= {beacon.id: beacon for beacon, missed in looks if missed}
         if missed:
             # A departed neighbour is missed too, but counts only once: it sends no new beacon.
             fresh = any(self._missed_s.get(other) != stamp_s for other, stamp_s in missed.items())
@@ -84,6 +89,25 @@ class SensorHealth:
             self._missed, self._met = 0, self._met + 1
             self._blind = self._blind and self._met < LOOKS
         self._missed_s = missed
+
+    def _discredit(self, neighbours: Sequence[HeardBeacon]) -> None:
+        """Trust the sensors again where all that were missed have misreported themselves.
+
+        A report that jumps where no vehicle can have flown shows that the earlier ones were wrong.
+        """
+        if not self._accusers:
+            return
+        for beacon in neighbours:
+            before = self._accusers.get(beacon.id)
+            if before is None:
+                continue
+            flown_m = 2.0 * self._max_speed * abs(beacon.stamp_s - before.stamp_s)
+            if apart(before.position, beacon.position) > flown_m + JUMP_M:
+                del self._accusers[beacon.id]
+            else:
+                self._accusers[beacon.id] = beacon
+        if not self._accusers:
+            self._missed, self._blind = 0, False
 
     def _update_stuck(self, observation: Observation) -> None:
         if not observation.scans:

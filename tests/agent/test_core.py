@@ -335,8 +335,11 @@ CLOSED = msgspec.convert(
 
 
 def counting_core(formation):
+    """Return an agent with a vehicle that can be elsewhere a tick later."""
     control = Control(controller=f"{__name__}:Counting")
-    return Agent(msgspec.structs.replace(AGENT_SETUP, formation=formation, control=control))
+    swift = Vehicle(sensors=("proximity",), max_speed_mps=50, max_climb_mps=50)
+    setup = msgspec.structs.replace(AGENT_SETUP, formation=formation, control=control)
+    return Agent(msgspec.structs.replace(setup, vehicle=swift))
 
 
 @pytest.mark.parametrize(("agents", "kept"), [(9, True), (5, False)])

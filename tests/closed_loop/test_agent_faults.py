@@ -62,3 +62,37 @@ def test_vehicles_without_a_sensor_keep_apart_while_clocks_are_wrong() -> None:
         )
         check_safety(flight)
         assert np.isfinite(flight.loop.world.vehicles.position).all()
+
+
+POSES = {
+    "off by a tenth": "bias_m = [0.1, 0, 0]",
+    "on another's place": "bias_m = [-0.577, 0.577, 0.577]",
+    "far off": "bias_m = [5, 0, 0]",
+    "noisy": "noise_m = 0.3",
+    "turned": "bias_yaw_deg = 30",
+}
+
+
+@pytest.mark.parametrize("pose", POSES.values(), ids=POSES)
+def test_an_agent_with_a_wrong_pose_collides_with_nobody_and_comes_back(pose: str) -> None:
+    fault = f"at_s = 15, for_s = 15, pose = {{ agents = [{STRUCK}], {pose} }}"
+    flight = flown(1, 45, fault)
+    assert breaches(flight) == []
+    assert max(reformed_s(flight)) <= 10.0
+    residual_m = flight.loop.judge.phases[0].residual_m
+    assert residual_m is not None
+    assert residual_m < 0.05
+
+
+def test_half_a_team_with_wrong_poses_converges_without_a_collision() -> None:
+    """It is struck while vehicles cross each other's ways."""
+    wrong = "agents = [0, 2, 4, 6], bias_m = [0.4, -0.4, 0.3], noise_m = 0.1, bias_yaw_deg = 40"
+    flight = flown(2, 30, f"at_s = 1, for_s = 12, pose = {{ {wrong} }}")
+    assert breaches(flight) == []
+    assert max(reformed_s(flight)) <= 10.0
+
+
+def test_convergence_is_judged_by_where_vehicles_are() -> None:
+    flight = flown(1, 25, f"at_s = 12, pose = {{ agents = [{STRUCK}], bias_m = [0.3, 0, 0] }}")
+    residual_m = flight.loop.judge.phases[0].residual_m
+    assert residual_m == pytest.approx(0.3, abs=0.02)

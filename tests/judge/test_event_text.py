@@ -49,6 +49,14 @@ SENTENCES: list[tuple[dict[str, Any], str]] = [
         {"kind": "clock", "agent": 3, "number": 1, "offset_s": 3.0, "ends": True, **BY_OPERATOR},
         "the clock of a3 is set right: +3 s no more (by the operator)",
     ),
+    (
+        {"kind": "pose", "agent": 3, "number": 1, "bias_m": [1, 0, 2], "noise_m": 0.1, **SCHEDULED},
+        "a3 measures its pose wrong: bias [1.0, 0.0, 2.0] m, noise 0.1 m (scheduled)",
+    ),
+    (
+        {"kind": "pose", "agent": 3, "number": 1, "bias_yaw_deg": 9, "ends": True, **SCHEDULED},
+        "a3 measures its pose rightly: yaw +9 deg no more (scheduled)",
+    ),
     ({"kind": "kill", "agent": 3, **SCHEDULED}, "a3 is killed; its vehicle hovers (scheduled)"),
     (
         {"kind": "kill", "agent": 3, "signal": 9, "planned": False},

@@ -122,10 +122,25 @@ class Timeline:
         kinds: list[Callable[[], Tables]] = [
             lambda: {"clock": self._clock()},
         ]
+        if self._all_range:  # others know of vehicles by their poses alone
+            kinds.append(lambda: {"pose": self._pose()})
         made = draw.among(kinds)()
         for table in made.values():
             table["agents"] = self._selectors(by_place=True)
         return made
+
+    @property
+    def _all_range(self) -> bool:
+        """Whether every vehicle has the proximity sensor."""
+        tables = [self._scenario["vehicle"]]
+        tables += [{**tables[0], **each.get("vehicle", {})} for each in self._scenario["agent"]]
+        return all("proximity" in each["sensors"] for each in tables)
+
+    def _pose(self) -> Tables:
+        draw = self._draw
+        bias_m = draw.point(draw.among((0.05, 0.5, 5.0)))
+        noise_m = draw.among((0.0, 0.02, 0.3))
+        return {"bias_m": bias_m, "noise_m": noise_m, "bias_yaw_deg": draw.number(-180, 180, 0)}
 
     def _clock(self) -> Tables:
         draw = self._draw

@@ -17,6 +17,7 @@ STRIKE = {
     "sabotage": ("sabotage = { kind = 'flood', agents = [1] }", "frames"),
     "sensor": ('sensor = { agents = [1], mode = "silent" }', "readings"),
     "clock": ("clock = { agents = [1], offset_s = 1 }", "readings"),
+    "pose": ("pose = { agents = [1], bias_m = [0, 0, 1] }", "readings"),
     "pause": ("pause = [1]", "agents"),
     "kill": ("kill = [1]", "agents"),
     "leave": ("leave = [1]", "agents"),

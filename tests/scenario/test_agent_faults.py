@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from worldsim.scenario.file import load
+from worldsim.scenario.safety_checks import poses_right_without_a_sensor
 from worldsim.scenario.toml import ScenarioError
 
 WEDGE = Path("deploy/scenarios/wedge-9.toml")
@@ -19,6 +20,11 @@ WEDGE = Path("deploy/scenarios/wedge-9.toml")
         ("clock = { agents = [1], offset_s = -2 }", "clock.offset_s", "less than 0 s"),
         ("clock = { agents = [1], offset_s = 1e9 }", "clock.offset_s", "86400"),
         ("clock = { agents = [1], drift_ppm = 1e6 }", "clock.drift_ppm", "10000"),
+        ("pose = { bias_m = [1, 0, 0] }", "pose.agents", "is missing"),
+        ("pose = { agents = [1] }", "pose.bias_m", "the pose would be right"),
+        ("pose = { agents = [1], bias_m = [1, 0] }", "pose.bias_m", "3"),
+        ("pose = { agents = [1], noise_m = -1 }", "pose.noise_m", "0"),
+        ("pose = { agents = ['queue:X'], noise_m = 1 }", "pose.agents[0]", "no queue 'X'"),
     ],
 )
 def test_an_invalid_fault_is_rejected(fault: str, key: str, detail: str) -> None:
@@ -26,3 +32,13 @@ def test_an_invalid_fault_is_rejected(fault: str, key: str, detail: str) -> None
         load(WEDGE, {"event": f"[{{ at_s = 1, {fault} }}]"})
     assert str(caught.value).startswith(f"{WEDGE}: event[0].{key}: ")
     assert detail in str(caught.value)
+
+
+@pytest.mark.parametrize(("sensors", "warned"), [("['proximity']", False), ("[]", True)])
+def test_a_wrong_pose_among_vehicles_that_cannot_sense_each_other_is_warned_of(
+    sensors: str, warned: bool
+) -> None:
+    event = "[{ at_s = 1, pose = { agents = [1], noise_m = 1 } }]"
+    scenario = load(WEDGE, {"event": event, "vehicle.sensors": sensors})
+    problem = poses_right_without_a_sensor(scenario)
+    assert (problem is not None and problem.key == "event[0].pose") == warned

@@ -13,7 +13,7 @@ import typer
 from worldsim.commands.options import RunFolder, examples
 from worldsim.results.exit_status import PASS
 
-AGENT_FAULTS = ("clock",)
+AGENT_FAULTS = ("clock", "pose")
 FAULTS = (
     *("kill", "leave", "restart", "pause", "resume", "join"),
     *AGENT_FAULTS,
@@ -93,6 +93,7 @@ def mission(
         "qswarm fault runs/mine join 2",
         "qswarm fault runs/mine kill random:1 --for 2 --every 10 --name outage",
         "qswarm fault runs/mine clock 3 offset_s=3 --for 10",
+        "qswarm fault runs/mine pose 3 bias_m=[0.5,0,0] --for 10",
         "qswarm fault runs/mine end outage",
     )
 )
@@ -118,9 +119,10 @@ def fault(
 
     kill ends processes, leave removes the vehicles too, restart brings them back; pause stops
     processes until resume; join adds new agents. clock lets agents' clocks be wrong (offset_s,
-    drift_ppm). disk_full lets nothing more of recording and events be written. end ends a fault of
-    any kind before its time, by its name: its kind and number, as in "kill-2", unless --name
-    gave it another one.
+    drift_ppm). pose lets agents measure their poses wrong (bias_m, noise_m, bias_yaw_deg).
+    disk_full lets nothing more of recording and events be written. end ends a fault of any kind
+    before its time, by its name: its kind and number, as in "kill-2", unless --name gave it
+    another one.
     """
     if action not in FAULTS:
         raise _bad(action, "ACTION", f"allowed: {', '.join(FAULTS)}")

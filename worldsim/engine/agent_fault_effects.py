@@ -1,12 +1,15 @@
 """Effects of faults of single agents: what the world shows them from now on, and the events."""
 
 from collections.abc import Iterator
+from math import radians
+from typing import Any, assert_never
 
 from worldsim.engine.operations import DisturbAgents
 from worldsim.judge.event import By
-from worldsim.judge.run_events import AgentFaultRunEvent, ClockChanged
-from worldsim.scenario.faults import ClockFault
+from worldsim.judge.run_events import AgentFaultRunEvent, ClockChanged, PoseChanged
+from worldsim.scenario.faults import ClockFault, PoseFault
 from worldsim.truth.agent_clocks import ClockError
+from worldsim.truth.pose_errors import PoseError
 from worldsim.truth.world import World
 
 
@@ -19,23 +22,48 @@ class AgentFaultEffects:
     def apply(self, operation: DisturbAgents, t_s: float, by: By) -> Iterator[AgentFaultRunEvent]:
         """Apply an operation at a time [s]; yield an event for each agent."""
         for agent in operation.agents:
-            yield self._set_clock(operation, operation.fault, agent, t_s, by)
+            if operation.ends:
+                self._end(operation, agent)
+            else:
+                self._begin(operation, agent, t_s)
+            yield _event(operation, agent, t_s, by)
 
-    def _set_clock(
-        self, operation: DisturbAgents, fault: ClockFault, agent: int, t_s: float, by: By
-    ) -> ClockChanged:
-        number, clocks = operation.number, self._world.clocks
-        if operation.ends:
-            clocks.end(number, agent)
-        else:
-            clocks.begin(number, agent, ClockError(t_s, fault.offset_s, fault.drift_ppm))
-        return ClockChanged(
-            t_s=t_s,
-            agent=agent,
-            planned=True,
-            by=by,
-            number=number,
-            ends=operation.ends,
-            offset_s=fault.offset_s,
-            drift_ppm=fault.drift_ppm,
-        )
+    def _begin(self, operation: DisturbAgents, agent: int, t_s: float) -> None:
+        number, fault, world = operation.number, operation.fault, self._world
+        match fault:
+            case ClockFault():
+                error = ClockError(t_s, fault.offset_s, fault.drift_ppm)
+                world.clocks.begin(number, agent, error)
+            case PoseFault():
+                wrong = PoseError(fault.bias_m, fault.noise_m, radians(fault.bias_yaw_deg))
+                world.pose_errors.begin(number, agent, wrong)
+            case _:
+                assert_never(fault)
+
+    def _end(self, operation: DisturbAgents, agent: int) -> None:
+        number, fault, world = operation.number, operation.fault, self._world
+        match fault:
+            case ClockFault():
+                world.clocks.end(number, agent)
+            case PoseFault():
+                world.pose_errors.end(number, agent)
+            case _:
+                assert_never(fault)
+
+
+def _event(operation: DisturbAgents, agent: int, t_s: float, by: By) -> AgentFaultRunEvent:
+    fault = operation.fault
+    common: dict[str, Any] = {
+        "t_s": t_s,
+        "agent": agent,
+        "planned": True,
+        "by": by,
+        "number": operation.number,
+        "ends": operation.ends,
+    }
+    match fault:
+        case ClockFault(offset_s=offset_s, drift_ppm=drift_ppm):
+            return ClockChanged(**common, offset_s=offset_s, drift_ppm=drift_ppm)
+        case PoseFault(bias_m=bias_m, noise_m=noise_m, bias_yaw_deg=yaw_deg):
+            return PoseChanged(**common, bias_m=bias_m, noise_m=noise_m, bias_yaw_deg=yaw_deg)
+    assert_never(fault)

@@ -27,6 +27,8 @@ class ClockLinks:
         self._clocks = AgentClocks()
         self.unclear = False
         """Whether the delay of a frame decides on some link whether the frame is rejected."""
+        self.silent = np.zeros(agents, dtype=np.bool_)
+        """(N,): the agents that know their clock to be wrong; they take no part in the team."""
 
     def __bool__(self) -> bool:
         return bool(self._clocks)
@@ -34,6 +36,7 @@ class ClockLinks:
     def handle_event(self, event: ClockChanged) -> None:
         """Take the beginning or the end of a clock's fault."""
         self.unclear = False
+        self.silent[:] = False
         if event.agent is None:
             return
         if event.ends:
@@ -54,5 +57,6 @@ class ClockLinks:
         by_delay = (lead > self._slack_s) | ((lead != 0.0) & (longest_s - lead > MAX_AGE_S))
         self.unclear = bool((reached & passes & by_delay).any())
         contradicted = np.count_nonzero(reached & future, axis=0) >= WITNESSES
-        passes[contradicted & ~(reached & passes).any(axis=0)] = False
+        self.silent = contradicted & ~(reached & passes).any(axis=0)
+        passes[self.silent] = False
         return passes

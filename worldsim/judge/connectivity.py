@@ -6,13 +6,14 @@ is one period of the multihop channel, on which agents pass on what they hear.
 
 from functools import cache
 from math import comb, inf
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agent.assignment.slot_selection import ALONE_S
 from agent.comms.gossip import LEAST_RELAYED_SILENCE_S
+from agent.comms.unidentified_vehicles import SAME_VEHICLE_M
 from netem.conditions import NetworkConditions
 from netem.link import burst_variance_factor, unusable_share
 from netem.link_model import LinkModel
@@ -20,7 +21,7 @@ from netem.random_draws import MAX_QUANTILE
 from netem.wire.channels import CHANNELS, LOCAL, MAX_PAYLOAD_B, MULTIHOP
 from worldsim.judge.clock_links import ClockLinks
 from worldsim.judge.radio_events import RadioRunEvent, order_of
-from worldsim.judge.run_events import ClockChanged
+from worldsim.judge.run_events import AgentFaultRunEvent, ClockChanged, PoseChanged
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
 from worldsim.truth.vehicle import Floats
@@ -51,7 +52,7 @@ class Components(NamedTuple):
     lossy: bool
     """Whether some frames are lost on a link within a component, and some are not."""
     closed: NDArray[np.bool_]
-    """(C,): of each component, whether its agents hear none of another."""
+    """(C,): of each component, whether its agents hear none of another, and take part."""
     hears: NDArray[np.bool_]
     """(N, N): whether the agent of the row hears beacons of the agent of the column."""
 
@@ -79,6 +80,8 @@ class Connectivity:
         self._rows = range(scenario.rows)
         self._network = NetworkConditions(scenario.netem)
         self._clocks = ClockLinks(scenario.rows, self._slack_s)
+        self._displaced: set[tuple[int, int | None]] = set()
+        """Faults, by number and agent, by which others take a vehicle for an unidentified one."""
         self._found: Components | None = None
         """The newest components, and below what they were computed from."""
         self._found_of: tuple[bytes, ...] = ()
@@ -89,9 +92,21 @@ class Connectivity:
         self._network.apply(order_of(event))
         self._refresh()
 
-    def handle_clock(self, event: ClockChanged) -> None:
-        """Take the beginning or the end of a fault of an agent's clock."""
-        self._clocks.handle_event(event)
+    def handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
+        """Take the beginning or the end of a fault of an agent."""
+        match event:
+            case ClockChanged():
+                self._clocks.handle_event(event)
+            case PoseChanged():
+                self._note_displaced(event)
+            case _:
+                assert_never(event)
+
+    def _note_displaced(self, event: PoseChanged) -> None:
+        if event.ends:
+            self._displaced.discard((event.number, event.agent))
+        elif event.displaces_m > SAME_VEHICLE_M:
+            self._displaced.add((event.number, event.agent))
 
     def components(self, tick: Tick) -> Components:
         """Return the connected components at a tick; the same object while no link changes."""
@@ -101,9 +116,10 @@ class Connectivity:
             passing = self._clocks.passing(heard, tick.time_s, self._in_flight_s)
             usable, heard = usable & passing, heard & passing
         lost = np.where(usable, self._lost_over(MULTIHOP, distance), 1.0)
-        of = lost.tobytes(), heard.tobytes(), tick.alive.tobytes()
+        silent = self._clocks.silent
+        of = lost.tobytes(), heard.tobytes(), tick.alive.tobytes(), silent.tobytes()
         if self._found is None or of != self._found_of:
-            self._found, self._found_of = _found(lost, heard, tick.alive), of
+            self._found, self._found_of = _found(lost, heard, tick.alive, silent), of
         return self._found
 
     def heard(self, tick: Tick) -> NDArray[np.bool_]:
@@ -125,9 +141,10 @@ class Connectivity:
         """Return B [s]: a record reaches every agent in this time, with probability 1 - 1e-6.
 
         loss: of the worst link; None: of a link without values of its own, within range. Infinite
-        while links flap, or delays decide whether stamps are accepted: there is no bound.
+        while links flap, delays decide whether stamps are accepted, or a vehicle is elsewhere than
+        its agent says: there is no bound.
         """
-        if self._network.flapping or self._clocks.unclear:
+        if self._network.flapping or self._clocks.unclear or self._displaced:
             return inf
         lost = self.loss if loss is None else loss
         rounds = rounds_to_all(agents, hops, lost) * self._burst_factor if hops else 0.0
@@ -221,10 +238,13 @@ def _longest_queued_s(model: LinkModel) -> float:
     return min(MAX_QUEUED_S, size_bit / (1000.0 * model.rate_kbit))
 
 
-def _found(lost: Floats, heard: NDArray[np.bool_], alive: NDArray[np.bool_]) -> Components:
+def _found(
+    lost: Floats, heard: NDArray[np.bool_], alive: NDArray[np.bool_], silent: NDArray[np.bool_]
+) -> Components:
     """Return the components where links lose these shares, and beacons are heard over some.
 
-    lost, heard: (N, N), from row to column. alive: (N,), the running agents.
+    lost, heard: (N, N), from row to column. alive: (N,), the running agents; silent: (N,), those of
+    them that take no part.
     """
     reached = _reached(_neighbours(lost < 1.0))
     label = _labels(reached.rows, alive)
@@ -235,7 +255,7 @@ def _found(lost: Floats, heard: NDArray[np.bool_], alive: NDArray[np.bool_]) -> 
     if len(losses) > 1 or not inside.all():
         reached = _reached(_neighbours((lost <= loss) & inside))
     foreign = (heard | (lost < 1.0)) & ~inside
-    open_ = np.unique(label[foreign.any(axis=0)])
+    open_ = np.unique(label[foreign.any(axis=0) | (silent & alive)])
     closed = ~np.isin(np.arange(label.max(initial=-1) + 1), open_)
     return Components(label, reached.hops, loss, bool(within.any()), closed, heard.T)
 

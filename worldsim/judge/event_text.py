@@ -27,6 +27,7 @@ from worldsim.judge.run_events import (
     LossEvent,
     MissionRunEvent,
     Paused,
+    PoseChanged,
     QueueChanged,
     Reconnected,
     Restarted,
@@ -78,7 +79,7 @@ def _words(event: RunEvent, queues: Queues) -> str:
             words = _returned(event)
         case SensorChanged(agent=agent, sensor=sensor, mode=mode):
             words = f"sensors of a{agent} ({sensor}): {mode}"
-        case ClockChanged():
+        case ClockChanged() | PoseChanged():
             words = _agent_fault(event)
         case FormationGiven() | FrameGiven():
             words = _mission(event)
@@ -135,6 +136,10 @@ def _agent_fault(event: AgentFaultRunEvent) -> str:
             return f"the clock of {agent} is set right: {_error(event)} no more"
         case ClockChanged():
             return f"the clock of {agent} goes wrong by {_error(event)}"
+        case PoseChanged(ends=True):
+            return f"{agent} measures its pose rightly: {_pose_error(event)} no more"
+        case PoseChanged():
+            return f"{agent} measures its pose wrong: {_pose_error(event)}"
     assert_never(event)
 
 
@@ -142,6 +147,13 @@ def _error(event: ClockChanged) -> str:
     offset = [f"{event.offset_s:+g} s"] if event.offset_s else []
     drift = [f"{event.drift_ppm:+g} ppm"] if event.drift_ppm else []
     return ", ".join(offset + drift)
+
+
+def _pose_error(event: PoseChanged) -> str:
+    bias = [f"bias [{_list(event.bias_m)}] m"] if any(event.bias_m) else []
+    noise = [f"noise {event.noise_m:g} m"] if event.noise_m else []
+    yaw = [f"yaw {event.bias_yaw_deg:+g} deg"] if event.bias_yaw_deg else []
+    return ", ".join(bias + noise + yaw)
 
 
 def _mission(event: MissionRunEvent) -> str:

@@ -45,6 +45,7 @@ from worldsim.judge.run_events import (
     LateStart,
     Left,
     Paused,
+    PoseChanged,
     QueueChanged,
     Reconnected,
     Restarted,
@@ -116,8 +117,9 @@ class Invariants:
             self._handle_radio(event)
             return
         match event:
-            case ClockChanged():
-                self._connectivity.handle_clock(event)
+            case ClockChanged() | PoseChanged():
+                self._connectivity.handle_agent_fault(event)
+                self._shared.forget()
                 self._fault(event.t_s, event.t_s)
             case RoleChanged():
                 self._leads.take(event, informed=self._is_informed(event.agent))

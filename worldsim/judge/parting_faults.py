@@ -1,5 +1,7 @@
 """The faults in force that part the team: while there are any, it cannot be one."""
 
+from typing import assert_never
+
 from worldsim.judge.radio_events import (
     Flapped,
     Healed,
@@ -8,7 +10,14 @@ from worldsim.judge.radio_events import (
     Partitioned,
     RadioRunEvent,
 )
-from worldsim.judge.run_events import AgentFaultRunEvent, Reconnected, WorldStopped
+from worldsim.judge.run_events import (
+    AgentFaultRunEvent,
+    ClockChanged,
+    PoseChanged,
+    Reconnected,
+    WorldStopped,
+)
+from worldsim.scenario.tables import CONVERGED_M
 
 
 class PartingFaults:
@@ -50,7 +59,14 @@ class PartingFaults:
 
     def handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
         """Take the beginning or the end of a fault of an agent."""
-        if abs(event.offset_s) > self._slack_s or event.drift_ppm:
+        match event:
+            case ClockChanged():
+                parts = abs(event.offset_s) > self._slack_s or event.drift_ppm != 0.0
+            case PoseChanged():
+                parts = event.displaces_m > 0.5 * CONVERGED_M or event.bias_yaw_deg != 0.0
+            case _:
+                assert_never(event)
+        if parts:
             self._mark(event.number, begins=not event.ends)
 
     def _mark(self, number: int, *, begins: bool) -> None:

@@ -3,11 +3,12 @@
 ``kind`` is the event's key. The judge, the recorder and readers of a run get the same events.
 """
 
+from math import hypot
 from typing import get_args
 
 import msgspec
 
-from agent.messages import FramePath, Role
+from agent.messages import ZERO, FramePath, Role, Vector
 from agent.qstructure.formation import FormationSpec
 from netem.faults import OutageCause
 from worldsim.judge.event import Event, PlannedEvent
@@ -87,6 +88,22 @@ class ClockChanged(AgentFaultEvent, frozen=True, tag="clock"):
     """[1e-6]"""
 
 
+class PoseChanged(AgentFaultEvent, frozen=True, tag="pose"):
+    """An agent measures its pose wrong by the values of a fault, or no more."""
+
+    bias_m: Vector = ZERO
+    """Of the position [m; world frame]."""
+    noise_m: float = 0.0
+    """Standard deviation on each axis [m]."""
+    bias_yaw_deg: float = 0.0
+    """[deg]"""
+
+    @property
+    def displaces_m(self) -> float:
+        """How far the vehicle may be from where its agent takes it to be [m]."""
+        return hypot(*self.bias_m) + 3.0 * self.noise_m
+
+
 class MissionEvent(PlannedEvent, frozen=True, kw_only=True):
     """A mission was given to an agent."""
 
@@ -159,7 +176,7 @@ class LateStart(Event, frozen=True, kw_only=True, tag="late"):
     detail: str
 
 
-AgentFaultRunEvent = ClockChanged
+AgentFaultRunEvent = ClockChanged | PoseChanged
 LossEvent = Killed | Left | Paused
 ReturnEvent = Restarted | Joined | Resumed
 LOSS_KINDS = frozenset({str(event.__struct_config__.tag) for event in get_args(LossEvent)})

@@ -41,6 +41,7 @@ from worldsim.judge.run_events import (
     LossEvent,
     MissionRunEvent,
     Paused,
+    PoseChanged,
     QueueChanged,
     Reconnected,
     Restarted,
@@ -155,7 +156,7 @@ class Judge:
                 self._open_phase(event)
             case Restarted() | Joined() | Killed() | Left() | Paused() | Resumed():
                 self._change_team(event)
-            case ClockChanged():
+            case ClockChanged() | PoseChanged():
                 self._handle_agent_fault(event)
             case SensorChanged():
                 self._held.open_window(event.t_s)

@@ -12,6 +12,7 @@ MAX_IDLE_NAMED = 3
 READ = {
     "sensor": "reading",
     "clock": "clock reading",
+    "pose": "measured pose",
 }
 """What the faults change that strike what agents read, by kind."""
 MAX_TOLD = 20

@@ -1,12 +1,19 @@
 """Checks of the faults of single agents whose processes go on."""
 
-from worldsim.scenario.faults import AgentFault, ClockFault
+from typing import assert_never
+
+from worldsim.scenario.faults import AgentFault, ClockFault, PoseFault
 from worldsim.scenario.problem import Problem
 
 
 def agent_fault_problem(fault: AgentFault, at_s: float) -> Problem | None:
     """Return what makes a fault that begins at a time [s] invalid, besides its selectors."""
-    return _clock_problem(fault, at_s)
+    match fault:
+        case ClockFault():
+            return _clock_problem(fault, at_s)
+        case PoseFault():
+            return _pose_problem(fault)
+    assert_never(fault)
 
 
 def _clock_problem(fault: ClockFault, at_s: float) -> Problem | None:
@@ -16,3 +23,9 @@ def _clock_problem(fault: ClockFault, at_s: float) -> Problem | None:
         detail = f"{fault.offset_s:g}; at {at_s:g} s the clock would show less than 0 s"
         return Problem("offset_s", detail)
     return None
+
+
+def _pose_problem(fault: PoseFault) -> Problem | None:
+    if any(fault.bias_m) or fault.noise_m or fault.bias_yaw_deg:
+        return None
+    return Problem("bias_m", "0, as are noise_m and bias_yaw_deg: the pose would be right")

@@ -21,6 +21,7 @@ from worldsim.scenario.faults import (
     Kill,
     Leave,
     Pause,
+    PoseFault,
     ProcessFault,
     Restart,
     Resume,
@@ -56,6 +57,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     sensor: lets sensors fail.
     clock: agents' clocks are wrong.
     disk_full: nothing more of recording and events can be written.
+    pose: agents measure their poses wrong.
     end: ends a fault by its name, which is its kind and the event's index, as in "jam-2", unless
     ``name`` gives another one. formation, frame: a mission for the team.
     """
@@ -73,6 +75,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     sensor: SensorFault | None = None
     clock: ClockFault | None = None
     disk_full: bool | None = None
+    pose: PoseFault | None = None
     end: str | None = None
     formation: FormationSpec | None = None
     frame: FrameChange | None = None
@@ -105,7 +108,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     @property
     def agent_fault(self) -> AgentFault | None:
         """The fault of single agents whose key is set; None where there is none."""
-        return self.clock
+        return self.clock or self.pose
 
     def called(self, number: int) -> str:
         """Return the event's name. number: its index, or the number of an operator's event."""
@@ -158,7 +161,11 @@ _OTHERS = (key for key in EventTable.__struct_fields__ if key not in (*_NO_ACTIO
 ACTIONS = (*_OTHERS, *_RADIO)
 """The keys of all actions."""
 _LASTING = tuple(key for key in _RADIO if key != "heal")
-UNDOABLE = ("kill", "leave", "pause", *_LASTING, "sensor", "clock", "disk_full")
+_OF_AGENTS = (
+    "clock",
+    "pose",
+)
+UNDOABLE = ("kill", "leave", "pause", *_LASTING, "sensor", *_OF_AGENTS, "disk_full")
 """The keys of the actions that ``for_s`` can undo."""
 FAULTS = UNDOABLE
 """The keys of the actions that are faults: each of them can be undone."""

@@ -17,6 +17,7 @@ from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.target_frame import FrameChange
 
 Joiners = Annotated[int, Meta(ge=1, le=1000)]
+Bias = Annotated[float, Meta(ge=-1000, le=1000)]
 FailureMode = Literal["stuck", "silent", "wrong"]
 """stuck: repeats the last reading; silent: gives no reading; wrong: gives arbitrary readings."""
 
@@ -88,6 +89,19 @@ class ClockFault(Table, frozen=True):
     """So much more for each second [1e-6]."""
 
 
+class PoseFault(Table, frozen=True):
+    """Let the selected agents measure their poses wrong."""
+
+    kind: ClassVar[str] = "pose"
+    agents: Selectors
+    bias_m: tuple[Bias, Bias, Bias] = (0.0, 0.0, 0.0)
+    """Of the measured position [m; world frame]."""
+    noise_m: Annotated[float, Meta(ge=0, le=10)] = 0.0
+    """Standard deviation of the measured position on each axis [m]."""
+    bias_yaw_deg: Annotated[float, Meta(ge=-180, le=180)] = 0.0
+    """Of the measured yaw [deg]."""
+
+
 class EndFault(msgspec.Struct, frozen=True):
     """End a fault before its time, or one that has no end."""
 
@@ -95,7 +109,7 @@ class EndFault(msgspec.Struct, frozen=True):
     """Its name."""
 
 
-AgentFault = ClockFault
+AgentFault = ClockFault | PoseFault
 """A fault of single agents whose processes go on."""
 ProcessFault = Kill | Leave | Restart | Pause | Resume | Join
 MissionChange = FormationSpec | FrameChange

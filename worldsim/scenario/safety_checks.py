@@ -228,6 +228,19 @@ def sensor_faults_noticed(scenario: Scenario) -> Problem | None:
     return None
 
 
+def poses_right_without_a_sensor(scenario: Scenario) -> Problem | None:
+    """Warn of wrong poses in a fleet in which some vehicle knows others by their reports alone."""
+    unable = [i for i, each in enumerate(scenario.vehicles) if "proximity" not in each.sensors]
+    for index, event in enumerate(scenario.event):
+        if event.pose is not None and unable:
+            return Problem(
+                f"event[{index}].pose",
+                f"{_agents(unable)} without 'proximity': reports alone keep nobody from a vehicle"
+                " that reports itself elsewhere",
+            )
+    return None
+
+
 def _obstacles_not_evaded(scenario: Scenario) -> Iterator[Problem]:
     for index, obstacle in enumerate(scenario.obstacle):
         if _speed_mps(obstacle) > 0.0:
@@ -329,4 +342,5 @@ SAFETY_WARNINGS = (
     expectations_within_the_filter,
     obstacles_give_way,
     sensor_faults_noticed,
+    poses_right_without_a_sensor,
 )

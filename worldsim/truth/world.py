@@ -7,9 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan
 
+from msgspec.structs import replace
+
 from agent.config import Vehicle
 from agent.messages import ZERO, Command, Observation, Scan, Vector
 from worldsim.truth.agent_clocks import AgentClocks
+from worldsim.truth.pose_errors import PoseErrors
 from worldsim.truth.proximity_sensor import NO_READING, ProximitySensor
 from worldsim.truth.scanning_sensors import ScanningSensors
 from worldsim.truth.sensor_faults import SensorFaults
@@ -67,6 +70,7 @@ class World:
         """Number of commands that were not accepted."""
         self.sensor_faults = SensorFaults(proximity.seed)
         self.clocks = AgentClocks()
+        self.pose_errors = PoseErrors(proximity.seed)
         self._has_proximity = ["proximity" in each.sensors for each in limits]
         self._proximity = proximity
         self._scanning = scanning
@@ -87,7 +91,7 @@ class World:
     @property
     def readings_struck(self) -> dict[int, int]:
         """How many readings each fault of what agents read has changed, by its number."""
-        return self.sensor_faults.struck | self.clocks.struck
+        return self.sensor_faults.struck | self.clocks.struck | self.pose_errors.struck
 
     def positions(self) -> tuple[Vector | None, ...]:
         """Return true positions, row i = agent i [m; world frame], None where there is none."""
@@ -121,7 +125,7 @@ class World:
                 for agent, each in zip(agents, readings, strict=True)
             ]
             scans = {a: self.sensor_faults.scans(a, each, self.slot) for a, each in scans.items()}
-        return [
+        found = [
             Observation(
                 slot,
                 clocks.shown_s(agent, time_s) if clocks else time_s,
@@ -135,6 +139,24 @@ class World:
             )
             for k, agent in enumerate(agents)
         ]
+        if not self.pose_errors:
+            return found
+        return [self._as_measured(agent, each) for agent, each in zip(agents, found, strict=True)]
+
+    def _as_measured(self, agent: int, true: Observation) -> Observation:
+        """Return an observation with the pose as the agent measures it."""
+        errors = self.pose_errors
+        position, yaw = errors.measured(agent, true.position, true.yaw, true.slot)
+        if not errors.turns(agent):
+            return replace(true, position=position)
+        return replace(
+            true,
+            position=position,
+            yaw=yaw,
+            velocity=errors.turned(agent, true.velocity),
+            vehicles=tuple([errors.turned(agent, each) for each in true.vehicles]),
+            obstacles=tuple([errors.turned(agent, each) for each in true.obstacles]),
+        )
 
     def _scans(self, agents: list[int]) -> dict[int, tuple[Scan, ...]]:
         """Return the scans of the present slot, by agent."""
@@ -162,8 +184,11 @@ class World:
         expires = min(command.expires_slot, command.slot + self._max_validity)
         self._expires[agent] = expires
         self._first_expires = min(self._first_expires, expires)
-        self._velocity[agent] = self.vehicles.within_limits(agent, command.velocity)
-        self._yaw[agent], self._tilt[agent] = command.yaw, command.tilt
+        velocity, self._yaw[agent], self._tilt[agent] = command.velocity, command.yaw, command.tilt
+        if self.pose_errors and self.pose_errors.turns(agent):
+            velocity = self.pose_errors.turned_back(agent, velocity)
+            self._yaw[agent] = self.pose_errors.yaw_back(agent, command.yaw)
+        self._velocity[agent] = self.vehicles.within_limits(agent, velocity)
         return True
 
     def advance(self) -> None:

@@ -134,7 +134,8 @@ def test_old_beacons_and_far_neighbours_prove_nothing():
 
 def test_a_blind_sensor_is_trusted_again_once_it_senses_a_neighbour():
     watch, vehicle = sensor_health(), ((1.0, 0.0, 0.0),)
-    there, gone = (heard_beacon(1, 1, stamp_s=0.0, at=(x, 0.0, 0.0)) for x in (1.0, 5.0))
+    there = heard_beacon(1, 1, stamp_s=0.0, at=(1.0, 0.0, 0.0))
+    gone = heard_beacon(1, 1, stamp_s=10.0, at=(5.0, 0.0, 0.0))
     for look in range(LOOKS):
         speaking = heard_beacon(1, look, stamp_s=0.01 * look, at=(1.0, 0.0, 0.0))
         watch.compare(observation(0), [speaking])
@@ -168,3 +169,17 @@ def test_a_departed_neighbour_is_missed_once_and_proves_no_blind_sensor():
     for tick in range(20, 40, 2):
         watch.compare(observation(tick), [gone])
         assert watch.update(observation(tick))
+
+
+@pytest.mark.parametrize(("others", "trusted"), [((), True), ((2,), False)])
+def test_a_neighbour_that_misreported_itself_proves_no_blind_sensor(others, trusted):
+    """Its report jumps back to where it is: nobody was there where it was missed."""
+    watch = sensor_health()
+    accusers = (1, *others)
+    for look in range(LOOKS):
+        there = [heard_beacon(k, look, stamp_s=0.01 * look, at=(1.0, 0.0, 0.0)) for k in accusers]
+        watch.compare(observation(0), there)
+    assert not watch.update(observation(0))
+    back = heard_beacon(1, LOOKS, stamp_s=0.01 * LOOKS, at=(4.0, 0.0, 0.0))
+    watch.compare(observation(0), [back])
+    assert watch.update(observation(0)) is trusted
