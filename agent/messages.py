@@ -193,6 +193,9 @@ class Observation(Message, frozen=True):
     orders: Annotated[tuple[Mission, ...], Meta(max_length=4)]
     """Missions that an operator gives to this agent, for the whole team."""
     scans: Annotated[tuple[Scan, ...], Meta(max_length=2)]  # scans made at this time
+    takes_s: Annotated[float, Meta(ge=0, le=1000)] = 0.0
+    """How long the agent's process takes for this step beyond its own time, by a fault [s; wall
+    time]."""
 
 
 class Telemetry(Message, frozen=True):

@@ -1,8 +1,11 @@
 """One step of an agent: frames and an observation in, a command and a transmission out."""
 
+import time
+
 from agent.codec import encode
 from agent.config import AgentSetup
 from agent.core import Agent
+from agent.late_frames import LateFrames
 from agent.messages import Observation
 from agent.step_page import StepGuard
 from netem.wire.bus import Put
@@ -18,6 +21,8 @@ class AgentStepper:
         self._guard = guard if guard is not None else StepGuard(None, 1.0 / setup.tick_hz)
         self._guard.enter()
         self.core = Agent(setup)
+        self._late = LateFrames() if setup.lockstep else None
+        """In lockstep a step takes no time: what it says leaves later instead."""
         self._guard.leave()
         self._incarnation = setup.incarnation
         self._put_command = command
@@ -29,11 +34,19 @@ class AgentStepper:
             self.core.receive(frame.source, frame.channel, frame.payload, now_s)
 
     def step(self, observation: Observation) -> None:
-        """Step on an observation; publish one command and one transmission."""
+        """Step on an observation; publish one command and one transmission.
+
+        A step that is to take long does so.
+        """
         self._guard.enter()
         outbox = self.core.step(observation)
         self._guard.leave()
-        frames = tuple([Outgoing(channel, payload) for channel, payload in outbox.frames])
+        said = outbox.frames
+        if self._late is not None:
+            said = self._late.sent(said, observation.takes_s)
+        elif observation.takes_s > 0.0:
+            time.sleep(observation.takes_s)
+        frames = tuple([Outgoing(channel, payload) for channel, payload in said])
         transmission = pack(Transmission(observation.slot, self._incarnation, frames))
         # One directly after the other: the two then often leave in one packet.
         self._put_command(encode(outbox.command))

@@ -96,3 +96,20 @@ def test_convergence_is_judged_by_where_vehicles_are() -> None:
     flight = flown(1, 25, f"at_s = 12, pose = {{ agents = [{STRUCK}], bias_m = [0.3, 0, 0] }}")
     residual_m = flight.loop.judge.phases[0].residual_m
     assert residual_m == pytest.approx(0.3, abs=0.02)
+
+
+@pytest.mark.parametrize("delay_s", [0.03, 0.2, 2.0])
+def test_slow_agents_collide_with_nobody_and_the_team_forms_again(delay_s: float) -> None:
+    """They are struck while they fly to their places, and once more in them."""
+    slow = f"slow = {{ agents = [0, 3, {STRUCK}], delay_s = {delay_s} }}"
+    flight = flown(1, 40, f"at_s = 1, for_s = 5, {slow}", f"at_s = 22, for_s = 5, {slow}")
+    assert breaches(flight) == []
+    assert reformed_s(flight)[-1] <= 10.0
+    assert (flight.loop.world.discarded > 0) == (delay_s > 0.05)
+
+
+def test_no_agent_that_is_slow_by_half_a_second_counts_as_dead() -> None:
+    flight = flown(1, 40, f"at_s = 15, for_s = 20, slow = {{ agents = [{STRUCK}], delay_s = 0.5 }}")
+    assert breaches(flight) == []
+    moved = [e for e in flight.loop.events if e.kind in {"slot", "role"} and e.t_s > 15.0]
+    assert moved == []

@@ -57,6 +57,14 @@ SENTENCES: list[tuple[dict[str, Any], str]] = [
         {"kind": "pose", "agent": 3, "number": 1, "bias_yaw_deg": 9, "ends": True, **SCHEDULED},
         "a3 measures its pose rightly: yaw +9 deg no more (scheduled)",
     ),
+    (
+        {"kind": "slow", "agent": 3, "number": 1, "delay_s": 0.2, **SCHEDULED},
+        "a3 is slow: each step takes 0.2 s (scheduled)",
+    ),
+    (
+        {"kind": "slow", "agent": 3, "number": 1, "delay_s": 0.2, "ends": True, **SCHEDULED},
+        "a3 is no longer slow by 0.2 s a step (scheduled)",
+    ),
     ({"kind": "kill", "agent": 3, **SCHEDULED}, "a3 is killed; its vehicle hovers (scheduled)"),
     (
         {"kind": "kill", "agent": 3, "signal": 9, "planned": False},

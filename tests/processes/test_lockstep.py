@@ -50,6 +50,22 @@ netem = { loss_percent = 60 }
 at_s = 4.5
 leave = [2]
 [[event]]
+at_s = 0.8
+for_s = 2.5
+slow = { agents = [0, 1, 3], delay_s = 0.13 }
+[[event]]
+at_s = 1.0
+for_s = 3.0
+slow = { agents = ["random:1"], delay_s = 0.02 }
+[[event]]
+at_s = 3.2
+for_s = 1.0
+clock = { agents = [0, 2], offset_s = 0.4, drift_ppm = 1000 }
+[[event]]
+at_s = 1.2
+for_s = 3.0
+pose = { agents = [1, 2], bias_m = [0.2, 0, 0.1], noise_m = 0.05, bias_yaw_deg = 20 }
+[[event]]
 at_s = 0.5
 sabotage = { kind = "garbage", agents = ["random:1", 3] }
 for_s = 3.0

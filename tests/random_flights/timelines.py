@@ -121,6 +121,7 @@ class Timeline:
         draw = self._draw
         kinds: list[Callable[[], Tables]] = [
             lambda: {"clock": self._clock()},
+            lambda: {"slow": {"delay_s": draw.among((0.02, 0.05, 0.2, 1.0, 5.0))}},
         ]
         if self._all_range:  # others know of vehicles by their poses alone
             kinds.append(lambda: {"pose": self._pose()})

@@ -24,6 +24,9 @@ WEDGE = Path("deploy/scenarios/wedge-9.toml")
         ("pose = { agents = [1] }", "pose.bias_m", "the pose would be right"),
         ("pose = { agents = [1], bias_m = [1, 0] }", "pose.bias_m", "3"),
         ("pose = { agents = [1], noise_m = -1 }", "pose.noise_m", "0"),
+        ("slow = { agents = [1] }", "slow.delay_s", "is missing"),
+        ("slow = { agents = [1], delay_s = 0 }", "slow.delay_s", "0.001"),
+        ("slow = { agents = [1], delay_s = 11 }", "slow.delay_s", "10"),
         ("pose = { agents = ['queue:X'], noise_m = 1 }", "pose.agents[0]", "no queue 'X'"),
     ],
 )

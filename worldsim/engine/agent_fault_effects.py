@@ -5,9 +5,10 @@ from math import radians
 from typing import Any, assert_never
 
 from worldsim.engine.operations import DisturbAgents
+from worldsim.engine.slow_controllers import SlowControllers
 from worldsim.judge.event import By
-from worldsim.judge.run_events import AgentFaultRunEvent, ClockChanged, PoseChanged
-from worldsim.scenario.faults import ClockFault, PoseFault
+from worldsim.judge.run_events import AgentFaultRunEvent, ClockChanged, PoseChanged, SlowChanged
+from worldsim.scenario.faults import ClockFault, PoseFault, SlowFault
 from worldsim.truth.agent_clocks import ClockError
 from worldsim.truth.pose_errors import PoseError
 from worldsim.truth.world import World
@@ -16,8 +17,9 @@ from worldsim.truth.world import World
 class AgentFaultEffects:
     """Begins and ends faults of agents in a world."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, slow: SlowControllers) -> None:
         self._world = world
+        self._slow = slow
 
     def apply(self, operation: DisturbAgents, t_s: float, by: By) -> Iterator[AgentFaultRunEvent]:
         """Apply an operation at a time [s]; yield an event for each agent."""
@@ -37,6 +39,8 @@ class AgentFaultEffects:
             case PoseFault():
                 wrong = PoseError(fault.bias_m, fault.noise_m, radians(fault.bias_yaw_deg))
                 world.pose_errors.begin(number, agent, wrong)
+            case SlowFault():
+                self._slow.begin(number, agent, fault.delay_s)
             case _:
                 assert_never(fault)
 
@@ -47,6 +51,8 @@ class AgentFaultEffects:
                 world.clocks.end(number, agent)
             case PoseFault():
                 world.pose_errors.end(number, agent)
+            case SlowFault():
+                self._slow.end(number, agent)
             case _:
                 assert_never(fault)
 
@@ -66,4 +72,6 @@ def _event(operation: DisturbAgents, agent: int, t_s: float, by: By) -> AgentFau
             return ClockChanged(**common, offset_s=offset_s, drift_ppm=drift_ppm)
         case PoseFault(bias_m=bias_m, noise_m=noise_m, bias_yaw_deg=yaw_deg):
             return PoseChanged(**common, bias_m=bias_m, noise_m=noise_m, bias_yaw_deg=yaw_deg)
+        case SlowFault(delay_s=delay_s):
+            return SlowChanged(**common, delay_s=delay_s)
     assert_never(fault)

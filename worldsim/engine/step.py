@@ -102,8 +102,8 @@ def world_of(scenario: Scenario, command_ticks: int) -> World:
 class SlotLoop:
     """Steps a world slot by slot, and passes every tick to the judge and the recorder.
 
-    packets: returns the medium's packet counters; called once a tick. real_outages: whether an
-    outage strikes real processes; otherwise it withholds the observations here.
+    packets: returns the medium's packet counters; called once a tick. real_outages: whether outages
+    and slow controllers strike real processes; otherwise they are modelled here.
     """
 
     def __init__(
@@ -122,9 +122,10 @@ class SlotLoop:
         """Every event so far, in order."""
         self.figures: Figures | None = None
         """Of the last tick; None before the first."""
-        self.effects = TimelineEffects(scenario, world, self.emit)
+        self.effects = TimelineEffects(scenario, world, self.emit, slow_modelled=not real_outages)
         self.members = self.effects.members
         self.network = self.effects.network
+        self._slow = self.effects.slow
         self.radio_use = RadioUse(scenario.rows, scenario.fleet.tick_hz)
         self._queue_neighbours = QueueNeighbours(scenario.rows, self.judge.phases)
         self.rejections = RejectionCounters()
@@ -161,15 +162,21 @@ class SlotLoop:
         self.trace.poses(world.slot, world.vehicles)
         if world.slot % world.clock.slots_per_tick == 0:
             self._judge_tick()
-        slots, running = world.clock.slots_per_tick, self.members.running.tolist()
+        slots, running, slow = world.clock.slots_per_tick, self.members.running.tolist(), self._slow
+        if slow:
+            self._take_late_answers()
         rows = range(world.slot % slots, len(running), slots)
         group = [agent for agent in rows if running[agent]]
         if self.network.outages:
             self.effects.faults.withhold(self.network.outages.keys(), len(group))
             group = group if self._real_outages else []
+        if slow:
+            group = [agent for agent in group if slow.takes_observation(agent, world.slot)]
         observations = list(zip(group, world.observe(group), strict=True)) if group else []
         for agent, observation in observations:
             self._headings[agent] = observation.yaw
+        if slow:
+            observations = [self._with_delay(*each) for each in observations]
         mission = self.effects.missions.unknown(running)
         if mission is not None:
             observations = [self._with_mission(mission, *each) for each in observations]
@@ -182,8 +189,15 @@ class SlotLoop:
 
     def apply_command(self, agent: int, command: Command, encoded: bytes) -> None:
         """Apply an agent's command; in lockstep and virtual time, agents in ascending order."""
-        if self.world.accept(agent, command):
+        if not self._slow.hold(agent, command, encoded):
+            self._take(agent, command, encoded)
+
+    def _take(self, agent: int, command: Command, encoded: bytes) -> None:
+        """Apply a command that has come; what a late one tells of its agent counts anyway."""
+        accepted = self.world.accept(agent, command)
+        if accepted:
             self.trace.command(agent, encoded)
+        if accepted or self._slow.is_late(agent, self.world.slot):
             telemetry = command.telemetry
             self._telemetry.update(agent, telemetry, self._headings[agent])
             needed = self._queue_neighbours.count(agent, telemetry)
@@ -233,6 +247,19 @@ class SlotLoop:
         before = self._disk_full.pop(number, None)
         if before is not None and self._recorder is not None:
             self.effects.faults.note_writes(number, self._recorder.failed_writes - before)
+
+    def _take_late_answers(self) -> None:
+        for agent, command, encoded in self._slow.answers(self.world.slot):
+            alive = command.incarnation == self.members.incarnations[agent]
+            if alive and self.members.running[agent]:
+                self._take(agent, command, encoded)
+
+    def _with_delay(self, agent: int, observation: Observation) -> tuple[int, Observation]:
+        """Add how long a step takes to the observation of a slow agent."""
+        takes_s = self._slow.step_s(agent, observation.slot)
+        if takes_s == 0.0:
+            return agent, observation
+        return agent, msgspec.structs.replace(observation, takes_s=takes_s)
 
     def _with_mission(
         self, mission: Mission, agent: int, observation: Observation

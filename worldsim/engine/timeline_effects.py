@@ -29,6 +29,7 @@ from worldsim.engine.operations import (
     StopWorldProcess,
 )
 from worldsim.engine.selection import Claims
+from worldsim.engine.slow_controllers import SlowControllers
 from worldsim.judge.event import By
 from worldsim.judge.radio_events import applied
 from worldsim.judge.run_events import (
@@ -73,7 +74,9 @@ Emit = Callable[[RunEvent], None]
 class TimelineEffects:
     """The effects of the timeline and of an operator on a fleet."""
 
-    def __init__(self, scenario: Scenario, world: World, emit: Emit) -> None:
+    def __init__(
+        self, scenario: Scenario, world: World, emit: Emit, slow_modelled: bool = True
+    ) -> None:
         self.timeline = Timeline(scenario)
         self.members = Membership(scenario)
         self.network = NetworkConditions(scenario.netem)
@@ -85,7 +88,8 @@ class TimelineEffects:
         """The role of each agent, as last reported: an index of ROLES."""
         self._spacing_m = scenario.control.spacing_m
         self._formation = formation_of(scenario.formation, self._spacing_m)
-        self._agent_faults = AgentFaultEffects(world)
+        self.slow = SlowControllers(world.clock, slow_modelled)
+        self._agent_faults = AgentFaultEffects(world, self.slow)
         self._world = world
         self._emit = emit
 
@@ -199,6 +203,7 @@ class TimelineEffects:
     def record_exit(self, agent: int, signal: int | None, status: int | None) -> None:
         """Record that an agent's process ended unplanned, by a signal or with a status."""
         self.members.record_exit(agent)
+        self.slow.forget(agent)
         self._emit(Killed(t_s=self._t_s, agent=agent, planned=False, signal=signal, status=status))
 
     @property
@@ -233,8 +238,9 @@ class TimelineEffects:
 
     def _end(self, operation: EndProcesses, by: By) -> None:
         self.members.apply(operation, self._world.time_s)
-        if operation.leaves:
-            for agent in operation.agents:
+        for agent in operation.agents:
+            self.slow.forget(agent)
+            if operation.leaves:
                 self._world.leave(agent)
         self._report(Left if operation.leaves else Killed, operation, by)
 

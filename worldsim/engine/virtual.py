@@ -15,6 +15,7 @@ from typing import Final, Protocol, TypeVar, assert_never
 
 from agent.codec import decode_command, decode_gossip, decode_observation, encode, hear_beacon
 from agent.core import Agent, Decoders
+from agent.late_frames import LateFrames
 from agent.messages import Observation
 from netem.faults import FaultOrder
 from netem.medium import Medium
@@ -101,6 +102,7 @@ class VirtualFleet:
         self._scenario = scenario
         self._medium = Medium(scenario.medium_setup())
         self._decoders = decoders
+        self._late: dict[int, LateFrames] = {}
         self._agents = {agent: self._new_agent(agent, 0) for agent in range(scenario.fleet.agents)}
         self._inboxes = [deque[tuple[Frame, ...]](maxlen=BATCH_RING) for _ in range(scenario.rows)]
         self.loop = SlotLoop(
@@ -160,6 +162,7 @@ class VirtualFleet:
                 assert_never(operation)
 
     def _new_agent(self, agent: int, incarnation: int) -> Agent:
+        self._late[agent] = LateFrames()
         setup = self._scenario.agent_setup(agent, incarnation, VIRTUAL_COMMAND_TICKS)
         if self._watch is None:
             return Agent(setup, self._decoders)
@@ -182,7 +185,8 @@ class VirtualFleet:
         outbox = core.step(observation)
         if self._watch is not None:
             self._watch.leave()
-        outgoing = tuple([Outgoing(channel, payload) for channel, payload in outbox.frames])
+        said = self._late[agent].sent(outbox.frames, observation.takes_s)
+        outgoing = tuple([Outgoing(channel, payload) for channel, payload in said])
         transmission = Transmission(open_slot.slot, outbox.command.incarnation, outgoing)
         if checks:
             _check_codec(transmission, unpack_transmission(pack(transmission)))

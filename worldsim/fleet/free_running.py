@@ -10,9 +10,11 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import assert_never
 
+import msgspec
 import numpy as np
 
 from agent.codec import decode_command, encode
+from agent.messages import Observation
 from agent.rejection import RejectedError
 from netem.faults import FaultOrder
 from netem.messages import MediumCounters, Truth
@@ -342,11 +344,19 @@ class FreeRunningFleet:
         self._agent_steps += len(opened.observations)
         for agent, observation in opened.observations:
             if takes_messages:
-                self._observers[agent](encode(observation))
-            if self._is_cut_off(agent):
+                self._observers[agent](encode(self._in_wall_time(observation)))
+            if self._is_cut_off(agent) or self.loop.effects.slow.is_late(agent, opened.slot):
                 self.lateness.drop_pending([agent])
             elif self.lateness.observe(agent, opened.slot, self.loop.world.latest[agent]):
                 self._late_agents.append(agent)
+
+    def _in_wall_time(self, observation: Observation) -> Observation:
+        """Return an observation that tells how long its step takes in wall time."""
+        if observation.takes_s == 0.0:
+            return observation
+        return msgspec.structs.replace(
+            observation, takes_s=observation.takes_s / self.overload.speed
+        )
 
     def _accept_command(self, agent: int, data: bytes) -> None:
         """Take a command; one of an agent that is not running any more has no effect."""

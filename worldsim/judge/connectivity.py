@@ -21,7 +21,7 @@ from netem.random_draws import MAX_QUANTILE
 from netem.wire.channels import CHANNELS, LOCAL, MAX_PAYLOAD_B, MULTIHOP
 from worldsim.judge.clock_links import ClockLinks
 from worldsim.judge.radio_events import RadioRunEvent, order_of
-from worldsim.judge.run_events import AgentFaultRunEvent, ClockChanged, PoseChanged
+from worldsim.judge.run_events import AgentFaultRunEvent, ClockChanged, PoseChanged, SlowChanged
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
 from worldsim.truth.vehicle import Floats
@@ -33,6 +33,8 @@ LEAST_DETECTION_S = LEAST_RELAYED_SILENCE_S + ALONE_S
 """The same for a loss, or for nobody to be heard at the start."""
 MAX_QUEUED_S: Final = 0.5
 """A frame that waits longer in its sender's queue makes news late, however slow the rate."""
+LONGEST_STEP_S: Final = 0.5
+"""Where a step takes longer, beacons come so rarely that others may take their sender for lost."""
 MAX_ROUNDS: Final = 2000
 """More rounds count as infinitely many."""
 
@@ -82,6 +84,10 @@ class Connectivity:
         self._clocks = ClockLinks(scenario.rows, self._slack_s)
         self._displaced: set[tuple[int, int | None]] = set()
         """Faults, by number and agent, by which others take a vehicle for an unidentified one."""
+        self._slow_s: dict[tuple[int, int | None], float] = {}
+        """How long a step takes, by fault and agent [s]."""
+        self._held_up_s = 0.0
+        """How long news waits in an agent, at most [s]."""
         self._found: Components | None = None
         """The newest components, and below what they were computed from."""
         self._found_of: tuple[bytes, ...] = ()
@@ -99,6 +105,8 @@ class Connectivity:
                 self._clocks.handle_event(event)
             case PoseChanged():
                 self._note_displaced(event)
+            case SlowChanged():
+                self._note_slow(event)
             case _:
                 assert_never(event)
 
@@ -107,6 +115,15 @@ class Connectivity:
             self._displaced.discard((event.number, event.agent))
         elif event.displaces_m > SAME_VEHICLE_M:
             self._displaced.add((event.number, event.agent))
+
+    def _note_slow(self, event: SlowChanged) -> None:
+        key = event.number, event.agent
+        if event.ends:
+            self._slow_s.pop(key, None)
+        else:
+            self._slow_s[key] = event.delay_s
+        longest_s = max(self._slow_s.values(), default=0.0)
+        self._held_up_s = 2.0 * longest_s if longest_s <= LONGEST_STEP_S else inf
 
     def components(self, tick: Tick) -> Components:
         """Return the connected components at a tick; the same object while no link changes."""
@@ -148,13 +165,15 @@ class Connectivity:
             return inf
         lost = self.loss if loss is None else loss
         rounds = rounds_to_all(agents, hops, lost) * self._burst_factor if hops else 0.0
-        return max(LEAST_NEWS_S, rounds * self._round_s + hops * self._delay_s)
+        return max(LEAST_NEWS_S, rounds * self._round_s + hops * (self._delay_s + self._held_up_s))
 
     def detection_s(self, hops: int, loss: float | None = None) -> float:
         """Return T_d [s]: the team knows within this time that an agent is gone."""
         lost = self.loss if loss is None else loss
         rounds = (2 * hops + 10) / (1.0 - lost) if lost < 1.0 else inf
-        return max(LEAST_DETECTION_S, rounds * self._round_s + hops * self._delay_s)
+        return max(
+            LEAST_DETECTION_S, rounds * self._round_s + hops * (self._delay_s + self._held_up_s)
+        )
 
     def _refresh(self) -> None:
         """Derive loss, delay and cuts from the conditions and partitions in force."""

@@ -37,6 +37,7 @@ from worldsim.judge.run_events import (
     RunEvent,
     SensorChanged,
     SlotChanged,
+    SlowChanged,
     WorldStopped,
 )
 
@@ -79,7 +80,7 @@ def _words(event: RunEvent, queues: Queues) -> str:
             words = _returned(event)
         case SensorChanged(agent=agent, sensor=sensor, mode=mode):
             words = f"sensors of a{agent} ({sensor}): {mode}"
-        case ClockChanged() | PoseChanged():
+        case ClockChanged() | PoseChanged() | SlowChanged():
             words = _agent_fault(event)
         case FormationGiven() | FrameGiven():
             words = _mission(event)
@@ -140,6 +141,10 @@ def _agent_fault(event: AgentFaultRunEvent) -> str:
             return f"{agent} measures its pose rightly: {_pose_error(event)} no more"
         case PoseChanged():
             return f"{agent} measures its pose wrong: {_pose_error(event)}"
+        case SlowChanged(ends=True):
+            return f"{agent} is no longer slow by {event.delay_s:g} s a step"
+        case SlowChanged():
+            return f"{agent} is slow: each step takes {event.delay_s:g} s"
     assert_never(event)
 
 

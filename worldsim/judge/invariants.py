@@ -54,6 +54,7 @@ from worldsim.judge.run_events import (
     RunEvent,
     SensorChanged,
     SlotChanged,
+    SlowChanged,
     WorldStopped,
 )
 from worldsim.judge.shared_places import Claims, SharedPlaces
@@ -117,7 +118,7 @@ class Invariants:
             self._handle_radio(event)
             return
         match event:
-            case ClockChanged() | PoseChanged():
+            case ClockChanged() | PoseChanged() | SlowChanged():
                 self._connectivity.handle_agent_fault(event)
                 self._shared.forget()
                 self._fault(event.t_s, event.t_s)

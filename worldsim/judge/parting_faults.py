@@ -15,6 +15,7 @@ from worldsim.judge.run_events import (
     ClockChanged,
     PoseChanged,
     Reconnected,
+    SlowChanged,
     WorldStopped,
 )
 from worldsim.scenario.tables import CONVERGED_M
@@ -23,7 +24,7 @@ from worldsim.scenario.tables import CONVERGED_M
 class PartingFaults:
     """The partitions, jams, flaps and wrong clocks in force, and whether agents are observed.
 
-    slack_s: clocks that differ by no more part nobody [s].
+    slack_s: two ticks [s]. Clocks that differ by no more part nobody, nor do steps of one tick.
     """
 
     def __init__(self, slack_s: float) -> None:
@@ -64,6 +65,8 @@ class PartingFaults:
                 parts = abs(event.offset_s) > self._slack_s or event.drift_ppm != 0.0
             case PoseChanged():
                 parts = event.displaces_m > 0.5 * CONVERGED_M or event.bias_yaw_deg != 0.0
+            case SlowChanged():
+                parts = event.delay_s > 0.5 * self._slack_s
             case _:
                 assert_never(event)
         if parts:

@@ -104,6 +104,13 @@ class PoseChanged(AgentFaultEvent, frozen=True, tag="pose"):
         return hypot(*self.bias_m) + 3.0 * self.noise_m
 
 
+class SlowChanged(AgentFaultEvent, frozen=True, tag="slow"):
+    """An agent's steps take a time by the value of a fault, or no more."""
+
+    delay_s: float = 0.0
+    """[s]"""
+
+
 class MissionEvent(PlannedEvent, frozen=True, kw_only=True):
     """A mission was given to an agent."""
 
@@ -176,7 +183,7 @@ class LateStart(Event, frozen=True, kw_only=True, tag="late"):
     detail: str
 
 
-AgentFaultRunEvent = ClockChanged | PoseChanged
+AgentFaultRunEvent = ClockChanged | PoseChanged | SlowChanged
 LossEvent = Killed | Left | Paused
 ReturnEvent = Restarted | Joined | Resumed
 LOSS_KINDS = frozenset({str(event.__struct_config__.tag) for event in get_args(LossEvent)})

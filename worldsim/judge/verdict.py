@@ -51,6 +51,7 @@ from worldsim.judge.run_events import (
     RunEvent,
     SensorChanged,
     SlotChanged,
+    SlowChanged,
     WorldStopped,
 )
 from worldsim.judge.sub_formations import SubFormations
@@ -156,7 +157,7 @@ class Judge:
                 self._open_phase(event)
             case Restarted() | Joined() | Killed() | Left() | Paused() | Resumed():
                 self._change_team(event)
-            case ClockChanged() | PoseChanged():
+            case ClockChanged() | PoseChanged() | SlowChanged():
                 self._handle_agent_fault(event)
             case SensorChanged():
                 self._held.open_window(event.t_s)

@@ -15,6 +15,10 @@ READ = {
     "pose": "measured pose",
 }
 """What the faults change that strike what agents read, by kind."""
+STEPS = {
+    "slow": "slowed",
+}
+"""What the faults do that strike agents' steps, by kind."""
 MAX_TOLD = 20
 """So many faults have a line of their own in the verdict."""
 
@@ -29,6 +33,7 @@ class FaultRow(TypedDict):
     by: str | None  # "operator", or None for the timeline
     agents: list[int] | None  # those that it struck; of sabotage, with a saboteur
     frames: int | None  # times the links on which the fault cut, altered or sent them
+    steps: int | None  # that took long
     readings: int | None  # of sensors or clocks, that differ from the true ones
     process: str | None  # "netem" or "world", of a fault that strikes no agent
     observations: int | None  # that no agent got while netem was down
@@ -37,11 +42,15 @@ class FaultRow(TypedDict):
 
 
 def fault_rows(
-    faults: Sequence[FaultReport], frames: Mapping[int, int] | None, readings: Mapping[int, int]
+    faults: Sequence[FaultReport],
+    frames: Mapping[int, int] | None,
+    readings: Mapping[int, int],
+    steps: Mapping[int, int],
 ) -> list[FaultRow]:
     """Return the faults with what they struck.
 
-    frames, readings: how many each fault struck, by its number; frames None: nobody counted them.
+    frames, readings, steps: how many each fault struck, by its number; frames None: nobody counted
+    them.
     """
     return [
         {
@@ -52,6 +61,7 @@ def fault_rows(
             "by": each.by,
             "agents": each.agents if _strikes_agents(each) else None,
             "frames": frames.get(each.number, 0) if each.on_radio and frames is not None else None,
+            "steps": steps.get(each.number, 0) if each.kind in STEPS else None,
             "readings": readings.get(each.number, 0) if each.kind in READ else None,
             "process": each.process,
             "observations": each.observations if each.process == "netem" else None,
@@ -85,8 +95,9 @@ def idle_text(rows: Sequence[FaultRow]) -> str | None:
 
 
 def _is_idle(row: FaultRow) -> bool:
-    counts = [row["frames"], row["readings"], row["observations"], row["stopped_s"], row["writes"]]
-    if row["readings"] is None and row["agents"] is not None:
+    keys = ("frames", "readings", "steps", "observations", "stopped_s", "writes")
+    counts: list[float | None] = [row[key] for key in keys]  # type: ignore[literal-required]
+    if row["readings"] is None and row["steps"] is None and row["agents"] is not None:
         counts.append(len(row["agents"]))
     return any(count == 0 for count in counts)
 
@@ -114,14 +125,21 @@ def _struck(row: FaultRow) -> str:
     if row["process"] is not None or row["writes"] is not None:
         return _stop(row)
     agents = _named(row["agents"] or [])
-    if row["readings"] is not None:
-        return f"changed {_counted(row['readings'], READ[row['kind']])} of {agents}"
+    if row["steps"] is not None or row["readings"] is not None:
+        return f"{_of_agents(row)} of {agents}"
     if row["kind"] == "sabotage" and row["frames"] is not None:
         return f"sent others {_counted(row['frames'], 'frame')} by the radio of {agents}"
     if row["frames"] is not None:
         done = "changed the links of" if row["kind"] == "netem" else "cut"
         return f"{done} {_counted(row['frames'], 'frame')}"
     return f"struck {agents}" if row["agents"] else "not counted"
+
+
+def _of_agents(row: FaultRow) -> str:
+    """Return what a fault of agents did to what they read, or to their steps."""
+    if row["steps"] is not None:
+        return f"{STEPS[row['kind']]} {_counted(row['steps'], 'step')}"
+    return f"changed {_counted(row['readings'] or 0, READ[row['kind']])}"
 
 
 def _stop(row: FaultRow) -> str:

@@ -27,6 +27,7 @@ from worldsim.scenario.faults import (
     Resume,
     SabotageFault,
     SensorFault,
+    SlowFault,
     StopWorld,
 )
 from worldsim.scenario.selectors import ProcessName, Selectors, other_process
@@ -58,6 +59,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     clock: agents' clocks are wrong.
     disk_full: nothing more of recording and events can be written.
     pose: agents measure their poses wrong.
+    slow: each step of agents takes a time; meanwhile they hear nothing, and they answer late.
     end: ends a fault by its name, which is its kind and the event's index, as in "jam-2", unless
     ``name`` gives another one. formation, frame: a mission for the team.
     """
@@ -76,6 +78,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     clock: ClockFault | None = None
     disk_full: bool | None = None
     pose: PoseFault | None = None
+    slow: SlowFault | None = None
     end: str | None = None
     formation: FormationSpec | None = None
     frame: FrameChange | None = None
@@ -108,7 +111,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     @property
     def agent_fault(self) -> AgentFault | None:
         """The fault of single agents whose key is set; None where there is none."""
-        return self.clock or self.pose
+        return self.clock or self.pose or self.slow
 
     def called(self, number: int) -> str:
         """Return the event's name. number: its index, or the number of an operator's event."""
@@ -164,6 +167,7 @@ _LASTING = tuple(key for key in _RADIO if key != "heal")
 _OF_AGENTS = (
     "clock",
     "pose",
+    "slow",
 )
 UNDOABLE = ("kill", "leave", "pause", *_LASTING, "sensor", *_OF_AGENTS, "disk_full")
 """The keys of the actions that ``for_s`` can undo."""

@@ -102,6 +102,15 @@ class PoseFault(Table, frozen=True):
     """Of the measured yaw [deg]."""
 
 
+class SlowFault(Table, frozen=True):
+    """Let the controllers of the selected agents be slow."""
+
+    kind: ClassVar[str] = "slow"
+    agents: Selectors
+    delay_s: Annotated[float, Meta(ge=0.001, le=10)]
+    """How long each step takes, beyond its own time [s; simulated time]."""
+
+
 class EndFault(msgspec.Struct, frozen=True):
     """End a fault before its time, or one that has no end."""
 
@@ -109,7 +118,7 @@ class EndFault(msgspec.Struct, frozen=True):
     """Its name."""
 
 
-AgentFault = ClockFault | PoseFault
+AgentFault = ClockFault | PoseFault | SlowFault
 """A fault of single agents whose processes go on."""
 ProcessFault = Kill | Leave | Restart | Pause | Resume | Join
 MissionChange = FormationSpec | FrameChange
