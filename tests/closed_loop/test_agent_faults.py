@@ -3,8 +3,18 @@
 import numpy as np
 import pytest
 
-from tests.closed_loop.test_faults import BAD, check_safety, flown, reformed_s, violated
-from worldsim.engine.virtual import Flight
+from tests.closed_loop.test_faults import (
+    BAD,
+    check_safety,
+    flown,
+    reformed_s,
+    scenario,
+    violated,
+)
+from worldsim.engine.virtual import Flight, fly
+from worldsim.judge.run_events import RunEvent
+from worldsim.judge.tick import Tick
+from worldsim.judge.verdict import Figures
 
 STRUCK = 4
 
@@ -113,3 +123,39 @@ def test_no_agent_that_is_slow_by_half_a_second_counts_as_dead() -> None:
     assert breaches(flight) == []
     moved = [e for e in flight.loop.events if e.kind in {"slot", "role"} and e.t_s > 15.0]
     assert moved == []
+
+
+class Heard:
+    """Records how many others each agent hears, by time."""
+
+    records_ticks = True
+
+    def __init__(self) -> None:
+        self.least = dict.fromkeys(range(9), 8)
+
+    def tick(self, tick: Tick, figures: Figures) -> None:
+        if tick.time_s > 12.0:
+            for agent, heard in enumerate(np.bincount(tick.links[:, 0], minlength=9).tolist()):
+                self.least[agent] = min(self.least[agent], heard)
+
+    def event(self, event: RunEvent) -> None:
+        """The loop keeps the events itself."""
+
+
+@pytest.mark.parametrize("starved", ["[4]", "['random:4']", "['all']"])
+def test_no_agent_of_a_starved_team_counts_as_dead(starved: str) -> None:
+    fault = f"at_s = 15, for_s = 20, starve = {{ agents = {starved}, cpu_percent = 20 }}"
+    heard = Heard()
+    flight = fly(scenario(1, 45, fault), heard)
+    check_safety(flight)
+    assert breaches(flight) == []
+    assert set(heard.least.values()) == {8}
+    moved = [e for e in flight.loop.events if e.kind in {"slot", "role"} and e.t_s > 15.0]
+    assert moved == []
+    assert flight.loop.judge.in_formation_fraction == 1.0
+
+
+def test_a_team_starved_while_it_forms_collides_with_nobody_and_forms() -> None:
+    flight = flown(2, 45, "at_s = 1, for_s = 20, starve = { agents = ['all'], cpu_percent = 20 }")
+    assert breaches(flight) == []
+    assert max(reformed_s(flight)) <= 25.0

@@ -65,6 +65,14 @@ SENTENCES: list[tuple[dict[str, Any], str]] = [
         {"kind": "slow", "agent": 3, "number": 1, "delay_s": 0.2, "ends": True, **SCHEDULED},
         "a3 is no longer slow by 0.2 s a step (scheduled)",
     ),
+    (
+        {"kind": "starve", "agent": 3, "number": 1, "cpu_percent": 20, "period_s": 0.5} | SCHEDULED,
+        "a3 gets 20 % of the CPU in each 0.5 s (scheduled)",
+    ),
+    (
+        {"kind": "starve", "agent": 3, "number": 1, "cpu_percent": 20, "ends": True} | SCHEDULED,
+        "a3 has the CPU as before, not only 20 % of it (scheduled)",
+    ),
     ({"kind": "kill", "agent": 3, **SCHEDULED}, "a3 is killed; its vehicle hovers (scheduled)"),
     (
         {"kind": "kill", "agent": 3, "signal": 9, "planned": False},

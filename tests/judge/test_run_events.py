@@ -26,6 +26,7 @@ from worldsim.judge.run_events import (
     SensorChanged,
     SlotChanged,
     SlowChanged,
+    Starved,
     as_row,
     event_of,
 )
@@ -48,6 +49,7 @@ EVENTS: list[RunEvent] = [
     ClockChanged(t_s=2.0, agent=1, planned=True, number=3, offset_s=-3.0, ends=True),
     PoseChanged(t_s=2.0, agent=1, planned=True, number=3, bias_m=(1.0, 0.0, 0.5), noise_m=0.1),
     SlowChanged(t_s=2.0, agent=1, planned=True, number=3, delay_s=0.2, ends=True),
+    Starved(t_s=2.0, agent=1, planned=True, number=3, cpu_percent=20.0, period_s=0.5),
     SlotChanged(t_s=0.5, agent=1, place=(2, 1), before=None),
     QueueChanged(t_s=0.5, agent=1, queue=2),
     RoleChanged(t_s=0.5, agent=1, role="vertex"),

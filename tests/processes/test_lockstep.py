@@ -58,6 +58,10 @@ at_s = 1.0
 for_s = 3.0
 slow = { agents = ["random:1"], delay_s = 0.02 }
 [[event]]
+at_s = 2.2
+for_s = 3.0
+starve = { agents = [0, 2, 3], cpu_percent = 30, period_s = 0.4 }
+[[event]]
 at_s = 3.2
 for_s = 1.0
 clock = { agents = [0, 2], offset_s = 0.4, drift_ppm = 1000 }

@@ -122,6 +122,7 @@ class Timeline:
         kinds: list[Callable[[], Tables]] = [
             lambda: {"clock": self._clock()},
             lambda: {"slow": {"delay_s": draw.among((0.02, 0.05, 0.2, 1.0, 5.0))}},
+            lambda: {"starve": self._starve()},
         ]
         if self._all_range:  # others know of vehicles by their poses alone
             kinds.append(lambda: {"pose": self._pose()})
@@ -142,6 +143,10 @@ class Timeline:
         bias_m = draw.point(draw.among((0.05, 0.5, 5.0)))
         noise_m = draw.among((0.0, 0.02, 0.3))
         return {"bias_m": bias_m, "noise_m": noise_m, "bias_yaw_deg": draw.number(-180, 180, 0)}
+
+    def _starve(self) -> Tables:
+        draw = self._draw
+        return {"cpu_percent": draw.whole(1, 99), "period_s": draw.among((0.05, 0.5, 3.0))}
 
     def _clock(self) -> Tables:
         draw = self._draw

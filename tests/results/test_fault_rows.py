@@ -19,6 +19,7 @@ STRIKE = {
     "clock": ("clock = { agents = [1], offset_s = 1 }", "readings"),
     "pose": ("pose = { agents = [1], bias_m = [0, 0, 1] }", "readings"),
     "slow": ("slow = { agents = [1], delay_s = 0.2 }", "steps"),
+    "starve": ("starve = { agents = [1], cpu_percent = 20 }", "steps"),
     "pause": ("pause = [1]", "agents"),
     "kill": ("kill = [1]", "agents"),
     "leave": ("leave = [1]", "agents"),

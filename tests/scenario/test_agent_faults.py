@@ -27,6 +27,9 @@ WEDGE = Path("deploy/scenarios/wedge-9.toml")
         ("slow = { agents = [1] }", "slow.delay_s", "is missing"),
         ("slow = { agents = [1], delay_s = 0 }", "slow.delay_s", "0.001"),
         ("slow = { agents = [1], delay_s = 11 }", "slow.delay_s", "10"),
+        ("starve = { agents = [1] }", "starve.cpu_percent", "is missing"),
+        ("starve = { agents = [1], cpu_percent = 100 }", "starve.cpu_percent", "99"),
+        ("starve = { agents = [1], cpu_percent = 9, period_s = 0 }", "starve.period_s", "0.05"),
         ("pose = { agents = ['queue:X'], noise_m = 1 }", "pose.agents[0]", "no queue 'X'"),
     ],
 )

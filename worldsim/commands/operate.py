@@ -13,7 +13,7 @@ import typer
 from worldsim.commands.options import RunFolder, examples
 from worldsim.results.exit_status import PASS
 
-AGENT_FAULTS = ("clock", "pose", "slow")
+AGENT_FAULTS = ("clock", "pose", "slow", "starve")
 FAULTS = (
     *("kill", "leave", "restart", "pause", "resume", "join"),
     *AGENT_FAULTS,
@@ -120,7 +120,8 @@ def fault(
     kill ends processes, leave removes the vehicles too, restart brings them back; pause stops
     processes until resume; join adds new agents. clock lets agents' clocks be wrong (offset_s,
     drift_ppm). pose lets agents measure their poses wrong (bias_m, noise_m, bias_yaw_deg).
-    slow lets each step of agents take delay_s.
+    slow lets each step of agents take delay_s. starve lets processes run for cpu_percent of each
+    period_s only.
     disk_full lets nothing more of recording and events be written. end ends a fault of any kind
     before its time, by its name: its kind and number, as in "kill-2", unless --name gave it
     another one.

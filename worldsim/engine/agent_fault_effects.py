@@ -6,9 +6,16 @@ from typing import Any, assert_never
 
 from worldsim.engine.operations import DisturbAgents
 from worldsim.engine.slow_controllers import SlowControllers
+from worldsim.engine.starvation import Share, Starvation
 from worldsim.judge.event import By
-from worldsim.judge.run_events import AgentFaultRunEvent, ClockChanged, PoseChanged, SlowChanged
-from worldsim.scenario.faults import ClockFault, PoseFault, SlowFault
+from worldsim.judge.run_events import (
+    AgentFaultRunEvent,
+    ClockChanged,
+    PoseChanged,
+    SlowChanged,
+    Starved,
+)
+from worldsim.scenario.faults import ClockFault, PoseFault, SlowFault, StarveFault
 from worldsim.truth.agent_clocks import ClockError
 from worldsim.truth.pose_errors import PoseError
 from worldsim.truth.world import World
@@ -17,9 +24,9 @@ from worldsim.truth.world import World
 class AgentFaultEffects:
     """Begins and ends faults of agents in a world."""
 
-    def __init__(self, world: World, slow: SlowControllers) -> None:
+    def __init__(self, world: World, slow: SlowControllers, starvation: Starvation) -> None:
         self._world = world
-        self._slow = slow
+        self._slow, self._starvation = slow, starvation
 
     def apply(self, operation: DisturbAgents, t_s: float, by: By) -> Iterator[AgentFaultRunEvent]:
         """Apply an operation at a time [s]; yield an event for each agent."""
@@ -41,6 +48,9 @@ class AgentFaultEffects:
                 world.pose_errors.begin(number, agent, wrong)
             case SlowFault():
                 self._slow.begin(number, agent, fault.delay_s)
+            case StarveFault():
+                share = Share(t_s, fault.cpu_percent, fault.period_s)
+                self._starvation.begin(number, agent, share)
             case _:
                 assert_never(fault)
 
@@ -53,6 +63,8 @@ class AgentFaultEffects:
                 world.pose_errors.end(number, agent)
             case SlowFault():
                 self._slow.end(number, agent)
+            case StarveFault():
+                self._starvation.end(number, agent)
             case _:
                 assert_never(fault)
 
@@ -74,4 +86,6 @@ def _event(operation: DisturbAgents, agent: int, t_s: float, by: By) -> AgentFau
             return PoseChanged(**common, bias_m=bias_m, noise_m=noise_m, bias_yaw_deg=yaw_deg)
         case SlowFault(delay_s=delay_s):
             return SlowChanged(**common, delay_s=delay_s)
+        case StarveFault(cpu_percent=cpu_percent, period_s=period_s):
+            return Starved(**common, cpu_percent=cpu_percent, period_s=period_s)
     assert_never(fault)

@@ -75,6 +75,17 @@ class StartProcesses(NamedTuple):
     """The reason for which no process starts."""
 
 
+class ThrottleProcesses(NamedTuple):
+    """Stop and continue the processes of starved agents, which stay members of the team."""
+
+    stops: tuple[int, ...]
+    """In ascending order."""
+    continues: tuple[int, ...]
+    """In ascending order."""
+    stopped: frozenset[int]
+    """All that are stopped from now on."""
+
+
 class AdmitAgents(NamedTuple):
     """Let agents step that have booted."""
 
@@ -144,6 +155,7 @@ class GiveMission(NamedTuple):
 
 
 ProcessOperation = EndProcesses | PauseProcesses | ResumeProcesses | StartProcesses | AdmitAgents
-AgentOperation = ProcessOperation | SetSensorMode | DisturbAgents
+ChangeOfAgents = SetSensorMode | DisturbAgents | ThrottleProcesses
+AgentOperation = ProcessOperation | ChangeOfAgents
 WorldOperation = StopWorldProcess | FillDisk
 Operation = AgentOperation | WorldOperation | FaultOrder | GiveMission

@@ -162,16 +162,10 @@ class SlotLoop:
         self.trace.poses(world.slot, world.vehicles)
         if world.slot % world.clock.slots_per_tick == 0:
             self._judge_tick()
-        slots, running, slow = world.clock.slots_per_tick, self.members.running.tolist(), self._slow
+        running, slow = self.members.running.tolist(), self._slow
         if slow:
             self._take_late_answers()
-        rows = range(world.slot % slots, len(running), slots)
-        group = [agent for agent in rows if running[agent]]
-        if self.network.outages:
-            self.effects.faults.withhold(self.network.outages.keys(), len(group))
-            group = group if self._real_outages else []
-        if slow:
-            group = [agent for agent in group if slow.takes_observation(agent, world.slot)]
+        group = self._observed(running)
         observations = list(zip(group, world.observe(group), strict=True)) if group else []
         for agent, observation in observations:
             self._headings[agent] = observation.yaw
@@ -186,6 +180,20 @@ class SlotLoop:
             positions=self._radios(),
             observations=observations,
         )
+
+    def _observed(self, running: list[bool]) -> list[int]:
+        """Return the agents that are given an observation of the present slot."""
+        slot, slots = self.world.slot, self.world.clock.slots_per_tick
+        group = [agent for agent in range(slot % slots, len(running), slots) if running[agent]]
+        if self.network.outages:
+            self.effects.faults.withhold(self.network.outages.keys(), len(group))
+            group = group if self._real_outages else []
+        starvation, time_s = self.effects.starvation, self.world.time_s
+        if starvation:
+            group = [agent for agent in group if not starvation.suppresses(agent, time_s)]
+        if self._slow:
+            group = [agent for agent in group if self._slow.takes_observation(agent, slot)]
+        return group
 
     def apply_command(self, agent: int, command: Command, encoded: bytes) -> None:
         """Apply an agent's command; in lockstep and virtual time, agents in ascending order."""

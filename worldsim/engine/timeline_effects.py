@@ -17,6 +17,7 @@ from worldsim.engine.membership import Membership
 from worldsim.engine.missions import Missions
 from worldsim.engine.operations import (
     AdmitAgents,
+    ChangeOfAgents,
     DisturbAgents,
     EndProcesses,
     FillDisk,
@@ -27,9 +28,11 @@ from worldsim.engine.operations import (
     SetSensorMode,
     StartProcesses,
     StopWorldProcess,
+    ThrottleProcesses,
 )
 from worldsim.engine.selection import Claims
 from worldsim.engine.slow_controllers import SlowControllers
+from worldsim.engine.starvation import Starvation
 from worldsim.judge.event import By
 from worldsim.judge.radio_events import applied
 from worldsim.judge.run_events import (
@@ -89,7 +92,8 @@ class TimelineEffects:
         self._spacing_m = scenario.control.spacing_m
         self._formation = formation_of(scenario.formation, self._spacing_m)
         self.slow = SlowControllers(world.clock, slow_modelled)
-        self._agent_faults = AgentFaultEffects(world, self.slow)
+        self.starvation = Starvation()
+        self._agent_faults = AgentFaultEffects(world, self.slow, self.starvation)
         self._world = world
         self._emit = emit
 
@@ -114,11 +118,15 @@ class TimelineEffects:
                 yield operation
         if self.members.next_boot_s <= time_s + SLACK_S:
             yield self.members.admission(time_s)
+        if self.starvation:
+            throttle = self.starvation.change(time_s, self.members.running)
+            if throttle is not None:
+                yield throttle
 
     def nothing_due(self) -> bool:
         """Return whether no operation is due before the present slot."""
         next_s = min(self.timeline.next_s, self.members.next_boot_s)
-        return next_s > self._world.time_s + SLACK_S
+        return next_s > self._world.time_s + SLACK_S and not self.starvation
 
     def operation(self, step: Step) -> Operation | None:
         """Return the operation of a step now; None where there is nothing to do or to undo."""
@@ -149,17 +157,13 @@ class TimelineEffects:
             case EndProcesses():
                 self._end(operation, by)
             case PauseProcesses() | ResumeProcesses():
-                self.members.apply(operation, self._world.time_s)
-                paused = isinstance(operation, PauseProcesses)
-                self._report(Paused if paused else Resumed, operation, by)
+                self._pause(operation, by)
             case StartProcesses():
                 self._start(operation, by)
             case AdmitAgents():
                 self.members.apply(operation, self._world.time_s)
-            case SetSensorMode():
-                self._set_sensors(operation, by)
-            case DisturbAgents():
-                self._disturb(operation, by)
+            case SetSensorMode() | DisturbAgents() | ThrottleProcesses():
+                self._apply_to_agents(operation, by)
             case FaultOrder() | StopWorldProcess() | FillDisk():
                 self._emit(self._applied(operation, by))
             case GiveMission():
@@ -176,6 +180,17 @@ class TimelineEffects:
             return DiskFilled(t_s=self._t_s, agent=None, planned=True, by=by, over=over)
         cause = operation.cause
         return WorldStopped(t_s=self._t_s, agent=None, planned=True, by=by, cause=cause)
+
+    def _apply_to_agents(self, operation: ChangeOfAgents, by: By) -> None:
+        match operation:
+            case SetSensorMode():
+                self._set_sensors(operation, by)
+            case DisturbAgents():
+                self._disturb(operation, by)
+            case ThrottleProcesses():
+                self.starvation.apply(operation)
+            case _:
+                assert_never(operation)
 
     def _repeated_by(self, operation: Operation) -> By:
         """Return by whom a fault of the timeline happens again; None for the scenario and ends."""
@@ -203,8 +218,13 @@ class TimelineEffects:
     def record_exit(self, agent: int, signal: int | None, status: int | None) -> None:
         """Record that an agent's process ended unplanned, by a signal or with a status."""
         self.members.record_exit(agent)
-        self.slow.forget(agent)
+        self._forget(agent)
         self._emit(Killed(t_s=self._t_s, agent=agent, planned=False, signal=signal, status=status))
+
+    def _forget(self, agent: int) -> None:
+        """Expect nothing of a process that has ended."""
+        self.slow.forget(agent)
+        self.starvation.forget(agent)
 
     @property
     def _t_s(self) -> float:
@@ -239,10 +259,17 @@ class TimelineEffects:
     def _end(self, operation: EndProcesses, by: By) -> None:
         self.members.apply(operation, self._world.time_s)
         for agent in operation.agents:
-            self.slow.forget(agent)
+            self._forget(agent)
             if operation.leaves:
                 self._world.leave(agent)
         self._report(Left if operation.leaves else Killed, operation, by)
+
+    def _pause(self, operation: PauseProcesses | ResumeProcesses, by: By) -> None:
+        self.members.apply(operation, self._world.time_s)
+        for agent in operation.agents:
+            self.starvation.forget(agent)
+        paused = isinstance(operation, PauseProcesses)
+        self._report(Paused if paused else Resumed, operation, by)
 
     def _report(
         self,

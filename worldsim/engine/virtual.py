@@ -42,6 +42,7 @@ from worldsim.engine.operations import (
     SetSensorMode,
     StartProcesses,
     StopWorldProcess,
+    ThrottleProcesses,
 )
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
 from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
@@ -154,7 +155,7 @@ class VirtualFleet:
             case StopWorldProcess(cause=cause):
                 # In a pause simulated time stands still: nothing happens meanwhile.
                 self.ended_by = WORLD_KILLED if cause == "kill" else None
-            case PauseProcesses() | ResumeProcesses() | AdmitAgents():
+            case PauseProcesses() | ResumeProcesses() | AdmitAgents() | ThrottleProcesses():
                 pass  # the slot loop decides which agents step
             case SetSensorMode() | DisturbAgents() | GiveMission() | FillDisk():
                 pass  # the slot loop applies what the world shows, and missions

@@ -27,6 +27,7 @@ from worldsim.engine.operations import (
     SetSensorMode,
     StartProcesses,
     StopWorldProcess,
+    ThrottleProcesses,
 )
 from worldsim.engine.step import SlotLoop
 from worldsim.judge.event import By
@@ -203,7 +204,14 @@ class Control:
                 return operation._replace(to=request.to, version=request.version)
             case FaultOrder(event=RadioEvent(sabotage=Sabotage(agents=()))):
                 raise RequestError(f"{kind}: no such agent has a radio now")
-            case FaultOrder() | SetSensorMode() | AdmitAgents() | StopWorldProcess() | FillDisk():
+            case (
+                FaultOrder()
+                | SetSensorMode()
+                | AdmitAgents()
+                | ThrottleProcesses()
+                | StopWorldProcess()
+                | FillDisk()
+            ):
                 return operation
         assert_never(operation)
 

@@ -33,6 +33,7 @@ from worldsim.engine.operations import (
     SetSensorMode,
     StartProcesses,
     StopWorldProcess,
+    ThrottleProcesses,
 )
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS
 from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
@@ -286,6 +287,8 @@ class FreeRunningFleet:
             self._stops.append(operation)
         if isinstance(operation, EndProcesses | PauseProcesses | ResumeProcesses | AdmitAgents):
             self.lateness.drop_pending(operation.agents)
+        if isinstance(operation, ThrottleProcesses):
+            self.lateness.drop_pending(operation.stops)
         for agent in late:
             t_s = round(self.loop.world.time_s, 6)
             detail = "its process is not up by the end of boot_s"
@@ -429,6 +432,9 @@ class ProcessActions:
                 self._launcher.request("pause", _processes(agents, incarnations))
             case ResumeProcesses(agents=agents):
                 self._launcher.request("resume", _processes(agents, incarnations))
+            case ThrottleProcesses(stops=stops, continues=continues):
+                self._launcher.request("pause", _processes(stops, incarnations))
+                self._launcher.request("resume", _processes(continues, incarnations))
             case StartProcesses(incarnations=started):
                 self._startup.expect(started)
                 processes = [AgentProcess(*each) for each in started.items()]

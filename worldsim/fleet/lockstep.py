@@ -46,6 +46,7 @@ from worldsim.engine.operations import (
     SetSensorMode,
     StartProcesses,
     StopWorldProcess,
+    ThrottleProcesses,
 )
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
 from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
@@ -283,6 +284,9 @@ class AwaitedActions:
                 self._act("pause", agents, incarnations)
             case ResumeProcesses(agents=agents):
                 self._act("resume", agents, incarnations)
+            case ThrottleProcesses(stops=stops, continues=continues):
+                self._act("pause", stops, incarnations)
+                self._act("resume", continues, incarnations)
             case AdmitAgents(agents=agents):
                 self._begin(agents, incarnations)
             case FaultOrder():

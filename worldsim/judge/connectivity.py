@@ -21,7 +21,13 @@ from netem.random_draws import MAX_QUANTILE
 from netem.wire.channels import CHANNELS, LOCAL, MAX_PAYLOAD_B, MULTIHOP
 from worldsim.judge.clock_links import ClockLinks
 from worldsim.judge.radio_events import RadioRunEvent, order_of
-from worldsim.judge.run_events import AgentFaultRunEvent, ClockChanged, PoseChanged, SlowChanged
+from worldsim.judge.run_events import (
+    AgentFaultRunEvent,
+    ClockChanged,
+    PoseChanged,
+    SlowChanged,
+    Starved,
+)
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
 from worldsim.truth.vehicle import Floats
@@ -35,6 +41,8 @@ MAX_QUEUED_S: Final = 0.5
 """A frame that waits longer in its sender's queue makes news late, however slow the rate."""
 LONGEST_STEP_S: Final = 0.5
 """Where a step takes longer, beacons come so rarely that others may take their sender for lost."""
+LONGEST_STOP_S: Final = 1.0
+"""Where processes stop for longer, others may take their agents for lost (LEAST_SILENCE_S)."""
 MAX_ROUNDS: Final = 2000
 """More rounds count as infinitely many."""
 
@@ -84,10 +92,10 @@ class Connectivity:
         self._clocks = ClockLinks(scenario.rows, self._slack_s)
         self._displaced: set[tuple[int, int | None]] = set()
         """Faults, by number and agent, by which others take a vehicle for an unidentified one."""
-        self._slow_s: dict[tuple[int, int | None], float] = {}
-        """How long a step takes, by fault and agent [s]."""
+        self._waits_s: dict[tuple[int, int | None], float] = {}
+        """How long news may wait in an agent by a fault, by the fault's number and agent [s]."""
         self._held_up_s = 0.0
-        """How long news waits in an agent, at most [s]."""
+        """The longest of these [s]."""
         self._found: Components | None = None
         """The newest components, and below what they were computed from."""
         self._found_of: tuple[bytes, ...] = ()
@@ -105,8 +113,10 @@ class Connectivity:
                 self._clocks.handle_event(event)
             case PoseChanged():
                 self._note_displaced(event)
-            case SlowChanged():
-                self._note_slow(event)
+            case SlowChanged(delay_s=delay_s):
+                self._note_held_up(event, 2.0 * delay_s if delay_s <= LONGEST_STEP_S else inf)
+            case Starved(stops_s=stops_s):
+                self._note_held_up(event, 2.0 * stops_s if stops_s <= LONGEST_STOP_S else inf)
             case _:
                 assert_never(event)
 
@@ -116,14 +126,14 @@ class Connectivity:
         elif event.displaces_m > SAME_VEHICLE_M:
             self._displaced.add((event.number, event.agent))
 
-    def _note_slow(self, event: SlowChanged) -> None:
+    def _note_held_up(self, event: SlowChanged | Starved, waits_s: float) -> None:
+        """Note for how long news may wait in an agent by a fault [s], or that it has ended."""
         key = event.number, event.agent
         if event.ends:
-            self._slow_s.pop(key, None)
+            self._waits_s.pop(key, None)
         else:
-            self._slow_s[key] = event.delay_s
-        longest_s = max(self._slow_s.values(), default=0.0)
-        self._held_up_s = 2.0 * longest_s if longest_s <= LONGEST_STEP_S else inf
+            self._waits_s[key] = waits_s
+        self._held_up_s = max(self._waits_s.values(), default=0.0)
 
     def components(self, tick: Tick) -> Components:
         """Return the connected components at a tick; the same object while no link changes."""
@@ -165,15 +175,15 @@ class Connectivity:
             return inf
         lost = self.loss if loss is None else loss
         rounds = rounds_to_all(agents, hops, lost) * self._burst_factor if hops else 0.0
-        return max(LEAST_NEWS_S, rounds * self._round_s + hops * (self._delay_s + self._held_up_s))
+        round_s = self._round_s + self._held_up_s
+        return max(LEAST_NEWS_S, rounds * round_s + hops * (self._delay_s + self._held_up_s))
 
     def detection_s(self, hops: int, loss: float | None = None) -> float:
         """Return T_d [s]: the team knows within this time that an agent is gone."""
         lost = self.loss if loss is None else loss
         rounds = (2 * hops + 10) / (1.0 - lost) if lost < 1.0 else inf
-        return max(
-            LEAST_DETECTION_S, rounds * self._round_s + hops * (self._delay_s + self._held_up_s)
-        )
+        round_s = self._round_s + self._held_up_s
+        return max(LEAST_DETECTION_S, rounds * round_s + hops * (self._delay_s + self._held_up_s))
 
     def _refresh(self) -> None:
         """Derive loss, delay and cuts from the conditions and partitions in force."""

@@ -38,6 +38,7 @@ from worldsim.judge.run_events import (
     SensorChanged,
     SlotChanged,
     SlowChanged,
+    Starved,
     WorldStopped,
 )
 
@@ -80,7 +81,7 @@ def _words(event: RunEvent, queues: Queues) -> str:
             words = _returned(event)
         case SensorChanged(agent=agent, sensor=sensor, mode=mode):
             words = f"sensors of a{agent} ({sensor}): {mode}"
-        case ClockChanged() | PoseChanged() | SlowChanged():
+        case ClockChanged() | PoseChanged() | SlowChanged() | Starved():
             words = _agent_fault(event)
         case FormationGiven() | FrameGiven():
             words = _mission(event)
@@ -131,20 +132,34 @@ def _returned(event: ReturnEvent) -> str:
 
 
 def _agent_fault(event: AgentFaultRunEvent) -> str:
+    return _agent_fault_over(event) if event.ends else _agent_fault_begun(event)
+
+
+def _agent_fault_begun(event: AgentFaultRunEvent) -> str:
     agent = f"a{event.agent}"
     match event:
-        case ClockChanged(ends=True):
-            return f"the clock of {agent} is set right: {_error(event)} no more"
         case ClockChanged():
             return f"the clock of {agent} goes wrong by {_error(event)}"
-        case PoseChanged(ends=True):
-            return f"{agent} measures its pose rightly: {_pose_error(event)} no more"
         case PoseChanged():
             return f"{agent} measures its pose wrong: {_pose_error(event)}"
-        case SlowChanged(ends=True):
-            return f"{agent} is no longer slow by {event.delay_s:g} s a step"
-        case SlowChanged():
-            return f"{agent} is slow: each step takes {event.delay_s:g} s"
+        case SlowChanged(delay_s=delay_s):
+            return f"{agent} is slow: each step takes {delay_s:g} s"
+        case Starved(cpu_percent=percent, period_s=period_s):
+            return f"{agent} gets {percent:g} % of the CPU in each {period_s:g} s"
+    assert_never(event)
+
+
+def _agent_fault_over(event: AgentFaultRunEvent) -> str:
+    agent = f"a{event.agent}"
+    match event:
+        case ClockChanged():
+            return f"the clock of {agent} is set right: {_error(event)} no more"
+        case PoseChanged():
+            return f"{agent} measures its pose rightly: {_pose_error(event)} no more"
+        case SlowChanged(delay_s=delay_s):
+            return f"{agent} is no longer slow by {delay_s:g} s a step"
+        case Starved(cpu_percent=percent):
+            return f"{agent} has the CPU as before, not only {percent:g} % of it"
     assert_never(event)
 
 

@@ -55,6 +55,7 @@ from worldsim.judge.run_events import (
     SensorChanged,
     SlotChanged,
     SlowChanged,
+    Starved,
     WorldStopped,
 )
 from worldsim.judge.shared_places import Claims, SharedPlaces
@@ -118,7 +119,7 @@ class Invariants:
             self._handle_radio(event)
             return
         match event:
-            case ClockChanged() | PoseChanged() | SlowChanged():
+            case ClockChanged() | PoseChanged() | SlowChanged() | Starved():
                 self._connectivity.handle_agent_fault(event)
                 self._shared.forget()
                 self._fault(event.t_s, event.t_s)

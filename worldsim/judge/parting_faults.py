@@ -2,6 +2,7 @@
 
 from typing import assert_never
 
+from worldsim.judge.connectivity import LONGEST_STOP_S
 from worldsim.judge.radio_events import (
     Flapped,
     Healed,
@@ -16,6 +17,7 @@ from worldsim.judge.run_events import (
     PoseChanged,
     Reconnected,
     SlowChanged,
+    Starved,
     WorldStopped,
 )
 from worldsim.scenario.tables import CONVERGED_M
@@ -67,6 +69,8 @@ class PartingFaults:
                 parts = event.displaces_m > 0.5 * CONVERGED_M or event.bias_yaw_deg != 0.0
             case SlowChanged():
                 parts = event.delay_s > 0.5 * self._slack_s
+            case Starved():
+                parts = event.stops_s > LONGEST_STOP_S
             case _:
                 assert_never(event)
         if parts:

@@ -111,6 +111,19 @@ class SlowChanged(AgentFaultEvent, frozen=True, tag="slow"):
     """[s]"""
 
 
+class Starved(AgentFaultEvent, frozen=True, tag="starve"):
+    """An agent's process gets only a share of the CPU's time by a fault, or no more."""
+
+    cpu_percent: float = 0.0
+    period_s: float = 0.0
+    """[s]"""
+
+    @property
+    def stops_s(self) -> float:
+        """For how long the process is stopped in each period [s]."""
+        return (1.0 - 0.01 * self.cpu_percent) * self.period_s
+
+
 class MissionEvent(PlannedEvent, frozen=True, kw_only=True):
     """A mission was given to an agent."""
 
@@ -183,7 +196,7 @@ class LateStart(Event, frozen=True, kw_only=True, tag="late"):
     detail: str
 
 
-AgentFaultRunEvent = ClockChanged | PoseChanged | SlowChanged
+AgentFaultRunEvent = ClockChanged | PoseChanged | SlowChanged | Starved
 LossEvent = Killed | Left | Paused
 ReturnEvent = Restarted | Joined | Resumed
 LOSS_KINDS = frozenset({str(event.__struct_config__.tag) for event in get_args(LossEvent)})

@@ -52,6 +52,7 @@ from worldsim.judge.run_events import (
     SensorChanged,
     SlotChanged,
     SlowChanged,
+    Starved,
     WorldStopped,
 )
 from worldsim.judge.sub_formations import SubFormations
@@ -157,7 +158,7 @@ class Judge:
                 self._open_phase(event)
             case Restarted() | Joined() | Killed() | Left() | Paused() | Resumed():
                 self._change_team(event)
-            case ClockChanged() | PoseChanged() | SlowChanged():
+            case ClockChanged() | PoseChanged() | SlowChanged() | Starved():
                 self._handle_agent_fault(event)
             case SensorChanged():
                 self._held.open_window(event.t_s)

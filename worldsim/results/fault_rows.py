@@ -17,6 +17,7 @@ READ = {
 """What the faults change that strike what agents read, by kind."""
 STEPS = {
     "slow": "slowed",
+    "starve": "suppressed",
 }
 """What the faults do that strike agents' steps, by kind."""
 MAX_TOLD = 20
@@ -33,7 +34,7 @@ class FaultRow(TypedDict):
     by: str | None  # "operator", or None for the timeline
     agents: list[int] | None  # those that it struck; of sabotage, with a saboteur
     frames: int | None  # times the links on which the fault cut, altered or sent them
-    steps: int | None  # that took long
+    steps: int | None  # that took long, or did not take place
     readings: int | None  # of sensors or clocks, that differ from the true ones
     process: str | None  # "netem" or "world", of a fault that strikes no agent
     observations: int | None  # that no agent got while netem was down

@@ -249,7 +249,7 @@ def _fault_rows(run: FinishedRun) -> list[FaultRow]:
         run.loop.effects.faults.all,
         dict(counters.struck) if counters is not None else None,
         run.loop.world.readings_struck,
-        run.loop.effects.slow.struck,
+        run.loop.effects.slow.struck | run.loop.effects.starvation.struck,
     )
 
 

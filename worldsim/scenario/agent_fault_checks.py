@@ -2,7 +2,7 @@
 
 from typing import assert_never
 
-from worldsim.scenario.faults import AgentFault, ClockFault, PoseFault, SlowFault
+from worldsim.scenario.faults import AgentFault, ClockFault, PoseFault, SlowFault, StarveFault
 from worldsim.scenario.problem import Problem
 
 
@@ -13,8 +13,8 @@ def agent_fault_problem(fault: AgentFault, at_s: float) -> Problem | None:
             return _clock_problem(fault, at_s)
         case PoseFault():
             return _pose_problem(fault)
-        case SlowFault():
-            return None  # its numbers are within their bounds
+        case SlowFault() | StarveFault():
+            return None  # their numbers are within their bounds
     assert_never(fault)
 
 

@@ -28,6 +28,7 @@ from worldsim.scenario.faults import (
     SabotageFault,
     SensorFault,
     SlowFault,
+    StarveFault,
     StopWorld,
 )
 from worldsim.scenario.selectors import ProcessName, Selectors, other_process
@@ -59,6 +60,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     clock: agents' clocks are wrong.
     disk_full: nothing more of recording and events can be written.
     pose: agents measure their poses wrong.
+    starve: agents' processes run only for a share of each period.
     slow: each step of agents takes a time; meanwhile they hear nothing, and they answer late.
     end: ends a fault by its name, which is its kind and the event's index, as in "jam-2", unless
     ``name`` gives another one. formation, frame: a mission for the team.
@@ -79,6 +81,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     disk_full: bool | None = None
     pose: PoseFault | None = None
     slow: SlowFault | None = None
+    starve: StarveFault | None = None
     end: str | None = None
     formation: FormationSpec | None = None
     frame: FrameChange | None = None
@@ -111,7 +114,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     @property
     def agent_fault(self) -> AgentFault | None:
         """The fault of single agents whose key is set; None where there is none."""
-        return self.clock or self.pose or self.slow
+        return self.clock or self.pose or self.slow or self.starve
 
     def called(self, number: int) -> str:
         """Return the event's name. number: its index, or the number of an operator's event."""
@@ -168,6 +171,7 @@ _OF_AGENTS = (
     "clock",
     "pose",
     "slow",
+    "starve",
 )
 UNDOABLE = ("kill", "leave", "pause", *_LASTING, "sensor", *_OF_AGENTS, "disk_full")
 """The keys of the actions that ``for_s`` can undo."""

@@ -111,6 +111,17 @@ class SlowFault(Table, frozen=True):
     """How long each step takes, beyond its own time [s; simulated time]."""
 
 
+class StarveFault(Table, frozen=True):
+    """Give the selected agents' processes only a share of the CPU's time."""
+
+    kind: ClassVar[str] = "starve"
+    agents: Selectors
+    cpu_percent: Annotated[float, Meta(ge=1, le=99)]
+    """The share of each period for which a process runs [%]."""
+    period_s: Annotated[float, Meta(ge=0.05, le=10)] = 0.5
+    """[s; simulated time]"""
+
+
 class EndFault(msgspec.Struct, frozen=True):
     """End a fault before its time, or one that has no end."""
 
@@ -118,7 +129,7 @@ class EndFault(msgspec.Struct, frozen=True):
     """Its name."""
 
 
-AgentFault = ClockFault | PoseFault | SlowFault
+AgentFault = ClockFault | PoseFault | SlowFault | StarveFault
 """A fault of single agents whose processes go on."""
 ProcessFault = Kill | Leave | Restart | Pause | Resume | Join
 MissionChange = FormationSpec | FrameChange
