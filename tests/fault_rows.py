@@ -68,6 +68,22 @@ def radio(keys: str, for_s: float = 30.0) -> str:
     return at(f"netem = {{ {keys} }}", for_s=for_s)
 
 
+def clock(offset_s: float, from_s: float) -> str:
+    """Return a wrong clock that lasts 15 s."""
+    return at(f"clock = {{ {ONE}, offset_s = {offset_s} }}", from_s, 15.0)
+
+
+def slow(delay_s: float, from_s: float = AT_S) -> str:
+    """Return a slow controller that lasts 15 s."""
+    return at(f"slow = {{ {ONE}, delay_s = {delay_s} }}", from_s, 15.0)
+
+
+def starved(agents: str, from_s: float = AT_S) -> str:
+    """Return a starvation that lasts 15 s."""
+    return at(f"starve = {{ agents = {agents}, cpu_percent = 20 }}", from_s, 15.0)
+
+
+ONE = "agents = ['random:1']"
 LONG: dict[str, Any] = {"radio": LOSSY, "lasts_s": 130.0, "converges_s": 60.0}
 ROWS = (
     Row("a follower leaves", (at("leave = [8]"),), 10.0),
@@ -116,6 +132,39 @@ ROWS = (
     Row("duplicates", (radio("duplicate_percent = 30"),), 10.0, lasts_s=60.0),
     Row("corruption", (radio("corrupt_percent = 30"),), 15.0, lasts_s=60.0),
     Row("a slow radio", (radio("rate_kbit = 100, limit = 20"),), 30.0, lasts_s=80.0),
+    *(
+        Row(f"a clock off by {offset_s:g} s{name}", (clock(offset_s, begins_s),), 15.0, **terms)
+        for offset_s in (3.0, -3.0, 100.0)
+        for name, begins_s, terms in (("", AT_S, {"lasts_s": 50.0}), (", lossy", 60.0, LONG))
+    ),
+    Row(
+        "a clock that drifts",
+        (at(f"clock = {{ {ONE}, drift_ppm = 10000 }}", for_s=30.0),),
+        15.0,
+        lasts_s=65.0,
+    ),
+    *(
+        Row(f"a pose, {name}", (at(f"pose = {{ {ONE}, {keys} }}", for_s=15.0),), 15.0, lasts_s=50.0)
+        for name, keys in (
+            ("on another's place", "bias_m = [-0.577, 0.577, 0.577]"),
+            ("5 m off", "bias_m = [5, 0, 0]"),
+            ("noisy and turned", "noise_m = 0.3, bias_yaw_deg = 30"),
+        )
+    ),
+    Row(
+        "a pose on another's place, lossy",
+        (at(f"pose = {{ {ONE}, bias_m = [-0.577, 0.577, 0.577] }}", 60.0, 15.0),),
+        15.0,
+        **LONG,
+    ),
+    *(
+        Row(f"slow by {delay_s:g} s a step", (slow(delay_s),), 15.0, lasts_s=50.0)
+        for delay_s in (0.05, 0.2, 2.0)
+    ),
+    Row("slow by 0.2 s a step, lossy", (slow(0.2, 60.0),), 15.0, **LONG),
+    Row("one starved, 20 %", (starved("['random:1']"),), 15.0, lasts_s=50.0),
+    Row("all starved, 20 %", (starved("['all']"),), 15.0, lasts_s=50.0),
+    Row("all starved, 20 %, lossy", (starved("['all']", 60.0),), 15.0, **LONG),
     Row(
         "a jam",
         (at("jam = { centre_m = [0, 0, 0], radius_m = 3 }", for_s=15.0),),

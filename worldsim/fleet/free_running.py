@@ -443,10 +443,10 @@ class ProcessActions:
                 return self._startup.absent(agents)
             case FaultOrder():
                 self._netem.order(operation, slot)
-            case SetSensorMode() | DisturbAgents() | GiveMission():
-                pass  # what the world shows, and missions, are its own
-            case StopWorldProcess() | FillDisk():
-                pass  # a stop waits for the slot's end, and the disk is the world's own
+            case (
+                SetSensorMode() | DisturbAgents() | GiveMission() | StopWorldProcess() | FillDisk()
+            ):
+                pass  # the world's own matters; its stop waits for the slot's end
             case _:
                 assert_never(operation)
         return []
