@@ -26,6 +26,15 @@ queue = [{ name = "Q1", vertices = ["V1"], shape = { kind = "ray", direction = [
 """
 
 
+def check_faults_of_agents(command: Callable[..., tuple[int, str]]) -> None:
+    """Check that faults of agents are refused with the reason, or carried out."""
+    status, output = command("fault", "clock", "7", "offset_s=3")
+    assert (status, "refused: clock.agents[0]: no agent 7; 0 to 3" in output) == (2, True)
+    assert command("fault", "pose", "1")[0] == 2
+    status, output = command("fault", "starve", "0", "cpu_percent=50", "--for", "1")
+    assert (status, "a0 gets 50 % of the CPU in each 0.5 s" in output) == (0, True)
+
+
 def test_a_running_fleet_carries_out_commands_and_refuses_impossible_ones(
     start: Start, scenario: Callable[[float], str], tmp_path: Path
 ) -> None:
@@ -44,6 +53,7 @@ def test_a_running_fleet_carries_out_commands_and_refuses_impossible_ones(
         2,
         f"{run}: refused: kill[0]: no agent 7; 0 to 3 by then\n",
     )
+    check_faults_of_agents(command)
     assert command("netem", "set", "loss_percent=101")[0] == 2
     assert command("netem", "set", "loss_percent=20", "--for", "2")[0] == 0
     status, output = command("mission", "column.toml", "--to", "2")
@@ -72,7 +82,7 @@ def test_a_running_fleet_carries_out_commands_and_refuses_impossible_ones(
     assert [phase["formation"] for phase in phases] == ["line", "column"]
     assert phases[1]["residual_m"] < 0.12
     by_operator = [e["kind"] for e in events_of(run) if e.get("by") == "operator"]
-    assert by_operator == ["netem", "formation", "kill", "jam", "pause", "resume"]
+    assert by_operator == ["starve", "netem", "formation", "kill", "jam", "pause", "resume"]
 
 
 @pytest.mark.usefixtures("port_by_hand")
