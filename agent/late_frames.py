@@ -12,10 +12,7 @@ class LateFrames:
     def __init__(self) -> None:
         self._held: Frames = ()
 
-    def sent(self, frames: Frames, takes_s: float) -> Frames:
-        """Return what leaves with a step.
-
-        frames: of this step; takes_s: how long it takes [s].
-        """
-        held, self._held = self._held, frames if takes_s > 0.0 else ()
-        return held if takes_s > 0.0 else held + frames
+    def sent(self, frames: Frames, late: bool) -> Frames:
+        """Return what leaves with a step. frames: of this step; late: whether it takes long."""
+        held, self._held = self._held, frames if late else ()
+        return held if late else held + frames

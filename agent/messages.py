@@ -193,9 +193,10 @@ class Observation(Message, frozen=True):
     orders: Annotated[tuple[Mission, ...], Meta(max_length=4)]
     """Missions that an operator gives to this agent, for the whole team."""
     scans: Annotated[tuple[Scan, ...], Meta(max_length=2)]  # scans made at this time
+    late_slots: Count = 0
+    """By how many slots the agent answers late, by a fault."""
     takes_s: Annotated[float, Meta(ge=0, le=1000)] = 0.0
-    """How long the agent's process takes for this step beyond its own time, by a fault [s; wall
-    time]."""
+    """How long its process takes for that [s; wall time]; 0 where time waits for it."""
 
 
 class Telemetry(Message, frozen=True):

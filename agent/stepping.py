@@ -41,13 +41,14 @@ class AgentStepper:
         self._guard.enter()
         outbox = self.core.step(observation)
         self._guard.leave()
-        said = outbox.frames
+        said, slot = outbox.frames, observation.slot
         if self._late is not None:
-            said = self._late.sent(said, observation.takes_s)
+            said = self._late.sent(said, observation.late_slots > 0)
         elif observation.takes_s > 0.0:
             time.sleep(observation.takes_s)
+            slot += observation.late_slots  # a radio sends what it gets, however old
         frames = tuple([Outgoing(channel, payload) for channel, payload in said])
-        transmission = pack(Transmission(observation.slot, self._incarnation, frames))
+        transmission = pack(Transmission(slot, self._incarnation, frames))
         # One directly after the other: the two then often leave in one packet.
         self._put_command(encode(outbox.command))
         self._put_transmission(transmission)

@@ -10,7 +10,7 @@ from agent.late_frames import LateFrames
 def test_each_step_is_sent_once_and_a_slow_one_with_the_next(slow_steps):
     late, sent = LateFrames(), []
     for step, slow in enumerate(slow_steps):
-        frames = late.sent(((0, str(step).encode()),), 0.2 if slow else 0.0)
+        frames = late.sent(((0, str(step).encode()),), slow)
         sent += [(int(payload), step) for _, payload in frames]
     expected = [
         (step, step + slow) for step, slow in enumerate(slow_steps) if step + slow < len(slow_steps)

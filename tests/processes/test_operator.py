@@ -26,8 +26,9 @@ queue = [{ name = "Q1", vertices = ["V1"], shape = { kind = "ray", direction = [
 """
 
 
-def check_faults_of_agents(command: Callable[..., tuple[int, str]]) -> None:
-    """Check that faults of agents are refused with the reason, or carried out."""
+def check_faults(command: Callable[..., tuple[int, str]]) -> None:
+    """Check that faults are refused with the reason, or carried out."""
+    assert command("netem", "set", "loss_percent=101")[0] == 2
     status, output = command("fault", "clock", "7", "offset_s=3")
     assert (status, "refused: clock.agents[0]: no agent 7; 0 to 3" in output) == (2, True)
     assert command("fault", "pose", "1")[0] == 2
@@ -53,8 +54,7 @@ def test_a_running_fleet_carries_out_commands_and_refuses_impossible_ones(
         2,
         f"{run}: refused: kill[0]: no agent 7; 0 to 3 by then\n",
     )
-    check_faults_of_agents(command)
-    assert command("netem", "set", "loss_percent=101")[0] == 2
+    check_faults(command)
     assert command("netem", "set", "loss_percent=20", "--for", "2")[0] == 0
     status, output = command("mission", "column.toml", "--to", "2")
     assert (status, "new formation 'column', given to a2" in output) == (0, True)

@@ -120,3 +120,22 @@ def test_by_hand_process_faults_are_refused_at_the_start(
     reason = "needs the launcher (qswarm run): processes started by hand are ended by hand"
     assert world.text == f"world: {scenario}: event[1].kill: {reason}\n"
     assert not run.exists()
+
+
+@pytest.mark.real_time
+def test_slow_and_starved_processes_answer_late_and_stay_in_the_team(
+    start: Start, timeline: Write, run: Path
+) -> None:
+    """What a slow agent says leaves late, and is heard; its commands are too old."""
+    slow = "at_s = 3\nfor_s = 3\nslow = { agents = [1], delay_s = 0.2 }"
+    starved = "at_s = 7\nfor_s = 3\nstarve = { agents = [2, 3], cpu_percent = 20 }"
+    summary = summary_after(start, timeline(12.0, slow, starved), run)
+    assert [(row["kind"], row["steps"] > 20) for row in summary["faults"]] == [
+        ("slow", True),
+        ("starve", True),
+    ]
+    stale = {name: causes.get("stale", 0) for name, causes in summary["rejected_by_cause"].items()}
+    assert stale["world"] > 5
+    assert stale["netem"] < stale["world"]
+    moved = [e for e in events_of(run) if e["kind"] in {"slot", "role"} and e["t_s"] > 4.0]
+    assert moved == []

@@ -4,10 +4,14 @@ import pytest
 
 from tests.small_scenario import SMALL
 from worldsim.campaign.pool import finished
+from worldsim.engine.slow_controllers import SlowControllers
+from worldsim.engine.starvation import Starvation
 from worldsim.engine.virtual import fly
 from worldsim.results.fault_rows import fault_texts, idle_text
 from worldsim.results.summary import Summary, summarise
 from worldsim.scenario.file import parse
+from worldsim.truth.agent_clocks import AgentClocks
+from worldsim.truth.pose_errors import PoseErrors
 
 STRIKE = {
     "partition": ("partition = [[0], [1]]", "frames"),
@@ -48,6 +52,24 @@ def test_a_fault_says_when_it_was_in_force_and_what_it_struck(kind: str) -> None
     assert (row["number"], row["kind"], row["from_s"], row["to_s"]) == (0, kind, 3.0, 4.0)
     assert row[counted]  # type: ignore[literal-required]
     assert idle_text(summary["faults"]) is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "model"),
+    [
+        ("clock", AgentClocks),
+        ("pose", PoseErrors),
+        ("slow", SlowControllers),
+        ("starve", Starvation),
+    ],
+)
+def test_without_the_model_of_a_fault_nothing_is_struck_and_the_run_says_so(
+    monkeypatch: pytest.MonkeyPatch, kind: str, model: type[object]
+) -> None:
+    monkeypatch.setattr(model, "begin", lambda *_: None)
+    summary = flown(f"at_s = 3.0\nfor_s = 1.0\n{STRIKE[kind][0]}")
+    assert summary["outcome"] == "inconclusive"
+    assert summary["reason"] == f"the {kind} at 3 s struck nothing"
 
 
 def test_a_fault_that_is_in_force_to_the_end_has_no_end() -> None:

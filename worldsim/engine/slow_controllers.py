@@ -75,16 +75,20 @@ class SlowControllers:
         del self._due[agent]
         return True
 
-    def step_s(self, agent: int, slot: int) -> float:
-        """Begin an agent's step; return how long it takes beyond its own time [s]."""
+    def begin_step(self, agent: int, slot: int) -> tuple[int, float]:
+        """Begin an agent's step; return by how many slots its answer is late.
+
+        And how long its process takes for that [s; simulated time]; 0 where that is modelled.
+        """
         delays_s = self._delays_s.get(agent)
         if not delays_s:
-            return 0.0
+            return 0, 0.0
         number = max(delays_s, key=delays_s.__getitem__)
         delay_s = delays_s[number]
         self.struck[number] = self.struck.get(number, 0) + 1
-        self._due[agent] = slot + ceil(delay_s * self._clock.slot_hz - SLACK_S)
-        return delay_s
+        late_slots = ceil(delay_s * self._clock.slot_hz - SLACK_S)
+        self._due[agent] = slot + late_slots
+        return late_slots, 0.0 if self._modelled else delay_s
 
     def hold(self, agent: int, command: Command, encoded: bytes) -> bool:
         """Take an agent's answer; return whether it is held until it is due."""

@@ -264,10 +264,11 @@ class SlotLoop:
 
     def _with_delay(self, agent: int, observation: Observation) -> tuple[int, Observation]:
         """Add how long a step takes to the observation of a slow agent."""
-        takes_s = self._slow.step_s(agent, observation.slot)
-        if takes_s == 0.0:
+        late_slots, takes_s = self._slow.begin_step(agent, observation.slot)
+        if late_slots == 0:
             return agent, observation
-        return agent, msgspec.structs.replace(observation, takes_s=takes_s)
+        late = msgspec.structs.replace(observation, late_slots=late_slots, takes_s=takes_s)
+        return agent, late
 
     def _with_mission(
         self, mission: Mission, agent: int, observation: Observation

@@ -186,7 +186,7 @@ class VirtualFleet:
         outbox = core.step(observation)
         if self._watch is not None:
             self._watch.leave()
-        said = self._late[agent].sent(outbox.frames, observation.takes_s)
+        said = self._late[agent].sent(outbox.frames, observation.late_slots > 0)
         outgoing = tuple([Outgoing(channel, payload) for channel, payload in said])
         transmission = Transmission(open_slot.slot, outbox.command.incarnation, outgoing)
         if checks:
