@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from netem.wire.bus import Subscriber
 
+RUN_OVER = b"the run is over"
+"""The message that the run has ended; any other one on its topic ends nothing."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -47,7 +49,7 @@ class RunEnd:
 
     def __call__(self) -> bool:
         """Poll, and return whether the run is over."""
-        self._received = self._received or bool(self._over.drain(1))
+        self._received = self._received or RUN_OVER in self._over.drain(1)
         return self._received or self._stop.requested
 
 

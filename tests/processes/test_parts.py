@@ -13,6 +13,7 @@ from netem.messages import MediumSetup
 from netem.wire.bus import Bus, RefusedError
 from netem.wire.keys import Keys
 from netem.wire.session import SessionError, open_client, open_router
+from netem.wire.shutdown import RUN_OVER
 from tests.processes.harness import Started
 
 pytestmark = pytest.mark.processes
@@ -53,7 +54,7 @@ def test_netem_serves_the_first_run_that_asks_and_refuses_a_second(
         with pytest.raises(RefusedError, match="serves run 'first' already"):
             second.query("medium", None, question, timeout_s=5.0)
         assert first.query("medium", None, question, timeout_s=5.0) == b""
-        first.publisher("over")(b"")
+        first.publisher("over")(RUN_OVER)
         assert netem.status(5.0) == 0, netem.text
 
 

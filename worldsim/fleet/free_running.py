@@ -21,6 +21,7 @@ from netem.messages import MediumCounters, Truth
 from netem.wire.bus import Bus
 from netem.wire.frame import WireError, pack, unpack
 from netem.wire.keys import agent_name
+from netem.wire.shutdown import RUN_OVER
 from worldsim.engine.operations import (
     AdmitAgents,
     DisturbAgents,
@@ -205,7 +206,7 @@ class FreeRunningFleet:
         self._netem.wake()
         if self.begun:
             self._launcher.report_run_over()
-        self._over(b"")
+        self._over(RUN_OVER)
         deadline = time.monotonic() + FINAL_VERDICTS_WITHIN_S
         while self._netem.state == "up" and (left_s := deadline - time.monotonic()) > 0.0:
             report = self._reports.wait(left_s)

@@ -34,6 +34,7 @@ from netem.wire.barrier import (
 from netem.wire.bus import Bus, Subscriber
 from netem.wire.frame import WireError, pack
 from netem.wire.keys import medium_name
+from netem.wire.shutdown import RUN_OVER
 from worldsim.engine.operations import (
     AdmitAgents,
     DisturbAgents,
@@ -150,7 +151,7 @@ class LockstepFleet:
             self._landed = True
             if self.begun:
                 self._launcher.report_run_over()
-            self._over(b"")
+            self._over(RUN_OVER)
 
     def _slot(self) -> None:
         for operation in self.loop.due():
