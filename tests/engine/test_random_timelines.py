@@ -24,6 +24,13 @@ BOOT = 10
 """How long an agent boots by default [0.1 s]."""
 RADIO = ("partition", "jam", "flap", "netem", "sabotage")
 DOWN = ("kill", "leave")
+OF_AGENTS = {
+    "sensor": "mode = 'silent'",
+    "sabotage": "kind = 'spoof'",
+    "intruder": "per_s = 9",
+}
+"""Kinds with a table of agents, and the table's other key."""
+KINDS = (*DOWN, "pause", "sensor", "intruder", *RADIO)
 
 
 @dataclass
@@ -52,10 +59,8 @@ class Fault:
                 action = f"flap = {{ period_s = {1 + self.value} }}"
             case "netem":
                 action = f"netem = {{ loss_percent = {self.value} }}"
-            case "sensor":
-                action = f"sensor = {{ agents = {agents}, mode = 'silent' }}"
-            case "sabotage":
-                action = f"sabotage = {{ kind = 'spoof', agents = {agents} }}"
+            case kind if kind in OF_AGENTS:
+                action = f"{kind} = {{ agents = {agents}, {OF_AGENTS[kind]} }}"
             case "heal":
                 action = "heal = true"
             case "end":
@@ -137,14 +142,13 @@ class Model:
 
 def drawn(random: Random) -> list[Fault]:
     """Return a timeline: up to eight overlapping faults, what undoes them, and early ends."""
-    kinds = (*DOWN, "pause", "sensor", *RADIO)
-    faults = [_drawn_fault(random, random.choice(kinds)) for _ in range(random.randint(2, 8))]
+    faults = [_drawn_fault(random, random.choice(KINDS)) for _ in range(random.randint(2, 8))]
     for kind in ("restart", "resume"):
         if random.random() < 0.5:
             faults.append(Fault(kind, random.randrange(UNTIL), _drawn_agents(random)))
     for number, each in enumerate(faults):
         last = each.at + (each.lasts or UNTIL) if each.every is None else UNTIL
-        if each.kind in kinds and random.random() < 0.2 and each.at + 1 < min(last, UNTIL):
+        if each.kind in KINDS and random.random() < 0.2 and each.at + 1 < min(last, UNTIL):
             at = random.randrange(each.at + 1, min(last, UNTIL))
             faults.append(Fault("end", at, name=f"{each.kind}-{number}"))
     return _with_heal(random, faults)

@@ -15,8 +15,9 @@ from agent import process as agent_process
 from worldsim.fleet.fork import ProcessExit, fork
 from worldsim.fleet.ipc import (
     AgentExited, AgentProcess, AgentStarted, EndRequest, Message, ActionDone, ActionRequest,
-    zygote_sockets,
+    IntruderEndRequest, IntruderExited, IntruderRequest, IntruderStarted, zygote_sockets,
 )
+from worldsim.fleet import intruder
 from worldsim.fleet.zygote import AgentProcessConfig, Zygote
 
 FIRST, SECOND = AgentProcess(0, 0), AgentProcess(1, 0)
@@ -33,6 +34,7 @@ def serve():
     return Zygote(zygote_end, AgentProcessConfig("mine", "tcp/x", Path("."))).serve()
 
 agent_process.run = sleep
+intruder.run = lambda attack, row: 1 if attack.per_s == 1.0 else sleep()
 launcher, zygote_end = zygote_sockets()
 zygote = fork(Path("zygote.log"), signal.SIGKILL, serve)
 zygote_end.close()
@@ -83,6 +85,23 @@ print(sorted((each.process.agent, *each.exit) for each in exits))
 print(os.waitstatus_to_exitcode(os.waitpid(zygote, 0)[1]))
 print(Path("zygote.log").read_text(), end="")
 """
+INTRUDERS = """
+for number in (5, 6):
+    launcher.send(IntruderRequest(number, (1,), 9.0))
+fifth, sixth = receive(IntruderStarted), receive(IntruderStarted)
+assert (fifth.number, sixth.number) == (5, 6)
+assert [os.read(ready, 1) for _ in (fifth, sixth)] == [b".", b"."]
+launcher.send(IntruderEndRequest(5))
+launcher.send(IntruderEndRequest(7))  # there is none
+request("resume")
+assert not Path(f"/proc/{fifth.pid}").exists() or state(fifth.pid) == "Z"
+assert state(sixth.pid) not in "TZ"
+launcher.send(IntruderRequest(8, (), 1.0))
+assert receive(IntruderExited) == IntruderExited(8, ProcessExit(None, 1))
+launcher.close()
+os.waitpid(zygote, 0)
+print(Path(f"/proc/{sixth.pid}").exists())
+"""
 LAUNCHER_GONE = """
 request("pause", SECOND)
 launcher.close()
@@ -109,6 +128,10 @@ def ran(program: str, folder: Path) -> list[str]:
 
 def test_actions_are_acknowledged_when_they_have_taken_effect(tmp_path: Path) -> None:
     assert ran(ACTIONS, tmp_path) == ["done"]
+
+
+def test_an_intruder_ends_with_its_fault_and_with_the_fleet(tmp_path: Path) -> None:
+    assert ran(INTRUDERS, tmp_path) == ["False"]
 
 
 def test_it_ends_all_agents_on_request_also_a_paused_one(tmp_path: Path) -> None:

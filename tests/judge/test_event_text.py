@@ -188,6 +188,21 @@ SENTENCES: list[tuple[dict[str, Any], str]] = [
             (None, "sabotage ended"),
         )
     ),
+    *(
+        (
+            {"kind": "intruder", **NO_AGENT, "number": 4, "per_s": 9, **keys, **SCHEDULED},
+            f"{words} (scheduled)",
+        )
+        for keys, words in (
+            (
+                {"agents": [2, 5]},
+                "an intruder with the password of a2, a5 puts 9 messages a second",
+            ),
+            ({"agents": []}, "an intruder without a password opens 9 connections a second"),
+            ({"agents": [], "nobody": ["vertex:V1"]}, "intruder: no agent matches vertex:V1"),
+            ({"agents": None}, "the intruder ended"),
+        )
+    ),
     (
         {"kind": "flap", **NO_AGENT, "number": 3, "flap": None, **SCHEDULED},
         "flapping links restored (scheduled)",

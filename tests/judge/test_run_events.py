@@ -14,6 +14,7 @@ from netem.link_parameters import Conditions, LinkKeys
 from worldsim.judge.radio_events import applied, order_of
 from worldsim.judge.run_events import (
     ClockChanged,
+    Intruded,
     Joined,
     Killed,
     LateStart,
@@ -50,6 +51,8 @@ EVENTS: list[RunEvent] = [
     PoseChanged(t_s=2.0, agent=1, planned=True, number=3, bias_m=(1.0, 0.0, 0.5), noise_m=0.1),
     SlowChanged(t_s=2.0, agent=1, planned=True, number=3, delay_s=0.2, ends=True),
     Starved(t_s=2.0, agent=1, planned=True, number=3, cpu_percent=20.0, period_s=0.5),
+    Intruded(t_s=2.0, agent=None, planned=True, number=3, agents=(1,), per_s=10.0),
+    Intruded(t_s=2.0, agent=None, planned=True, number=3, agents=None, per_s=10.0),
     SlotChanged(t_s=0.5, agent=1, place=(2, 1), before=None),
     QueueChanged(t_s=0.5, agent=1, queue=2),
     RoleChanged(t_s=0.5, agent=1, role="vertex"),

@@ -15,40 +15,17 @@ from random import Random
 
 import zenoh
 
-from agent.codec import decode_observation, encode
-from agent.messages import Command, Telemetry
+from agent.codec import decode_observation
 from netem.wire.access import login_of
 from netem.wire.bus import Bus, Put
-from netem.wire.frame import Frame, Outgoing, Transmission, pack
 from netem.wire.keys import Keys
-from netem.wire.latency import LatencyHistogram
 from netem.wire.session import open_client
+from worldsim.fleet.intruder import MAKERS, mixed
 from worldsim.fleet.process_table import read_fleet
 from worldsim.results.run_folder import USERS
 
 RATE_HZ = 10_000
 BURST_S = 0.005
-KINDS = 400
-ZERO = (0.0, 0.0, 0.0)
-TELEMETRY = Telemetry(ZERO, 0.0, None, None, (), (), 0, -1, -1, 0)
-
-
-def command(slot: int, incarnation: int = 0) -> bytes:
-    velocity = (0.3, 0.3, 0.3)
-    return encode(Command(slot, incarnation, slot + 8, velocity, 0.0, (0.0, 0.0), TELEMETRY))
-
-
-def transmission(slot: int, incarnation: int = 0) -> bytes:
-    return pack(Transmission(slot, incarnation, (Outgoing(0, bytes(200)), Outgoing(1, bytes(90)))))
-
-
-def arrivals(slot: int, incarnation: int = 0) -> bytes:
-    histogram = LatencyHistogram(0.0125)
-    histogram.add((Frame(1, 0, 0, 0, b""),) * (slot % 50), (slot,) * (slot % 50), slot % 7)
-    return pack(histogram.report(incarnation))
-
-
-MAKERS = {"tx": transmission, "command": command, "arrivals": arrivals}
 
 
 def flood(run: Path, agent: int, seconds: float, forged: bool) -> dict[str, int]:
@@ -56,7 +33,10 @@ def flood(run: Path, agent: int, seconds: float, forged: bool) -> dict[str, int]
     fleet, login = read_fleet(run), login_of(run / USERS, f"agent-{agent}")
     with open_client(fleet.endpoint, login=login) as session:
         bus, random = Bus(session, Keys(fleet.run)), Random(1)
-        puts = [(bus.publisher(topic, agent), cycle(_mixed(topic, random))) for topic in MAKERS]
+        puts = [
+            (bus.publisher(topic, agent), cycle(mixed(make, random)))
+            for topic, make in MAKERS.items()
+        ]
         observations = bus.subscriber("observation", agent)
         begun, sent, pause = time.monotonic(), 0, threading.Event()
         while (now_s := time.monotonic() - begun) < seconds:
@@ -69,17 +49,6 @@ def flood(run: Path, agent: int, seconds: float, forged: bool) -> dict[str, int]
     return dict.fromkeys(MAKERS, sent)
 
 
-def _mixed(topic: str, random: Random) -> list[bytes]:
-    make = MAKERS[topic]
-    kinds = [
-        lambda: random.randbytes(random.randrange(200)),
-        lambda: make(random.randrange(100)),
-        lambda: make(random.randrange(4000), random.randrange(1, 9)),
-        lambda: make(random.randrange(10**6, 2**52), random.randrange(3)),
-    ]
-    return [random.choice(kinds)() for _ in range(KINDS)]
-
-
 def _burst(put: Put, messages: "cycle[bytes]", count: int) -> None:
     for _ in range(count):
         put(next(messages))
@@ -89,7 +58,7 @@ def _forge(bus: Bus, agent: int, observed: list[bytes]) -> None:
     for data in observed:
         slot = decode_observation(data).slot
         for topic, make in MAKERS.items():
-            bus.publisher(topic, agent)(make(slot))
+            bus.publisher(topic, agent)(make(slot, 0))
 
 
 def main() -> None:

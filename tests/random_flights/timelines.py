@@ -123,6 +123,7 @@ class Timeline:
             lambda: {"clock": self._clock()},
             lambda: {"slow": {"delay_s": draw.among((0.02, 0.05, 0.2, 1.0, 5.0))}},
             lambda: {"starve": self._starve()},
+            lambda: {"intruder": {"per_s": draw.scale(1.0, 9000.0)}},
         ]
         if self._all_range:  # others know of vehicles by their poses alone
             kinds.append(lambda: {"pose": self._pose()})

@@ -95,6 +95,7 @@ EVENTS: tuple[Data, ...] = (
     {"jam": {"centre_m": [0.0, 0.0, 0.0], "radius_m": 2.0}, "for_s": 0.2},
     {"flap": {"period_s": 0.2}, "for_s": 0.2},
     {"sabotage": {"kind": "garbage", "agents": [1], "per_s": 20.0}, "for_s": 0.2},
+    {"intruder": {"agents": [1], "per_s": 20.0}, "for_s": 0.2},
     {"sabotage": {"kind": "replay", "agents": [1], "delay_s": 0.1}, "for_s": 0.2},
     {"netem": {"loss_percent": 50.0, "delay_ms": 100.0}, "for_s": 0.2},
     {"frame": {"waypoints_m": [[1.0, 0.0, 0.0]], "yaw_deg": 90.0}},

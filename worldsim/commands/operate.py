@@ -13,7 +13,7 @@ import typer
 from worldsim.commands.options import RunFolder, examples
 from worldsim.results.exit_status import PASS
 
-AGENT_FAULTS = ("clock", "pose", "slow", "starve")
+AGENT_FAULTS = ("clock", "pose", "slow", "starve", "intruder")
 FAULTS = (
     *("kill", "leave", "restart", "pause", "resume", "join"),
     *AGENT_FAULTS,
@@ -94,6 +94,7 @@ def mission(
         "qswarm fault runs/mine kill random:1 --for 2 --every 10 --name outage",
         "qswarm fault runs/mine clock 3 offset_s=3 --for 10",
         "qswarm fault runs/mine pose 3 bias_m=[0.5,0,0] --for 10",
+        "qswarm fault runs/mine intruder 2 per_s=10000 --for 5",
         "qswarm fault runs/mine end outage",
     )
 )
@@ -121,7 +122,8 @@ def fault(
     processes until resume; join adds new agents. clock lets agents' clocks be wrong (offset_s,
     drift_ppm). pose lets agents measure their poses wrong (bias_m, noise_m, bias_yaw_deg).
     slow lets each step of agents take delay_s. starve lets processes run for cpu_percent of each
-    period_s only.
+    period_s only. intruder lets a process attack the router (per_s), with the passwords of agents
+    or without any.
     disk_full lets nothing more of recording and events be written. end ends a fault of any kind
     before its time, by its name: its kind and number, as in "kill-2", unless --name gave it
     another one.

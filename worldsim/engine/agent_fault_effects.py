@@ -11,11 +11,19 @@ from worldsim.judge.event import By
 from worldsim.judge.run_events import (
     AgentFaultRunEvent,
     ClockChanged,
+    Intruded,
     PoseChanged,
     SlowChanged,
     Starved,
 )
-from worldsim.scenario.faults import ClockFault, PoseFault, SlowFault, StarveFault
+from worldsim.scenario.faults import (
+    ClockFault,
+    FaultOfEach,
+    Intruder,
+    PoseFault,
+    SlowFault,
+    StarveFault,
+)
 from worldsim.truth.agent_clocks import ClockError
 from worldsim.truth.pose_errors import PoseError
 from worldsim.truth.world import World
@@ -28,17 +36,23 @@ class AgentFaultEffects:
         self._world = world
         self._slow, self._starvation = slow, starvation
 
-    def apply(self, operation: DisturbAgents, t_s: float, by: By) -> Iterator[AgentFaultRunEvent]:
-        """Apply an operation at a time [s]; yield an event for each agent."""
+    def apply(
+        self, operation: DisturbAgents, t_s: float, by: By
+    ) -> Iterator[AgentFaultRunEvent | Intruded]:
+        """Apply an operation at a time [s]; yield an event for each agent, or one for all."""
+        fault = operation.fault
+        if isinstance(fault, Intruder):
+            yield _intruded(operation, fault, t_s, by)
+            return
         for agent in operation.agents:
             if operation.ends:
-                self._end(operation, agent)
+                self._end(operation.number, fault, agent)
             else:
-                self._begin(operation, agent, t_s)
-            yield _event(operation, agent, t_s, by)
+                self._begin(operation.number, fault, agent, t_s)
+            yield _event(operation, fault, agent, t_s, by)
 
-    def _begin(self, operation: DisturbAgents, agent: int, t_s: float) -> None:
-        number, fault, world = operation.number, operation.fault, self._world
+    def _begin(self, number: int, fault: FaultOfEach, agent: int, t_s: float) -> None:
+        world = self._world
         match fault:
             case ClockFault():
                 error = ClockError(t_s, fault.offset_s, fault.drift_ppm)
@@ -54,8 +68,8 @@ class AgentFaultEffects:
             case _:
                 assert_never(fault)
 
-    def _end(self, operation: DisturbAgents, agent: int) -> None:
-        number, fault, world = operation.number, operation.fault, self._world
+    def _end(self, number: int, fault: FaultOfEach, agent: int) -> None:
+        world = self._world
         match fault:
             case ClockFault():
                 world.clocks.end(number, agent)
@@ -69,8 +83,9 @@ class AgentFaultEffects:
                 assert_never(fault)
 
 
-def _event(operation: DisturbAgents, agent: int, t_s: float, by: By) -> AgentFaultRunEvent:
-    fault = operation.fault
+def _event(
+    operation: DisturbAgents, fault: FaultOfEach, agent: int, t_s: float, by: By
+) -> AgentFaultRunEvent:
     common: dict[str, Any] = {
         "t_s": t_s,
         "agent": agent,
@@ -89,3 +104,16 @@ def _event(operation: DisturbAgents, agent: int, t_s: float, by: By) -> AgentFau
         case StarveFault(cpu_percent=cpu_percent, period_s=period_s):
             return Starved(**common, cpu_percent=cpu_percent, period_s=period_s)
     assert_never(fault)
+
+
+def _intruded(operation: DisturbAgents, fault: Intruder, t_s: float, by: By) -> Intruded:
+    return Intruded(
+        t_s=t_s,
+        agent=None,
+        planned=True,
+        by=by,
+        number=operation.number,
+        agents=None if operation.ends else operation.agents,
+        per_s=fault.rate,
+        nobody=fault.agents if fault.agents and not operation.agents else None,
+    )

@@ -35,7 +35,7 @@ from worldsim.judge.run_events import RunEvent
 from worldsim.scenario.decoding import decode
 from worldsim.scenario.event_checks import problem_now
 from worldsim.scenario.events import EventTable
-from worldsim.scenario.faults import MissionChange, ProcessFault, StopWorld
+from worldsim.scenario.faults import Intruder, MissionChange, ProcessFault, StopWorld
 from worldsim.scenario.foreseen_fleet import FleetNow
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.timeline import Step
@@ -140,7 +140,8 @@ class Control:
         problem = problem_now(self._scenario, event, self._fleet_now())
         if problem is not None:
             raise RequestError(": ".join(part for part in problem if part))
-        if isinstance(event.action, ProcessFault | StopWorld | Outage) and not self._launcher:
+        by_launcher = ProcessFault | Intruder | StopWorld | Outage
+        if isinstance(event.action, by_launcher) and not self._launcher:
             raise RequestError(f"{event.kind}: this fleet has no launcher; do it by hand")
         return event
 
@@ -192,7 +193,7 @@ class Control:
             case None:
                 raise RequestError(f"{kind}: nothing to do")
             case EndProcesses() | PauseProcesses() | ResumeProcesses() | DisturbAgents():
-                if not operation.agents:
+                if operation.selectors and not operation.agents:
                     selectors = list(operation.selectors)
                     raise RequestError(f"{kind}: no agent in {selectors} can do that now")
                 return operation

@@ -18,6 +18,10 @@ from worldsim.fleet.ipc import (
     AgentStarted,
     FromWorld,
     FromZygote,
+    IntruderEndRequest,
+    IntruderExited,
+    IntruderRequest,
+    IntruderStarted,
     LauncherToWorld,
     LauncherToZygote,
     MessageError,
@@ -97,7 +101,8 @@ class FleetMonitor:
         messages = self._received(self._zygote.receive)
         for message in messages:
             self._handle_zygote(message)
-        if not self.run_over and any(isinstance(each, AgentStarted) for each in messages):
+        started = any(isinstance(each, AgentStarted | IntruderStarted) for each in messages)
+        if not self.run_over and started:
             self._table.write()
 
     def receive_from_world(self) -> None:
@@ -167,6 +172,11 @@ class FleetMonitor:
                 self._agent_exited(message)
             case ActionDone():
                 self._world.send(message)
+            case IntruderStarted(number=number, pid=pid):
+                self._table.add(f"intruder-{number}", pid)
+            case IntruderExited(number=number, exit=process_exit):
+                name = f"intruder-{number}"
+                self._terminal.print(f"{name} {process_exit}; {self.log_tail(name)}")
             case _:
                 assert_never(message)
 
@@ -177,6 +187,8 @@ class FleetMonitor:
                 self._terminal.show(message)
             case ActionRequest() | OtherProcessRequest():
                 self._relay(message)
+            case IntruderRequest() | IntruderEndRequest():
+                self._zygote.send(message)
             case ProcessesMissing(names=names):
                 self._missing = names
             case Stalled(waiting_for=waiting_for):

@@ -41,7 +41,7 @@ from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
 from worldsim.fleet.control import Control, ControlServer
 from worldsim.fleet.culprits import Culprits
 from worldsim.fleet.delivery_latency import DeliveryLatency, LatencyCollector
-from worldsim.fleet.ipc import AgentProcess
+from worldsim.fleet.ipc import AgentProcess, IntruderEndRequest, IntruderRequest, ProcessAction
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.netem_process import NetemProcess
 from worldsim.fleet.overload import REMEDIES, LateSpells, Overload, percent
@@ -56,6 +56,7 @@ from worldsim.judge.event import By
 from worldsim.judge.run_events import LateStart
 from worldsim.judge.tick import Packets
 from worldsim.results.summary import OverloadRow
+from worldsim.scenario.faults import Intruder
 from worldsim.scenario.tables import Scenario
 
 START_WITHIN_S = 5.0
@@ -177,6 +178,13 @@ class FreeRunningFleet:
             else 0
         )
         return self._latency.summary(delivered)
+
+    @property
+    def messages(self) -> Mapping[int, int]:
+        """How many messages each intruder has put, by its fault's number."""
+        numbers = [each.number for each in self.loop.effects.faults.all if each.kind == "intruder"]
+        put = {number: self._launcher.messages_put(number) for number in numbers}
+        return {number: count for number, count in put.items() if count is not None}
 
     @property
     def rejected(self) -> Mapping[str, int]:
@@ -427,23 +435,22 @@ class ProcessActions:
         incarnations: of all agents, as they were before the operation.
         """
         match operation:
-            case EndProcesses(agents=agents):
-                self._launcher.request("kill", _processes(agents, incarnations))
-            case PauseProcesses(agents=agents):
-                self._launcher.request("pause", _processes(agents, incarnations))
-            case ResumeProcesses(agents=agents):
-                self._launcher.request("resume", _processes(agents, incarnations))
+            case EndProcesses() | PauseProcesses() | ResumeProcesses():
+                processes = _processes(operation.agents, incarnations)
+                self._launcher.request(_action(operation), processes)
             case ThrottleProcesses(stops=stops, continues=continues):
                 self._launcher.request("pause", _processes(stops, incarnations))
                 self._launcher.request("resume", _processes(continues, incarnations))
             case StartProcesses(incarnations=started):
                 self._startup.expect(started)
-                processes = [AgentProcess(*each) for each in started.items()]
-                self._launcher.request("start", processes, self._after_s)
+                starting = [AgentProcess(*each) for each in started.items()]
+                self._launcher.request("start", starting, self._after_s)
             case AdmitAgents(agents=agents):
                 return self._startup.absent(agents)
             case FaultOrder():
                 self._netem.order(operation, slot)
+            case DisturbAgents(fault=Intruder() as intruder):
+                self._intrude(operation, intruder)
             case (
                 SetSensorMode() | DisturbAgents() | GiveMission() | StopWorldProcess() | FillDisk()
             ):
@@ -451,6 +458,25 @@ class ProcessActions:
             case _:
                 assert_never(operation)
         return []
+
+    def _intrude(self, operation: DisturbAgents, intruder: Intruder) -> None:
+        """Start or end an intruder; one for which no agent was found does not start."""
+        number, agents = operation.number, operation.agents
+        if operation.ends:
+            self._launcher.request_intruder(IntruderEndRequest(number))
+        elif agents or not intruder.agents:
+            self._launcher.request_intruder(IntruderRequest(number, agents, intruder.rate))
+
+
+def _action(operation: EndProcesses | PauseProcesses | ResumeProcesses) -> ProcessAction:
+    match operation:
+        case EndProcesses():
+            return "kill"
+        case PauseProcesses():
+            return "pause"
+        case ResumeProcesses():
+            return "resume"
+    assert_never(operation)
 
 
 def _processes(agents: Iterable[int], incarnations: Sequence[int]) -> list[AgentProcess]:

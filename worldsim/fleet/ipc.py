@@ -72,6 +72,20 @@ class WorldWoken(Message, frozen=True):
     """The world's pause is over."""
 
 
+class IntruderRequest(Message, frozen=True):
+    """Start the intruder of a fault; its process is named after the fault's number."""
+
+    number: Natural
+    agents: tuple[Natural, ...]  # whose passwords it has; none: it has no password
+    per_s: float  # messages on each key, or connections [1/s; wall time]
+
+
+class IntruderEndRequest(Message, frozen=True):
+    """Kill the intruder of a fault, where there is one."""
+
+    number: Natural
+
+
 class EndRequest(Message, frozen=True):
     """End all agents, then exit."""
 
@@ -88,6 +102,20 @@ class AgentExited(Message, frozen=True):
 
     process: AgentProcess
     pid: Pid
+    exit: ProcessExit
+
+
+class IntruderStarted(Message, frozen=True):
+    """An intruder's process was forked."""
+
+    number: Natural
+    pid: Pid
+
+
+class IntruderExited(Message, frozen=True):
+    """An intruder's process has ended by itself."""
+
+    number: Natural
     exit: ProcessExit
 
 
@@ -140,11 +168,12 @@ class RunOver(Message, frozen=True):
     """The run has ended; every exit from now on is expected."""
 
 
-ToZygote = ActionRequest | EndRequest
-FromZygote = AgentStarted | AgentExited | ActionDone
+ToZygote = ActionRequest | IntruderRequest | IntruderEndRequest | EndRequest
+FromZygote = AgentStarted | AgentExited | ActionDone | IntruderStarted | IntruderExited
 ToWorld = AgentExited | ActionDone | WorldWoken | RunFailed
 Report = Progress | Stalled | Notice
-FromWorld = ActionRequest | OtherProcessRequest | ProcessesMissing | Report | RunOver
+Request = ActionRequest | OtherProcessRequest | IntruderRequest | IntruderEndRequest
+FromWorld = Request | ProcessesMissing | Report | RunOver
 
 Sent = TypeVar("Sent", bound=Message)
 Received = TypeVar("Received", bound=Message)

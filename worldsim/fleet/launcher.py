@@ -18,6 +18,7 @@ from worldsim.fleet import process as world_process
 from worldsim.fleet.culprits import SharedSteps
 from worldsim.fleet.fleet_monitor import FleetMonitor, ProcessSockets, StartError
 from worldsim.fleet.fork import adopt_orphans, end_orphans
+from worldsim.fleet.intruder import IntruderCounts
 from worldsim.fleet.ipc import (
     ActionRequest,
     AgentProcess,
@@ -94,6 +95,7 @@ class Launcher:
         self._endpoint = f"tcp/127.0.0.1:{_free_port()}"
         self._access = AccessControl(directory.users, options.run, scenario.rows)
         self._steps = SharedSteps.of(scenario.rows, options.shards)
+        self._counts = IntruderCounts()
         self._table = ProcessTable(directory.path, options.run, self._endpoint)
         self._zygote, self._zygote_end = zygote_sockets()
         self._world, self._world_end = world_sockets()
@@ -222,6 +224,7 @@ class Launcher:
             long_lease=self._options.lockstep,
             users=self._directory.users,
             steps=self._steps.page,
+            counts=self._counts,
         )
         return Zygote(self._zygote_end, config).serve()
 
@@ -239,7 +242,7 @@ class Launcher:
             self._scenario,
             lambda: self._directory,
             self._options,
-            lambda _: LaunchedLink(self._world_end, self._steps),
+            lambda _: LaunchedLink(self._world_end, self._steps, self._counts),
         )
 
 

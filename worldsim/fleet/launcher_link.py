@@ -12,11 +12,14 @@ from typing import NamedTuple, Protocol, assert_never
 
 from worldsim.fleet.culprits import SharedSteps
 from worldsim.fleet.fork import ProcessExit
+from worldsim.fleet.intruder import IntruderCounts
 from worldsim.fleet.ipc import (
     ActionDone,
     ActionRequest,
     AgentExited,
     AgentProcess,
+    IntruderEndRequest,
+    IntruderRequest,
     MessageError,
     Notice,
     OtherProcessRequest,
@@ -96,6 +99,12 @@ class LauncherLink(Protocol):
     def has_done(self, action: ProcessAction, processes: Sequence[AgentProcess]) -> bool:
         """Return whether a requested action has taken effect; True once for each request."""
 
+    def request_intruder(self, request: IntruderRequest | IntruderEndRequest) -> None:
+        """Request the start or the end of an intruder."""
+
+    def messages_put(self, number: int) -> int | None:
+        """Return how many messages the intruder of a fault has put; None where nobody counts."""
+
     def report_missing(self, names: Iterable[str]) -> None:
         """Report which processes are missing at the start; no names: none is missing."""
 
@@ -117,8 +126,14 @@ class LaunchedLink:
 
     controls_processes = True
 
-    def __init__(self, launcher: WorldToLauncher, steps: SharedSteps | None = None) -> None:
+    def __init__(
+        self,
+        launcher: WorldToLauncher,
+        steps: SharedSteps | None = None,
+        counts: IntruderCounts | None = None,
+    ) -> None:
         self.steps = steps
+        self._counts = counts
         self._launcher = launcher
         self._exits: list[AgentExit] = []
         self._done: list[ActionDone] = []
@@ -176,6 +191,14 @@ class LaunchedLink:
             return False
         self._done.remove(done)
         return True
+
+    def request_intruder(self, request: IntruderRequest | IntruderEndRequest) -> None:
+        """Ask the launcher for it."""
+        self._launcher.send(request)
+
+    def messages_put(self, number: int) -> int | None:
+        """Return how many messages the intruder of a fault has put."""
+        return self._counts.read(number) if self._counts is not None else None
 
     def report_missing(self, names: Iterable[str]) -> None:
         """Tell the launcher which processes are missing."""
@@ -275,6 +298,14 @@ class ManualLink:
     def has_done(self, action: ProcessAction, processes: Sequence[AgentProcess]) -> bool:
         """Refuse: no action was accepted. Raises LookupError."""
         raise LookupError(f"no request to {action} {names_of(processes)} was accepted")
+
+    def request_intruder(self, request: IntruderRequest | IntruderEndRequest) -> None:
+        """Refuse: nothing here starts processes. Raises LookupError."""
+        raise LookupError(f"no launcher starts or ends intruder-{request.number}")
+
+    def messages_put(self, number: int) -> int | None:
+        """Return None: nobody counts them."""
+        return None
 
     def report_missing(self, names: Iterable[str]) -> None:
         """Print which processes are missing, at most every two seconds."""

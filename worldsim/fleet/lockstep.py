@@ -79,6 +79,8 @@ class LockstepFleet:
     delivery: None = None
     rejected: Mapping[str, int] = {}
     """Always empty: a message that the world rejects ends the run."""
+    messages: Mapping[int, int] = {}
+    """Always empty: no intruder is started, for a message out of turn would end the run."""
 
     def __init__(
         self,

@@ -164,4 +164,5 @@ def _finished(
         failure=fleet.failure,
         rejected_by_world=fleet.rejected,
         delivery=msgspec.to_builtins(fleet.delivery),
+        messages=fleet.messages,
     )

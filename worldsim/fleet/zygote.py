@@ -19,7 +19,9 @@ from typing import NamedTuple, assert_never
 
 from agent import process as agent_process
 from agent.step_page import CLOSED_FILES, StepPage
+from worldsim.fleet import intruder
 from worldsim.fleet.fork import ProcessExit, adopt_orphans, end_orphans, fork, reap
+from worldsim.fleet.intruder import Attack, IntruderCounts
 from worldsim.fleet.ipc import (
     ActionDone,
     ActionRequest,
@@ -27,6 +29,10 @@ from worldsim.fleet.ipc import (
     AgentProcess,
     AgentStarted,
     EndRequest,
+    IntruderEndRequest,
+    IntruderExited,
+    IntruderRequest,
+    IntruderStarted,
     MessageError,
     ToZygote,
     ZygoteToLauncher,
@@ -50,6 +56,7 @@ class AgentProcessConfig(NamedTuple):
     long_lease: bool = False  # a silent agent keeps its session for long (lockstep)
     users: Path | None = None  # file of passwords, where the router requires one
     steps: StepPage | None = None  # where agents note their steps
+    counts: IntruderCounts | None = None  # where intruders count their messages
 
 
 class Zygote:
@@ -63,6 +70,7 @@ class Zygote:
         self._launcher = launcher
         self._config = config
         self._agents: dict[int, AgentProcess] = {}  # by pid
+        self._intruders: dict[int, int] = {}  # pids, by their faults' numbers
         self._selector = selectors.DefaultSelector()
         self._ending = False
         self._status = 0
@@ -84,6 +92,8 @@ class Zygote:
         return self._status
 
     def _end_agents(self) -> None:
+        for number in list(self._intruders):
+            self._end_intruder(number)
         self._signal_all(signal.SIGTERM)
         self._signal_all(signal.SIGCONT)  # a paused agent handles SIGTERM once it continues
         deadline = time.monotonic() + END_WITHIN_S
@@ -113,10 +123,51 @@ class Zygote:
                 for process in message.processes:
                     self._act_on(process, message)
                 self._launcher.send(ActionDone(message.action, message.processes))
+            case IntruderRequest():
+                self._start_intruder(message)
+            case IntruderEndRequest(number=number):
+                self._end_intruder(number)
             case EndRequest():
                 self._ending = True
             case _:
                 assert_never(message)
+
+    def _start_intruder(self, request: IntruderRequest) -> None:
+        number, config = request.number, self._config
+        attack = Attack(config.run, config.endpoint, config.users, request.agents, request.per_s)
+
+        def main() -> int:
+            self._launcher.close()
+            _limit_resources()
+            counts = config.counts if config.counts is not None else IntruderCounts()
+            return intruder.run(attack, counts.row(number))
+
+        pid = fork(config.logs / f"intruder-{number}.log", signal.SIGKILL, main)
+        exit_descriptor = os.pidfd_open(pid)
+        self._intruders[number] = pid
+        self._selector.register(
+            exit_descriptor,
+            selectors.EVENT_READ,
+            lambda: self._reap_intruder(exit_descriptor, number, pid),
+        )
+        self._launcher.send(IntruderStarted(number, pid))
+
+    def _end_intruder(self, number: int) -> None:
+        """Kill an intruder and wait until it is gone: it must not outlive its fault."""
+        pid = self._intruders.pop(number, None)
+        if pid is not None:
+            os.kill(pid, signal.SIGKILL)
+            os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+
+    def _reap_intruder(self, exit_descriptor: int, number: int, pid: int) -> None:
+        process_exit = reap(pid)
+        if process_exit is None:
+            return
+        self._selector.unregister(exit_descriptor)
+        os.close(exit_descriptor)
+        if self._intruders.get(number) == pid:
+            del self._intruders[number]
+            self._launcher.send(IntruderExited(number, process_exit))
 
     def _act_on(self, process: AgentProcess, request: ActionRequest) -> None:
         match request.action:

@@ -20,6 +20,7 @@ from worldsim.judge.run_events import (
     DiskFilled,
     FormationGiven,
     FrameGiven,
+    Intruded,
     Joined,
     Killed,
     LateStart,
@@ -56,6 +57,7 @@ WARNINGS = (
     Partitioned,
     Jammed,
     Sabotaged,
+    Intruded,
     NetemOutage,
     WorldStopped,
     LateStart,
@@ -81,7 +83,7 @@ def _words(event: RunEvent, queues: Queues) -> str:
             words = _returned(event)
         case SensorChanged(agent=agent, sensor=sensor, mode=mode):
             words = f"sensors of a{agent} ({sensor}): {mode}"
-        case ClockChanged() | PoseChanged() | SlowChanged() | Starved():
+        case ClockChanged() | PoseChanged() | SlowChanged() | Starved() | Intruded():
             words = _agent_fault(event)
         case FormationGiven() | FrameGiven():
             words = _mission(event)
@@ -131,7 +133,9 @@ def _returned(event: ReturnEvent) -> str:
     assert_never(event)
 
 
-def _agent_fault(event: AgentFaultRunEvent) -> str:
+def _agent_fault(event: AgentFaultRunEvent | Intruded) -> str:
+    if isinstance(event, Intruded):
+        return _intruded(event)
     return _agent_fault_over(event) if event.ends else _agent_fault_begun(event)
 
 
@@ -174,6 +178,17 @@ def _pose_error(event: PoseChanged) -> str:
     noise = [f"noise {event.noise_m:g} m"] if event.noise_m else []
     yaw = [f"yaw {event.bias_yaw_deg:+g} deg"] if event.bias_yaw_deg else []
     return ", ".join(bias + noise + yaw)
+
+
+def _intruded(event: Intruded) -> str:
+    if event.nobody is not None:
+        return f"intruder: no agent matches {_list(event.nobody)}"
+    if event.agents is None:
+        return "the intruder ended"
+    if not event.agents:
+        return f"an intruder without a password opens {event.per_s:g} connections a second"
+    agents = ", ".join(f"a{agent}" for agent in event.agents)
+    return f"an intruder with the password of {agents} puts {event.per_s:g} messages a second"
 
 
 def _mission(event: MissionRunEvent) -> str:

@@ -40,6 +40,7 @@ from worldsim.judge.run_events import (
     DiskFilled,
     FormationGiven,
     FrameGiven,
+    Intruded,
     Joined,
     Killed,
     LateStart,
@@ -135,7 +136,14 @@ class Invariants:
             case WorldStopped() | Reconnected():
                 self._unobserved = isinstance(event, WorldStopped)
                 self._fault(event.t_s, event.t_s)
-            case SlotChanged() | QueueChanged() | SensorChanged() | LateStart() | DiskFilled():
+            case (
+                SlotChanged()
+                | QueueChanged()
+                | SensorChanged()
+                | Intruded()
+                | LateStart()
+                | DiskFilled()
+            ):
                 pass
             case _:
                 assert_never(event)

@@ -124,6 +124,19 @@ class Starved(AgentFaultEvent, frozen=True, tag="starve"):
         return (1.0 - 0.01 * self.cpu_percent) * self.period_s
 
 
+class Intruded(PlannedEvent, frozen=True, kw_only=True, tag="intruder"):
+    """A process outside the fleet began to attack the router, or ended."""
+
+    number: int
+    """The fault's number."""
+    agents: tuple[int, ...] | None
+    """Whose passwords it has; none: it has no password; None: it ended."""
+    per_s: float
+    """Messages on each key, or connections [1/s; wall time]."""
+    nobody: tuple[int | str, ...] | None = None
+    """The selectors, where they selected no agent."""
+
+
 class MissionEvent(PlannedEvent, frozen=True, kw_only=True):
     """A mission was given to an agent."""
 
@@ -208,6 +221,7 @@ RunEvent = (
     | RadioRunEvent
     | SensorChanged
     | AgentFaultRunEvent
+    | Intruded
     | MissionRunEvent
     | SlotChanged
     | QueueChanged

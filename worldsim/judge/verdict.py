@@ -34,6 +34,7 @@ from worldsim.judge.run_events import (
     DiskFilled,
     FormationGiven,
     FrameGiven,
+    Intruded,
     Joined,
     Killed,
     LateStart,
@@ -164,7 +165,14 @@ class Judge:
                 self._held.open_window(event.t_s)
             case WorldStopped() | Reconnected():
                 self._handle_stop(event)
-            case SlotChanged() | QueueChanged() | RoleChanged() | LateStart() | DiskFilled():
+            case (
+                SlotChanged()
+                | QueueChanged()
+                | RoleChanged()
+                | Intruded()
+                | LateStart()
+                | DiskFilled()
+            ):
                 pass
             case _:
                 assert_never(event)

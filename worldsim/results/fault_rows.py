@@ -36,6 +36,7 @@ class FaultRow(TypedDict):
     frames: int | None  # times the links on which the fault cut, altered or sent them
     steps: int | None  # that took long, or did not take place
     readings: int | None  # of sensors or clocks, that differ from the true ones
+    messages: int | None  # of an intruder; None where there is no router, too
     process: str | None  # "netem" or "world", of a fault that strikes no agent
     observations: int | None  # that no agent got while netem was down
     stopped_s: float | None  # wall time that the world stood still
@@ -47,10 +48,11 @@ def fault_rows(
     frames: Mapping[int, int] | None,
     readings: Mapping[int, int],
     steps: Mapping[int, int],
+    messages: Mapping[int, int],
 ) -> list[FaultRow]:
     """Return the faults with what they struck.
 
-    frames, readings, steps: how many each fault struck, by its number; frames None: nobody counted
+    frames, readings, steps, messages: of each fault, by its number; frames None: nobody counted
     them.
     """
     return [
@@ -64,6 +66,7 @@ def fault_rows(
             "frames": frames.get(each.number, 0) if each.on_radio and frames is not None else None,
             "steps": steps.get(each.number, 0) if each.kind in STEPS else None,
             "readings": readings.get(each.number, 0) if each.kind in READ else None,
+            "messages": messages.get(each.number),
             "process": each.process,
             "observations": each.observations if each.process == "netem" else None,
             "stopped_s": _stopped_s(each),
@@ -96,9 +99,10 @@ def idle_text(rows: Sequence[FaultRow]) -> str | None:
 
 
 def _is_idle(row: FaultRow) -> bool:
-    keys = ("frames", "readings", "steps", "observations", "stopped_s", "writes")
+    keys = ("frames", "readings", "steps", "messages", "observations", "stopped_s", "writes")
     counts: list[float | None] = [row[key] for key in keys]  # type: ignore[literal-required]
-    if row["readings"] is None and row["steps"] is None and row["agents"] is not None:
+    counted = row["readings"] is not None or row["steps"] is not None or row["kind"] == "intruder"
+    if not counted and row["agents"] is not None:
         counts.append(len(row["agents"]))
     return any(count == 0 for count in counts)
 
@@ -128,11 +132,10 @@ def _struck(row: FaultRow) -> str:
     agents = _named(row["agents"] or [])
     if row["steps"] is not None or row["readings"] is not None:
         return f"{_of_agents(row)} of {agents}"
-    if row["kind"] == "sabotage" and row["frames"] is not None:
-        return f"sent others {_counted(row['frames'], 'frame')} by the radio of {agents}"
+    if row["kind"] == "intruder":
+        return _put(row["messages"])
     if row["frames"] is not None:
-        done = "changed the links of" if row["kind"] == "netem" else "cut"
-        return f"{done} {_counted(row['frames'], 'frame')}"
+        return _frames(row["kind"], _counted(row["frames"], "frame"), agents)
     return f"struck {agents}" if row["agents"] else "not counted"
 
 
@@ -141,6 +144,18 @@ def _of_agents(row: FaultRow) -> str:
     if row["steps"] is not None:
         return f"{STEPS[row['kind']]} {_counted(row['steps'], 'step')}"
     return f"changed {_counted(row['readings'] or 0, READ[row['kind']])}"
+
+
+def _put(messages: int | None) -> str:
+    if messages is None:
+        return "left out: it needs processes that run freely"
+    return f"put {_counted(messages, 'message')}"
+
+
+def _frames(kind: str, frames: str, agents: str) -> str:
+    if kind == "sabotage":
+        return f"sent others {frames} by the radio of {agents}"
+    return f"{'changed the links of' if kind == 'netem' else 'cut'} {frames}"
 
 
 def _stop(row: FaultRow) -> str:

@@ -81,6 +81,7 @@ class FinishedRun:
     resources: "ResourcesRow | None" = None  # of the processes of a launched fleet
     rejected_by_world: Mapping[str, int] = field(default_factory=dict)  # messages by cause
     delivery: "DeliveryRow | None" = None  # of frames that agents used
+    messages: Mapping[int, int] = field(default_factory=dict)  # of intruders, by a fault's number
 
     @property
     def duration_s(self) -> float:
@@ -250,6 +251,7 @@ def _fault_rows(run: FinishedRun) -> list[FaultRow]:
         dict(counters.struck) if counters is not None else None,
         run.loop.world.readings_struck,
         run.loop.effects.slow.struck | run.loop.effects.starvation.struck,
+        run.messages,
     )
 
 

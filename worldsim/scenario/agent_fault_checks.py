@@ -2,7 +2,14 @@
 
 from typing import assert_never
 
-from worldsim.scenario.faults import AgentFault, ClockFault, PoseFault, SlowFault, StarveFault
+from worldsim.scenario.faults import (
+    AgentFault,
+    ClockFault,
+    Intruder,
+    PoseFault,
+    SlowFault,
+    StarveFault,
+)
 from worldsim.scenario.problem import Problem
 
 
@@ -13,7 +20,7 @@ def agent_fault_problem(fault: AgentFault, at_s: float) -> Problem | None:
             return _clock_problem(fault, at_s)
         case PoseFault():
             return _pose_problem(fault)
-        case SlowFault() | StarveFault():
+        case SlowFault() | StarveFault() | Intruder():
             return None  # their numbers are within their bounds
     assert_never(fault)
 

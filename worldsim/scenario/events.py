@@ -16,6 +16,7 @@ from worldsim.scenario.faults import (
     ClockFault,
     DiskFull,
     EndFault,
+    Intruder,
     Join,
     Joiners,
     Kill,
@@ -62,6 +63,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     pose: agents measure their poses wrong.
     starve: agents' processes run only for a share of each period.
     slow: each step of agents takes a time; meanwhile they hear nothing, and they answer late.
+    intruder: a process outside the fleet attacks its router.
     end: ends a fault by its name, which is its kind and the event's index, as in "jam-2", unless
     ``name`` gives another one. formation, frame: a mission for the team.
     """
@@ -82,6 +84,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     pose: PoseFault | None = None
     slow: SlowFault | None = None
     starve: StarveFault | None = None
+    intruder: Intruder | None = None
     end: str | None = None
     formation: FormationSpec | None = None
     frame: FrameChange | None = None
@@ -114,7 +117,7 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     @property
     def agent_fault(self) -> AgentFault | None:
         """The fault of single agents whose key is set; None where there is none."""
-        return self.clock or self.pose or self.slow or self.starve
+        return self.clock or self.pose or self.slow or self.starve or self.intruder
 
     def called(self, number: int) -> str:
         """Return the event's name. number: its index, or the number of an operator's event."""
@@ -172,6 +175,7 @@ _OF_AGENTS = (
     "pose",
     "slow",
     "starve",
+    "intruder",
 )
 UNDOABLE = ("kill", "leave", "pause", *_LASTING, "sensor", *_OF_AGENTS, "disk_full")
 """The keys of the actions that ``for_s`` can undo."""

@@ -12,7 +12,7 @@ from msgspec import Meta
 from agent.config import SensorKind, Table
 from agent.qstructure.formation import FormationSpec
 from netem.faults import OutageCause, RadioFault, SabotageKeys
-from worldsim.scenario.selectors import Selectors
+from worldsim.scenario.selectors import Selector, Selectors
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.target_frame import FrameChange
 
@@ -122,6 +122,24 @@ class StarveFault(Table, frozen=True):
     """[s; simulated time]"""
 
 
+class Intruder(Table, frozen=True):
+    """Let a process outside the fleet attack its router.
+
+    With agents it has their passwords, and puts messages on all keys that these agents may write
+    to. Without any it opens connections and sends noise.
+    """
+
+    kind: ClassVar[str] = "intruder"
+    agents: Annotated[tuple[Selector, ...], Meta(max_length=1000)] = ()
+    per_s: Annotated[float, Meta(ge=1, le=20_000)] | None = None
+    """Messages on each key, or connections [1/s; wall time]; None: 10 000, or 200 connections."""
+
+    @property
+    def rate(self) -> float:
+        """Messages on each key, or connections [1/s; wall time]."""
+        return self.per_s if self.per_s is not None else 1e4 if self.agents else 200.0
+
+
 class EndFault(msgspec.Struct, frozen=True):
     """End a fault before its time, or one that has no end."""
 
@@ -129,7 +147,9 @@ class EndFault(msgspec.Struct, frozen=True):
     """Its name."""
 
 
-AgentFault = ClockFault | PoseFault | SlowFault | StarveFault
+FaultOfEach = ClockFault | PoseFault | SlowFault | StarveFault
+"""A fault that strikes each of its agents by itself."""
+AgentFault = FaultOfEach | Intruder
 """A fault of single agents whose processes go on."""
 ProcessFault = Kill | Leave | Restart | Pause | Resume | Join
 MissionChange = FormationSpec | FrameChange
