@@ -29,6 +29,7 @@ from agent.messages import Beacon, Gossip, Observation
 from agent.rejection import RejectedError
 from netem.fault_queue import FaultQueue
 from netem.messages import SlotInput, SlotResult, Truth, unpack_slot_input, unpack_slot_result
+from netem.saboteur import garbage
 from netem.wire.frame import (
     Batch,
     Delivery,
@@ -54,6 +55,8 @@ WARM_SLOTS, WARM_S = 200, 2.5
 LIES = 100
 TICKS = 20
 STEP_EVERY = 500
+SABOTAGE_FROM = 0.95
+"""The rest of the radio's messages is what a saboteur calls garbage."""
 REFUSALS = (RejectedError, WireError, RequestError)
 ORDERS = b'{"slot":3,"orders":[{"type":"jam","number":1,"jam":{"centre_m":[0,0,0],"radius_m":2}}]}'
 REQUEST = b'{"event":{"kill":[2,"vertex:V1"],"for_s":3.0},"to":1,"version":4}'
@@ -111,6 +114,8 @@ class Fuzz:
     def _mutated(self, target: Target) -> bytes:
         random = self._random
         kind = random.random()
+        if target.checksum and kind > SABOTAGE_FROM:
+            return garbage(random.choice(target.whole), random)
         if kind < 0.1:
             return random.randbytes(random.randrange(0, 120))
         data = bytearray(random.choice(target.whole))

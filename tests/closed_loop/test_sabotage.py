@@ -58,6 +58,23 @@ def test_no_agent_flies_or_says_anything_else_than_without_the_saboteur(
 
 
 @pytest.mark.parametrize("kind", REJECTED)
+def test_an_agent_that_falls_silent_is_missed_as_without_the_saboteur(kind: str) -> None:
+    """Its frames go on, but none of them is news."""
+    silent = "at_s = 2.5\npause = [1]"
+    alone, beside = (
+        fly(scenario(CLEAN, silent)).loop,
+        fly(scenario(CLEAN, silent, sabotage(kind))).loop,
+    )
+    assert (alone.world.vehicles.position == beside.world.vehicles.position).all()
+    for agent in (0, 2, 3):
+        own, same = alone.world.latest[agent], beside.world.latest[agent]
+        assert own is not None
+        assert same is not None
+        assert own.telemetry.heard == same.telemetry.heard
+        assert 1 not in same.telemetry.heard
+
+
+@pytest.mark.parametrize("kind", REJECTED)
 def test_what_a_saboteur_sends_is_rejected_by_its_cause(kind: str) -> None:
     found = flown(kind).loop.rejections.by_cause()
     assert set(found) == REJECTED[kind]
