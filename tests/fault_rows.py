@@ -83,7 +83,14 @@ def starved(agents: str, from_s: float = AT_S) -> str:
     return at(f"starve = {{ agents = {agents}, cpu_percent = 20 }}", from_s, 15.0)
 
 
+def sabotage(kind: str, more: str = "") -> str:
+    """Return sabotage of two agents' radios, from before the team forms."""
+    return at(f"sabotage = {{ kind = '{kind}', agents = ['random:2']{more} }}", 1.0, 35.0)
+
+
 ONE = "agents = ['random:1']"
+KEPT = (("expect.in_formation_fraction", "1.0"),)
+"""Nobody leaves its place once the team has formed."""
 LONG: dict[str, Any] = {"radio": LOSSY, "lasts_s": 130.0, "converges_s": 60.0}
 ROWS = (
     Row("a follower leaves", (at("leave = [8]"),), 10.0),
@@ -165,6 +172,27 @@ ROWS = (
     Row("one starved, 20 %", (starved("['random:1']"),), 15.0, lasts_s=50.0),
     Row("all starved, 20 %", (starved("['all']"),), 15.0, lasts_s=50.0),
     Row("all starved, 20 %, lossy", (starved("['all']", 60.0),), 15.0, **LONG),
+    *(
+        Row(kind, (sabotage(kind),), 10.0, more=KEPT)
+        for kind in ("replay", "spoof", "garbage", "flood")
+    ),
+    *(
+        Row(f"{kind}, lossy", (sabotage(kind),), 10.0, LOSSY, 60.0, 30.0, KEPT)
+        for kind in ("replay", "spoof", "garbage", "flood")
+    ),
+    Row(
+        "a flood on a slow radio",
+        (radio("rate_kbit = 50, limit = 20"), sabotage("flood", ", per_s = 400")),
+        30.0,
+        lasts_s=80.0,
+    ),
+    Row(
+        "10 000 messages a second on each key",
+        (at("intruder = { agents = ['random:1'] }", 1.0, 30.0),),
+        10.0,
+        more=KEPT,
+    ),
+    Row("an intruder without a password", (at("intruder = {}", 1.0, 30.0),), 10.0, more=KEPT),
     Row(
         "a jam",
         (at("jam = { centre_m = [0, 0, 0], radius_m = 3 }", for_s=15.0),),
@@ -211,7 +239,7 @@ def processes(flights: list[Scenario], folder: Path) -> list[dict[str, Any]]:
     for n, flight in enumerate(flights):
         file, out = folder / f"{n}.toml", folder / str(n)
         file.write_text(dump(flight), "utf-8")
-        words = (sys.executable, "-m", "worldsim", "run", file, "--out", out, "--no-recording")
+        words = (*QSWARM, "run", file, "--out", out, "--no-recording")
         made = subprocess.run(words, check=False, capture_output=True, text=True)
         summary = out / "summary.json"
         error = {"error": made.stderr or made.stdout}
