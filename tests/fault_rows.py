@@ -88,6 +88,11 @@ def sabotage(kind: str, more: str = "") -> str:
     return at(f"sabotage = {{ kind = '{kind}', agents = ['random:2']{more} }}", 1.0, 35.0)
 
 
+def sensors(mode: str) -> str:
+    """Return a failure of two agents' sensors that lasts 15 s, from before the team forms."""
+    return at(f"sensor = {{ agents = ['random:2'], mode = '{mode}' }}", 2.0, 15.0)
+
+
 ONE = "agents = ['random:1']"
 KEPT = (("expect.in_formation_fraction", "1.0"),)
 """Nobody leaves its place once the team has formed."""
@@ -193,6 +198,10 @@ ROWS = (
         more=KEPT,
     ),
     Row("an intruder without a password", (at("intruder = {}", 1.0, 30.0),), 10.0, more=KEPT),
+    *(
+        Row(f"sensors {mode}", (sensors(mode),), 15.0, lasts_s=50.0)
+        for mode in ("silent", "stuck", "wrong")
+    ),
     Row(
         "a jam",
         (at("jam = { centre_m = [0, 0, 0], radius_m = 3 }", for_s=15.0),),
