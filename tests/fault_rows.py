@@ -199,7 +199,7 @@ ROWS = (
     ),
     Row("an intruder without a password", (at("intruder = {}", 1.0, 30.0),), 10.0, more=KEPT),
     *(
-        Row(f"sensors {mode}", (sensors(mode),), 15.0, lasts_s=50.0)
+        Row(f"sensors {mode}", (sensors(mode),), 15.0, lasts_s=50.0, converges_s=32.0)
         for mode in ("silent", "stuck", "wrong")
     ),
     Row(
