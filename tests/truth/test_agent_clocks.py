@@ -1,6 +1,6 @@
 """Clocks that are wrong: the errors of faults in force add up, and each ends by itself."""
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from worldsim.truth.agent_clocks import AgentClocks, ClockError
@@ -13,6 +13,7 @@ errors = st.builds(
 )
 
 
+@settings(derandomize=True, deadline=None)
 @given(st.lists(errors, min_size=1, max_size=5), st.randoms(use_true_random=False))
 def test_errors_add_up_and_end_in_any_order(given_errors, random):
     clocks, left = AgentClocks(), dict(enumerate(given_errors))

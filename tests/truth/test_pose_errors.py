@@ -4,7 +4,7 @@ from math import dist, hypot, pi, radians
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from worldsim.truth.pose_errors import PoseError, PoseErrors
@@ -13,6 +13,7 @@ HERE = (1.0, 2.0, 3.0)
 biases = st.tuples(*[st.integers(-10, 10)] * 3)
 
 
+@settings(derandomize=True, deadline=None)
 @given(st.lists(biases, min_size=1, max_size=5), st.randoms(use_true_random=False))
 def test_biases_add_up_and_end_in_any_order(given_biases, random):
     errors, left = PoseErrors(1), dict(enumerate(given_biases))
@@ -40,6 +41,7 @@ def test_the_noise_is_keyed_by_seed_agent_and_slot_and_has_its_deviation():
     assert np.mean(drawn - HERE, axis=0) == pytest.approx([0.0] * 3, abs=0.04)
 
 
+@settings(derandomize=True, deadline=None)
 @given(st.floats(-pi, pi), st.floats(-5, 5), st.floats(-5, 5))
 def test_what_is_measured_and_what_is_flown_turn_against_each_other(yaw, x, y):
     errors = PoseErrors(1)

@@ -1,6 +1,6 @@
 """The own clock: slots tell of its jumps, and an agent doubts it only where all contradict it."""
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agent.comms.own_clock import CONTRADICTED_S, OwnClock
@@ -8,6 +8,7 @@ from agent.comms.own_clock import CONTRADICTED_S, OwnClock
 SLOT_S, SLACK_S = 0.0125, 0.1
 
 
+@settings(derandomize=True, deadline=None)
 @given(st.lists(st.tuples(st.integers(1, 400), st.floats(-200, 200)), min_size=1, max_size=20))
 def test_a_clock_jumps_exactly_where_it_differs_from_the_slots(steps):
     clock = OwnClock(SLOT_S, SLACK_S)
