@@ -198,6 +198,15 @@ ROWS = (
         more=KEPT,
     ),
     Row("an intruder without a password", (at("intruder = {}", 1.0, 30.0),), 10.0, more=KEPT),
+    Row("netem killed for 3 s", (at("kill = ['netem']", for_s=3.0),), 10.0, lasts_s=45.0),
+    Row("netem stopped for 3 s", (at("pause = ['netem']", for_s=3.0),), 10.0, lasts_s=45.0),
+    Row("netem stopped for 13 s", (at("pause = ['netem']", for_s=13.0),), 10.0, lasts_s=50.0),
+    Row(
+        "the world stopped for 5 s",
+        (at("pause = ['world']", for_s=5.0),),
+        10.0,
+        more=(("expect.idle_faults", "true"),),
+    ),
     *(
         Row(f"sensors {mode}", (sensors(mode),), 15.0, lasts_s=50.0, converges_s=32.0)
         for mode in ("silent", "stuck", "wrong")
