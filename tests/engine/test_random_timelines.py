@@ -220,7 +220,7 @@ def check(faults: list[Fault]) -> int:
     The conditions that the judge derives from the events must be those of the medium.
     """
     parsed = scenario(*(each.toml() for each in faults))
-    fleet = replace(parsed.fleet, tick_hz=10.0)
+    fleet = replace(parsed.fleet, tick_hz=5.0)
     flown = replace(parsed, duration_s=UNTIL / 10, fleet=fleet)
     loop = SlotLoop(flown, world_of(flown, command_ticks=1))
     model, told, heard, ticks = Model(), NetworkConditions(flown.netem), 0, 0

@@ -60,6 +60,11 @@ def push_two_sided(self, r, between_targets):
     return self.k_ob * slope * gap / r
 
 
+def pushes_far_away(self, r, between_targets):
+    """(23) on both sides also acts on agents that are farther apart than their targets."""
+    return False
+
+
 def bobber(q, yaw, q_toq, zone):
     """(1)-(3), (10) at unit weight: the least U_tcast + U_obcast in the cast-zone, on a grid."""
     near, far, theta = 0.05, zone.reach, zone.cone.left

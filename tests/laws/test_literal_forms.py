@@ -13,12 +13,13 @@ from agent.structure.tree import Tree
 from tests.laws import literal
 from tests.laws.laws import LAWS
 
+ON_BOTH_SIDES = {"_push": literal.push_two_sided, "_is_surely_apart": literal.pushes_far_away}
 LITERAL = {
     "E1": ("E1", Potential, {"gap_at_targets": literal.gap_at_targets}),
     "E1 floor": (
         "E1 floor",
         Potential,
-        {"gap_at_targets": literal.gap_at_targets_without_floor, "_push": literal.push_two_sided},
+        {"gap_at_targets": literal.gap_at_targets_without_floor, **ON_BOTH_SIDES},
     ),
     "E2": ("E2", Potential, {"omega": literal.omega}),
     "E3": (
@@ -27,7 +28,7 @@ LITERAL = {
         {
             "value": literal.value_two_sided,
             "slope": literal.slope_two_sided,
-            "_push": literal.push_two_sided,
+            **ON_BOTH_SIDES,
         },
     ),
     "E3 (b)": ("(a)-(c)", Potential, {"slope": literal.slope_two_sided}),
@@ -36,7 +37,7 @@ LITERAL = {
         Potential,
         {"value": literal.value_two_sided, "slope": literal.slope_two_sided},
     ),
-    "E3 Lemma 6": ("Lemma 6 (ii)", Potential, {"_push": literal.push_two_sided}),
+    "E3 Lemma 6": ("Lemma 6 (ii)", Potential, ON_BOTH_SIDES),
     "E1 Lemma 6": ("Lemma 6 (i)", Potential, {"gap_at_targets": literal.gap_at_targets}),
     "E2 (29)": ("(29)", Potential, {"omega": literal.omega}),
     "E4": ("E4 flown", Potential, {"__init__": literal.unit_weight}),

@@ -55,7 +55,8 @@ def test_a_fleet_outlives_an_outage_of_netem(
     outage = f"at_s = 4.5\nfor_s = 2\n{fault} = ['netem']"
     loss = "at_s = 5\nnetem = { loss_percent = 20 }"
     restart = "at_s = 7.5\nfor_s = 0.5\nkill = [3]"
-    fleet = launched(start, with_event(11.0, jam, outage, loss, restart), run, "--no-recording")
+    options = ("--no-recording", "--speed", "2")
+    fleet = launched(start, with_event(11.0, jam, outage, loss, restart), run, *options)
     fleet.wait_for_output("least separation")
     before = pids(run)["netem"]
     assert fleet.status(30.0) in (0, 1), fleet.text
@@ -104,15 +105,15 @@ def test_a_fleet_without_netem_hovers_to_the_end(
 def test_the_world_is_paused_and_woken(
     start: Start, with_event: Callable[..., str], run: Path
 ) -> None:
-    event = with_event(7.0, "at_s = 4\nfor_s = 1.5\npause = ['world']")
+    event = with_event(5.5, "at_s = 3\nfor_s = 1.5\npause = ['world']")
     fleet = launched(start, event, run)
     assert fleet.status(30.0) in (0, 1), fleet.text
     summary = summary_of(run)
     (row,) = summary["faults"]
-    assert (row["process"], row["from_s"], row["to_s"]) == ("world", 4.0, 4.0)
+    assert (row["process"], row["from_s"], row["to_s"]) == ("world", 3.0, 3.0)
     assert 1.4 < row["stopped_s"] < 3.0
     assert outages(run) == [("world_outage", False), ("reconnect", False)]
-    assert summary["duration_s"] == 7.0
+    assert summary["duration_s"] == 5.5
     assert summary["real_time_factor"] > 0.9, "the planned pause is no slowness"
     verification = verified(run)
     assert (verification.whole, verification.differences) == (True, ()), verification
