@@ -244,3 +244,43 @@ def test_rejected_messages_are_counted_by_component_and_cause(run: FinishedRun) 
     made = summary(run, medium_counters=by_medium, rejected_by_world={"stale": 3})
     assert made["rejected_by_cause"] == {"agents": {}, "netem": {"stale": 2}, "world": {"stale": 3}}
     assert made["packets"]["rejected"] == 5
+
+
+def flown_to(duration_s: float, **keys: str) -> Summary:
+    scenario = parse(SMALL, overrides={"duration_s": str(duration_s), **keys})
+    return summarise(scenario, finished(fly(scenario), scenario))
+
+
+def test_a_fault_that_never_ends_leaves_open_whether_the_team_re_forms() -> None:
+    pose = "[{ at_s = 3, pose = { agents = ['all'], bias_m = [0, 0, 0.5] } }]"
+    made = flown_to(16.0, event=pose, **{"expect.reform_within_s": "3"})
+    reason = "formation after a fault: one was in force to the end (limit 3 s)"
+    assert (made["outcome"], made["reason"]) == ("inconclusive", f"not judged: {reason}")
+
+
+def test_a_loss_is_not_blamed_for_what_another_fault_prevents() -> None:
+    pose = "{ at_s = 3, pose = { agents = [1], bias_m = [0, 0, 0.5] } }"
+    event = f"[{pose}, {{ at_s = 4, for_s = 1, kill = [0] }}]"
+    made = flown_to(16.0, event=event, **{"expect.reform_within_s": "3"})
+    assert made["outcome"] == "inconclusive"
+
+
+def test_without_a_limit_the_planned_duration_is_the_limit() -> None:
+    scenario = parse(
+        SMALL, overrides={"fleet.start": "{ kind = 'list', positions_m = [[9, 0, 0], [12, 0, 0]] }"}
+    )
+    made = summarise(scenario, finished(fly(scenario), scenario))
+    assert (made["outcome"], made["reason"]) == ("fail", "line did not converge in 5 s")
+    flight = fly(scenario, should_stop=StopAfter(40))
+    assert flight.loop.judge.expectations()[1].held is None
+
+
+class StopAfter:
+    """Asks a flight to stop after so many slots."""
+
+    def __init__(self, slots: int) -> None:
+        self._left = slots
+
+    def __call__(self) -> bool:
+        self._left -= 1
+        return self._left < 0

@@ -351,8 +351,9 @@ class Judge:
     def _converged(self, phase: Phase) -> Expectation:
         within_s, got_s = self._scenario.expect.converge_within_s, phase.converge_s
         held: bool | None = got_s is not None and (within_s is None or got_s <= within_s)
-        if got_s is None and within_s is not None:
-            held = None if phase.may_converge(within_s, self._end_s(phase)) else False
+        limit_s = self._planned_end_s - phase.from_s if within_s is None else within_s
+        if got_s is None and phase.may_converge(limit_s, self._end_s(phase)):
+            held = None
         name = f"converge {phase.formation.name}"
         return Expectation(name=name, wanted=within_s, got=got_s, held=held)
 
@@ -360,6 +361,11 @@ class Judge:
         """Return until when a formation was asked for, so far [s]."""
         later = self.phases[self.phases.index(phase) + 1 :]
         return later[0].from_s if later else self._until_s
+
+    @property
+    def _planned_end_s(self) -> float:
+        """When the run is to end, less a tick [s]: where nothing else is asked for, the limit."""
+        return self._scenario.duration_s - 1.0 / self._scenario.fleet.tick_hz
 
     @property
     def _until_s(self) -> float:
@@ -375,6 +381,8 @@ class Judge:
         held: bool | None = not any(time_s > within_s for time_s in known_s)
         if open_s and held:
             held = None if max(open_s) < within_s else False
+        if self._parting and not any(time_s > within_s for time_s in known_s):
+            held = None  # the fault that parts the team has not ended
         return Expectation(name="reform_within_s", wanted=within_s, got=worst_s, held=held)
 
     def _held_rows(self) -> list[Expectation]:

@@ -158,6 +158,8 @@ def _reform(row: ExpectationRow, run: Circumstances) -> str:
     if row["held"]:
         return f"formation restored within {row['got']:.3g} s of each fault{limit}"
     worst = _slowest(row, run)
+    if worst is None:
+        return f"formation after a fault: one was in force to the end{limit}"
     reformed_s = worst["reformed_s"]
     if reformed_s is not None:
         return f"{_change(worst)}: re-formed after {reformed_s:.3g} s{limit}"
@@ -165,15 +167,22 @@ def _reform(row: ExpectationRow, run: Circumstances) -> str:
     return f"{_change(worst)}: not re-formed{_within(row['wanted'], left)}"
 
 
-def _slowest(row: ExpectationRow, run: Circumstances) -> RecoveryRow:
-    """Return the recovery that took longest so far; of those without an end, where none is late."""
+def _slowest(row: ExpectationRow, run: Circumstances) -> RecoveryRow | None:
+    """Return the recovery that took longest so far; of those without an end, where none is late.
+
+    None where only a fault in force keeps the team from it.
+    """
 
     def lasted_s(recovery: RecoveryRow) -> float:
         reformed_s = recovery["reformed_s"]
         return run.ended_s - recovery["t_s"] if reformed_s is None else reformed_s
 
+    if row["held"] is not None:
+        return max(run.recoveries, key=lasted_s)
     unended = [each for each in run.recoveries if each["reformed_s"] is None]
-    return max(unended if row["held"] is None else run.recoveries, key=lasted_s)
+    slowest = max(unended, key=lasted_s, default=None)
+    waits = slowest is not None and lasted_s(slowest) < row["wanted"]
+    return slowest if waits else None
 
 
 def _change(recovery: RecoveryRow) -> str:

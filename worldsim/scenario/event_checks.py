@@ -167,7 +167,7 @@ def _times_problem(event: EventTable, action: str) -> Problem | None:
             detail = f"{action} is not undone; {key} goes with {', '.join(UNDOABLE)}"
             return Problem(key, detail)
     if event.every_s is not None and event.every_s <= (event.for_s or 0.0):
-        return Problem("every_s", f"{event.every_s:g}; longer than for_s = {event.for_s:g}")
+        return Problem("every_s", f"{event.every_s:g}; must be longer than for_s = {event.for_s:g}")
     return None
 
 
