@@ -196,7 +196,7 @@ SENTENCES: list[tuple[dict[str, Any], str]] = [
         for keys, words in (
             (
                 {"agents": [2, 5]},
-                "an intruder with the password of a2, a5 puts 9 messages a second",
+                "an intruder with the passwords of a2, a5 puts 9 messages a second on each key",
             ),
             ({"agents": []}, "an intruder without a password opens 9 connections a second"),
             ({"agents": [], "nobody": ["vertex:V1"]}, "intruder: no agent matches vertex:V1"),

@@ -32,7 +32,9 @@ from worldsim.engine.process_life import (
 )
 from worldsim.engine.selection import Candidates, Claims, selected
 from worldsim.scenario.faults import (
+    MAX_PASSWORDS,
     AgentFault,
+    Intruder,
     Join,
     Kill,
     Leave,
@@ -163,6 +165,8 @@ class Membership:
         if ends:
             return DisturbAgents(number, self._struck_by.pop(number, ()), fault, ends=True)
         agents = self._selected(number, fault.agents, KNOWN, claims)
+        if isinstance(fault, Intruder):
+            agents = agents[:MAX_PASSWORDS]
         self._struck_by[number] = agents
         return DisturbAgents(number, agents, fault, ends=False)
 

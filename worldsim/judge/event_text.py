@@ -188,7 +188,8 @@ def _intruded(event: Intruded) -> str:
     if not event.agents:
         return f"an intruder without a password opens {event.per_s:g} connections a second"
     agents = ", ".join(f"a{agent}" for agent in event.agents)
-    return f"an intruder with the password of {agents} puts {event.per_s:g} messages a second"
+    rate = f"{event.per_s:g} messages a second on each key"
+    return f"an intruder with the passwords of {agents} puts {rate}"
 
 
 def _mission(event: MissionRunEvent) -> str:

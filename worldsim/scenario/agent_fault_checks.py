@@ -3,6 +3,7 @@
 from typing import assert_never
 
 from worldsim.scenario.faults import (
+    MAX_PASSWORDS,
     AgentFault,
     ClockFault,
     Intruder,
@@ -20,7 +21,9 @@ def agent_fault_problem(fault: AgentFault, at_s: float) -> Problem | None:
             return _clock_problem(fault, at_s)
         case PoseFault():
             return _pose_problem(fault)
-        case SlowFault() | StarveFault() | Intruder():
+        case Intruder():
+            return _intruder_problem(fault)
+        case SlowFault() | StarveFault():
             return None  # their numbers are within their bounds
     assert_never(fault)
 
@@ -32,6 +35,13 @@ def _clock_problem(fault: ClockFault, at_s: float) -> Problem | None:
         detail = f"{fault.offset_s:g}; at {at_s:g} s the clock would show less than 0 s"
         return Problem("offset_s", detail)
     return None
+
+
+def _intruder_problem(fault: Intruder) -> Problem | None:
+    named = sum(isinstance(selector, int) for selector in fault.agents)
+    if named <= MAX_PASSWORDS:
+        return None
+    return Problem("agents", f"{named} agents; an intruder has at most {MAX_PASSWORDS} passwords")
 
 
 def _pose_problem(fault: PoseFault) -> Problem | None:

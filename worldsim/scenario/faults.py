@@ -122,11 +122,15 @@ class StarveFault(Table, frozen=True):
     """[s; simulated time]"""
 
 
+MAX_PASSWORDS = 8
+"""An intruder has at most so many; of more agents that are selected, those of the first."""
+
+
 class Intruder(Table, frozen=True):
     """Let a process outside the fleet attack its router.
 
-    With agents it has their passwords, and puts messages on all keys that these agents may write
-    to. Without any it opens connections and sends noise.
+    With agents it has their passwords, of MAX_PASSWORDS at most, and puts messages on all keys that
+    these agents may write to. Without any it opens connections and sends noise.
     """
 
     kind: ClassVar[str] = "intruder"
