@@ -81,7 +81,8 @@ def test_a_fleet_outlives_an_outage_of_netem(
     in_air = packets["addressed"] - packets["in_flight"]
     fates = ("delivered", "dropped_range", "dropped_loss", "dropped_partition", "dropped_queue")
     assert in_air == sum(packets[name] for name in fates) + packets["dropped_medium"]
-    assert (packets["dropped_medium"] > 0) == (fault == "kill")
+    # The kill of agent 3 may drop what is on its way to it, also where netem was only paused.
+    assert packets["dropped_medium"] > 0 or fault == "pause"
     none_left(pids(run))
 
 

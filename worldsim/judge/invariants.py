@@ -315,7 +315,9 @@ class Invariants:
     def _evaluate_quiet(self, tick: Tick, last_claims: Claims, at_slots: bool) -> None:
         """Evaluate I7 once every agent of a settled team has been in its place for 2 s."""
         since_s = self._quiet_since_s
-        if since_s is not None and tick.time_s - since_s >= CONVERGED_S:
+        if self._twice_s == inf:
+            self._quiet_since_s = None  # a drifting clock makes news unbounded without an event
+        elif since_s is not None and tick.time_s - since_s >= CONVERGED_S:
             self.tallies["I7"].count(self._count_moves(tick.alive, last_claims))
         elif not at_slots or tick.time_s < self._settled_s:
             self._quiet_since_s = None
