@@ -5,7 +5,7 @@ exact far from the origin as at it. A verdict recomputed from the recording ther
 numbers of the first one.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, Final
 
 import numpy as np
@@ -32,6 +32,9 @@ class HierarchyRows:
     role: NDArray[np.int8]  # (N,), an index of agent.messages.ROLES, or NO_ROLE
     record_age_s: Float32s  # (N,), age [s] of the oldest team record, NaN for one not running
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return HierarchyRows, _values(self)
+
 
 @dataclass(frozen=True, slots=True)
 class Tick:
@@ -56,6 +59,14 @@ class Tick:
     """The newest counters; empty before the first come."""
     hierarchy: HierarchyRows | None = None
     """None where ticks are not recorded."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Tick, _values(self)
+
+
+def _values(rows: HierarchyRows | Tick) -> tuple[Any, ...]:
+    """Return the values of all fields: what to pickle, as the compiled classes have no slots."""
+    return tuple(getattr(rows, each.name) for each in fields(rows))
 
 
 def same_claims(one: Tick, other: Tick) -> bool:
