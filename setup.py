@@ -9,8 +9,7 @@ qswarm itself needs.
 
     QSWARM_COMPILED=1 pip wheel . --no-deps --no-build-isolation
 
-makes a wheel that holds them too, for this Python on this platform. QSWARM_COMPILED=quick compiles
-in less time what then runs slower: enough to see that it does the same.
+makes a wheel that holds them too, for this Python on this platform.
 """
 
 import json
@@ -37,7 +36,7 @@ from netem.compiled import FOLDER, IN_WHEEL, MANIFEST, digest_of  # noqa: E402
 from worldsim.results.provenance import RECORDED, commit_of  # noqa: E402
 
 WANTED = environ.get("QSWARM_COMPILED", "0")
-"""Whether a wheel is to be compiled: no ("0" or ""), "quick", or yes."""
+"""Whether a wheel is to be compiled: no ("0" or ""), or yes."""
 
 
 class BuildWhole(build_py):
@@ -56,7 +55,7 @@ class BuildWhole(build_py):
             shutil.copytree(ROOT / "deploy" / kind, built / "worldsim" / "library" / kind)
         (built / RECORDED).write_text(json.dumps(commit_of(ROOT)._asdict()) + "\n", "utf-8")
         if self.distribution.has_ext_modules():
-            _compile(built / IN_WHEEL.relative_to(ROOT), quick=WANTED == "quick")
+            _compile(built / IN_WHEEL.relative_to(ROOT))
 
 
 class BuildObjects(build_ext):
@@ -122,10 +121,10 @@ class Compile(Command):
 
     def run(self) -> None:
         """Compile."""
-        _compile(FOLDER, quick=False)
+        _compile(FOLDER)
 
 
-def _compile(folder: Path, *, quick: bool) -> None:
+def _compile(folder: Path) -> None:
     """Compile the hot modules into a folder; the manifest comes last.
 
     What was compiled there before stays away if this ends early.
@@ -139,7 +138,7 @@ def _compile(folder: Path, *, quick: bool) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     extensions = mypycify(
         sources,
-        opt_level="0" if quick else "1",  # 1 is as fast as 2, and built in two thirds of the time
+        opt_level="1",  # 1 is as fast as 2, and built in two thirds of the time
         debug_level="0",
         multi_file=True,
         group_name="qswarm",
@@ -152,7 +151,7 @@ def _compile(folder: Path, *, quick: bool) -> None:
     library = Distribution({"ext_modules": extensions, "cmdclass": {"build_ext": BuildObjects}})
     built = library.get_command_obj("build_ext")
     built.build_lib = str(folder)
-    built.build_temp = str(_folder_of_objects("quick" if quick else "fast"))
+    built.build_temp = str(_folder_of_objects())
     built.ensure_finalized()
     built.run()
     files = {each.name: str(Path(built.get_ext_filename(each.name))) for each in extensions}
@@ -160,15 +159,12 @@ def _compile(folder: Path, *, quick: bool) -> None:
     (folder / MANIFEST).write_text(json.dumps(manifest, indent=1) + "\n", "utf-8")
 
 
-def _folder_of_objects(level: str) -> Path:
-    """Return the folder of objects that these compilers made in this way, at a level of speed.
-
-    Remove those that others made at that level.
-    """
+def _folder_of_objects() -> Path:
+    """Return the folder of objects that these compilers made in this way; remove all others."""
     mypy = import_module("mypy.version").__version__
     made_by = [get_config_var("SOABI"), mypy, environ.get("CC"), environ.get("CFLAGS")]
     kind = sha256(repr(made_by).encode() + Path(__file__).read_bytes()).hexdigest()[:16]
-    objects = ROOT / "build" / "objects" / level
+    objects = ROOT / "build" / "objects"
     for other in {*objects.glob("*")} - {objects / kind}:
         shutil.rmtree(other)
     return objects / kind

@@ -51,15 +51,20 @@ printf '%-16s ...\n' tests
 if [ $# -gt 0 ]; then
     "$venv/bin/pytest" "$@" || failed=1
 else
-    # Virtual tests share the cores, one file per worker.
-    "$venv/bin/pytest" -m "not processes" --numprocesses auto --dist loadfile || failed=1
-    # Processes mostly wait, so two such tests share the host with the compiler; what a late host
-    # fails runs alone.
-    begin compiled "$venv/bin/python" -m tests.same_compiled
+    # Processes mostly wait, so two such tests share the host with the compiler.
     processes=(tests/processes tests/tutorial)
+    begin compiled "$venv/bin/python" -m tests.same_compiled
     "$venv/bin/pytest" "${processes[@]}" -m "processes and not real_time" --numprocesses 2 \
         || failed=1
     end_begun
-    "$venv/bin/pytest" "${processes[@]}" -m "processes and real_time" || failed=1
+    # A late host fails fleets on the wall clock, so only compiled ones share it.
+    at_once=0
+    if [ -f build/compiled/manifest.json ]; then at_once=2; fi
+    QSWARM_PURE=0 "$venv/bin/pytest" "${processes[@]}" -m "processes and real_time" \
+        --numprocesses "$at_once" || failed=1
+    # Virtual tests share the cores, one file per worker. Flights run compiled if the compiler ran.
+    virtual=(--numprocesses auto --dist loadfile)
+    "$venv/bin/pytest" -m "not processes and not flight" "${virtual[@]}" || failed=1
+    QSWARM_PURE=0 "$venv/bin/pytest" -m "not processes and flight" "${virtual[@]}" || failed=1
 fi
 exit "$failed"

@@ -3,6 +3,20 @@
 import gc
 import signal
 
+import pytest
+
+FLYING = (
+    "campaign",
+    "closed_loop",
+    "commands",
+    "engine",
+    "judge",
+    "link_check",
+    "random_flights",
+    "recording",
+)
+"""Folders of tests that mostly fly: CI runs them compiled where it can, in half of the time."""
+
 # A shell that starts this run in the background has it ignore SIGINT, and nohup has it ignore
 # SIGHUP. Whatever a test starts would inherit that; some tests send these signals.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -12,6 +26,13 @@ if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
 
 # As in a run (worldsim.commands.app), the collector looks for reference cycles less often.
 gc.set_threshold(200_000)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what flies, and does so compiled as well."""
+    for item in items:
+        if item.path.parent.name in FLYING and item.get_closest_marker("pure") is None:
+            item.add_marker("flight")
 
 
 def pytest_collection_finish() -> None:

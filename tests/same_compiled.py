@@ -2,14 +2,15 @@
 
     python -m tests.same_compiled
 
-builds a compiled wheel, in the quickest way, installs it into an empty folder, and flies from there
-and from the checkout. Without a C compiler there is nothing to compare.
+compiles the checkout, builds a compiled wheel of it, installs that into an empty folder, and flies
+from there and, in pure Python, from the checkout. Without a C compiler there is nothing to compare.
 """
 
 import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from sysconfig import get_config_var
 from tempfile import TemporaryDirectory
@@ -19,6 +20,7 @@ from tests.traces import CHAOS, LIBRARY
 
 ROOT = Path(__file__).resolve().parents[1]
 PIP = (sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check")
+COMPILE = (sys.executable, "setup.py", "--quiet", "compile")
 OFFLINE = ("--no-deps", "--no-index")
 FLIGHTS = {
     "wedge-9-lossy": 6,
@@ -51,6 +53,7 @@ def main() -> int:
     if shutil.which(compiler) is None:
         print(f"skipped: no C compiler '{compiler}'")
         return 0
+    _run(COMPILE, ROOT, {PURE: "1"})
     with TemporaryDirectory(prefix="qswarm-same-") as name:
         folder = Path(name)
         chaos = folder / "chaos.toml"
@@ -74,11 +77,19 @@ def _installed(folder: Path) -> Path:
     """Return a folder into which a compiled wheel is installed, without dependencies."""
     made, target = folder / "made", folder / "target"
     build = [*PIP, "wheel", str(ROOT), *OFFLINE, "--no-build-isolation", "-w", str(made)]
-    subprocess.run(build, cwd=folder, env={**os.environ, "QSWARM_COMPILED": "quick"}, check=True)
+    _run(build, folder, {"QSWARM_COMPILED": "1"})
     (wheel,) = made.glob("qswarm-*.whl")
     install = [*PIP, "install", *OFFLINE, "--target", str(target), str(wheel)]
-    subprocess.run(install, cwd=folder, check=True)
+    _run(install, folder, {})
     return target
+
+
+def _run(command: Sequence[str], folder: Path, variables: dict[str, str]) -> None:
+    """Run a command in a folder; show what it prints, mostly warnings, only if it fails."""
+    env = {**os.environ, **variables}
+    done = subprocess.run(command, cwd=folder, env=env, capture_output=True, check=False)
+    if done.returncode:
+        sys.exit((done.stdout + done.stderr).decode(errors="replace"))
 
 
 def _flown(words: list[str], code: Path) -> list[str]:

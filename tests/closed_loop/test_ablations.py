@@ -54,6 +54,7 @@ def test_the_whole_structure_fills_the_formation(
     [WITHOUT_TIERS, MUTE_LEADERS, MULTIHOP_OFF, ONE_BRIEFED | WITHOUT_TIERS],
     ids=["without tiers", "mute leaders", "multihop off", "one briefed, without tiers"],
 )
+@pytest.mark.pure
 def test_without_a_part_all_have_the_mission_and_only_the_leader_a_place(
     switched: dict[str, str],
 ) -> None:

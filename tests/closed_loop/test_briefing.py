@@ -125,6 +125,7 @@ def test_without_the_mission_agents_keep_their_place_beside_the_team(path: str) 
     assert last.hierarchy.role[1:].tolist() == [DISTRESS] * 8
 
 
+@pytest.mark.pure
 def test_without_tiers_the_team_leaves_them_behind() -> None:
     flown = scenario(1, 24, frame=STRAIGHT, **ONLY_THE_FRAME, **WITHOUT_TIERS)
     _, ticks = recorded(flown)
@@ -154,6 +155,7 @@ def test_without_the_mission_an_agent_gives_up_the_point_that_a_member_needs(sta
     assert 0.25 < np.linalg.norm(apart) < 1.0
 
 
+@pytest.mark.pure
 def test_in_distress_with_a_mission_an_agent_keeps_to_its_frame_and_claims_nothing() -> None:
     flown = scenario(1, 20, frame=STRAIGHT, **WITHOUT_TIERS)
     _, ticks = recorded(flown)

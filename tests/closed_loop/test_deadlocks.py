@@ -40,6 +40,7 @@ STARTS = {
 
 @pytest.mark.parametrize("kind", ["kinematic", "accelerating", "forward"])
 @pytest.mark.parametrize("starts", STARTS.values(), ids=STARTS.keys())
+@pytest.mark.pure
 def test_two_agents_that_must_swap_pass_each_other(starts: list[list[float]], kind: str) -> None:
     judge = fly(parse(SWAP.format(starts=starts, kind=kind))).loop.judge
     assert judge.phases[0].converge_s is not None

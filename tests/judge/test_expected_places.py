@@ -63,6 +63,7 @@ def misplaced(layout: Layout) -> Layout:
     return layout._replace(slots={**layout.slots, last: wrong})
 
 
+@pytest.mark.pure
 def test_a_team_that_computes_a_place_wrongly_does_not_converge(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

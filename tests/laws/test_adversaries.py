@@ -25,6 +25,8 @@ from tests.laws.adversaries import (
     violations,
 )
 
+pytestmark = pytest.mark.flight
+
 
 @pytest.mark.parametrize("fleet", FLEETS, ids=str)
 def test_no_pair_ever_comes_nearer_than_d_ob(fleet):

@@ -29,6 +29,12 @@ class Fails(Flocking):
 """
 
 
+@pytest.fixture(autouse=True)
+def in_pure_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have the fleets run pure: these controllers derive from one that may be compiled."""
+    monkeypatch.setenv("QSWARM_PURE", "1")
+
+
 def launched(start: Start, run: Path, *options: str) -> Started:
     return start(*QSWARM, "run", FLOCKING, "--no-recording", "--out", str(run), *options)
 

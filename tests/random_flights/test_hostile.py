@@ -40,6 +40,7 @@ def test_numbers_in_a_row_fly_every_vehicle_and_set_of_sensors_and_all_numbers_e
     assert {case_of(number) for number in range(len(CASES))} == set(CASES)
 
 
+@pytest.mark.pure
 def test_without_the_filter_every_kind_of_hostile_but_those_that_stand_does_harm(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
