@@ -62,6 +62,7 @@ def test_it_has_every_key_of_the_contract(run: FinishedRun) -> None:
         "from_s",
         "converged",
         "converge_s",
+        "timed_from_s",
         "residual_m",
         "queues_converge_s",
     }

@@ -134,7 +134,14 @@ def test_an_expectation_is_a_line_with_its_limit(
 
 
 def change(t_s: float, kind: str, agents: list[int], reformed_s: float | None) -> dict[str, Any]:
-    return {"t_s": t_s, "kind": kind, "agents": agents, "reformed_s": reformed_s}
+    return {
+        "t_s": t_s,
+        "kind": kind,
+        "agents": agents,
+        "reformed_s": reformed_s,
+        "timed_from_s": t_s,
+        "asked_s": 5.0 - t_s if reformed_s is None else reformed_s,
+    }
 
 
 @pytest.mark.parametrize(
@@ -173,12 +180,35 @@ def test_the_change_that_was_restored_worst_is_named(
 
 
 def test_a_formation_that_was_replaced_names_the_next_mission(summary: Summary) -> None:
-    phases = [{**summary["phases"][0], "from_s": from_s} for from_s in (0.0, 2.0)]
+    first = summary["phases"][0]
+    phases = [{**first, "from_s": t_s, "timed_from_s": t_s} for t_s in (0.0, 2.0)]
     rows = [row("converge a", 3.0, None, None), row("converge b", 3.0, None, False)]
     assert text(summary, expectations=rows, phases=phases)[1:3] == [
         "  open     a did not converge: the next mission came after 2 s, before the limit of 3 s",
         "  NOT MET  b did not converge within 3 s",
     ]
+
+
+@pytest.mark.parametrize(
+    ("timed_from_s", "got", "held", "words"),
+    [
+        (None, None, None, "a did not converge: a fault that forbids it was in force to the end"),
+        (2.0, 1.5, True, "a: converged in 1.5 s from 2 s on, the end of a fault that forbids it"),
+        (
+            4.0,
+            None,
+            None,
+            "a did not converge: the run ended after 1 s, before the limit of 3 s from 4 s on,"
+            " the end of a fault that forbids it",
+        ),
+    ],
+)
+def test_a_formation_that_a_fault_forbade_is_timed_from_its_end(
+    summary: Summary, timed_from_s: float | None, got: float | None, held: bool | None, words: str
+) -> None:
+    phases = [{**summary["phases"][0], "timed_from_s": timed_from_s}]
+    expectation = row("converge a", 3.0, got, held)
+    assert words in text(summary, expectations=[expectation], phases=phases)[1]
 
 
 @pytest.mark.parametrize(

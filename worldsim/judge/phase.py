@@ -16,6 +16,7 @@ from agent.messages import AT_HOME, FramePath, Place, Vector
 from agent.qstructure.formation import NO_PLACES, Formation, Slot
 from agent.qstructure.frame_path import Track
 from agent.qstructure.target_frame import Frame
+from worldsim.judge.asked_time import AskedTime
 from worldsim.judge.expected_places import ExpectedPlaces
 from worldsim.judge.tick import Tick, same_claims
 from worldsim.scenario.tables import CONVERGED_M, CONVERGED_S
@@ -78,6 +79,7 @@ class Phase:
         """Whether each running agent is near its own slot, as sides of a partition may be too."""
         self._track = Track(path)
         self._timer = ConvergenceTimer()
+        self._asked = AskedTime(from_s)
         self._known_slots: dict[tuple[int, int, int], Slot | None] = {}
         self._own: SlotsByRow = {}
         self._own_of: Tick | None = None
@@ -94,13 +96,27 @@ class Phase:
         at_s = self._timer.converged_s
         return None if at_s is None else at_s - self.from_s
 
-    def may_converge(self, within_s: float, until_s: float) -> bool:
-        """Return whether a phase that ends at a time [s] could have converged in time had it not.
+    @property
+    def timed_from_s(self) -> float | None:
+        """From when the time to converge counts [s; simulated time]; None while a fault forbids it.
 
-        It could where the limit was not over, and where the team stood, but for less than 2 s.
+        It is the start, or the end of the last fault that forbade it before the convergence.
         """
-        since_s = until_s if self._timer.since_s is None else self._timer.since_s
-        return since_s - self.from_s < within_s
+        return self._asked.from_s
+
+    def note(self, t_s: float, *, forbidden: bool) -> None:
+        """Take from a time on whether a fault in force forbids converging [s; simulated time]."""
+        if self._timer.converged_s is None:
+            self._asked.note(t_s, forbidden=forbidden, standing_since_s=self._timer.since_s)
+
+    def asked_s(self, until_s: float) -> float:
+        """Return how long the team has been asked to converge, and did not stand, until a time [s].
+
+        It is the longest time that no fault broke off which forbids it.
+        """
+        converged_s, since_s = self._timer.converged_s, self._timer.since_s
+        standing_s = converged_s if converged_s is not None else since_s
+        return self._asked.until(until_s if standing_s is None else standing_s)
 
     def frame(self, time_s: float) -> Frame:
         """Return the target's frame at a time [s]."""

@@ -1,7 +1,7 @@
 """Recoveries: the time until a team that was disturbed stands in a complete formation again.
 
 It is disturbed where agents are lost or come back, where the radio or an agent's fault changes, and
-where a fault ends that parted it.
+where a fault ends that parted it. While a fault in force forbids re-forming, no time counts.
 
 Complete: the running agents hold exactly the places that the formation has for their number; a
 place in which a dead vehicle hovers is not among them (E18). Standing: each agent is within 0.12 m
@@ -10,6 +10,7 @@ of its own slot for 2 s.
 
 import msgspec
 
+from worldsim.judge.asked_time import AskedTime
 from worldsim.judge.radio_events import RadioRunEvent
 from worldsim.judge.run_events import (
     LOSS_KINDS,
@@ -33,7 +34,14 @@ class Recovery(msgspec.Struct):
     agents: list[int]
     """The agents that were lost, came back, or have or had a fault; none for the radio."""
     reformed_s: float | None = None
-    """From the change to the start of the 2 s [s]; None until the team has re-formed."""
+    """From ``timed_from_s`` to the start of the 2 s [s]; None until the team has re-formed."""
+    timed_from_s: float | None = None
+    """From when the time counts: ``t_s``, or the end of the last fault that forbade re-forming.
+
+    None while one does [s; simulated time].
+    """
+    asked_s: float = 0.0
+    """The longest time without such a fault that the team had, or took [s]."""
 
 
 class Recoveries:
@@ -41,39 +49,53 @@ class Recoveries:
 
     def __init__(self) -> None:
         self.all: list[Recovery] = []
-        self._open: list[Recovery] = []
+        self._open: list[tuple[Recovery, AskedTime]] = []
+        self._forbidden = False
         self.standing_since_s: float | None = None
         """Since when the team has stood again [s]; None where it does not."""
 
+    def note(self, t_s: float, *, forbidden: bool) -> None:
+        """Take from a time on whether a fault in force forbids re-forming [s; simulated time]."""
+        self._forbidden = forbidden
+        for recovery, asked in self._open:
+            asked.note(t_s, forbidden=forbidden, standing_since_s=self.standing_since_s)
+            recovery.timed_from_s = asked.from_s
+
     def handle_event(self, event: LossEvent | ReturnEvent) -> None:
         """Take the loss or return of an agent; without an agent, a start that was refused."""
-        self.standing_since_s = None
-        last = self.all[-1] if self.all else None
-        if last is None or (last.t_s, last.kind) != (event.t_s, event.kind):
-            last = Recovery(event.t_s, event.kind, [])
-            self.all.append(last)
-            self._open.append(last)
+        last = self._disturbed(event)
         if event.agent is None:
-            self._open.remove(last)
+            self._open = [each for each in self._open if each[0] is not last]
         else:
             last.agents.append(event.agent)
 
     def handle_radio(self, event: RadioRunEvent | Reconnected) -> None:
         """Take a change of the radio, after which the team is not parted, or no more."""
-        self.standing_since_s = None
-        self.all.append(Recovery(event.t_s, event.kind, []))
-        self._open.append(self.all[-1])
+        self._begin(event)
 
     def handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
         """Take a change of an agent's fault, after which the team is not parted, or no more."""
-        self._since_s = None
-        last = self.all[-1] if self.all else None
-        if last is None or (last.t_s, last.kind) != (event.t_s, event.kind):
-            last = Recovery(event.t_s, event.kind, [])
-            self.all.append(last)
-            self._open.append(last)
+        last = self._disturbed(event)
         if event.agent is not None:
             last.agents.append(event.agent)
+
+    def _disturbed(self, event: LossEvent | ReturnEvent | AgentFaultRunEvent) -> Recovery:
+        """Return the disturbance that an event belongs to: that of others of its time and kind."""
+        last = self.all[-1] if self.all else None
+        if last is None or (last.t_s, last.kind) != (event.t_s, event.kind):
+            return self._begin(event)
+        self.standing_since_s = None
+        return last
+
+    def _begin(
+        self, event: LossEvent | ReturnEvent | AgentFaultRunEvent | RadioRunEvent | Reconnected
+    ) -> Recovery:
+        self.standing_since_s = None
+        asked = AskedTime(event.t_s, forbidden=self._forbidden)
+        recovery = Recovery(event.t_s, event.kind, [], timed_from_s=asked.from_s)
+        self.all.append(recovery)
+        self._open.append((recovery, asked))
+        return recovery
 
     def see(self, tick: Tick, in_place: bool) -> None:
         """Take a tick; in_place: whether every running agent is in its place."""
@@ -81,12 +103,14 @@ class Recoveries:
             return
         if not (in_place and self._all_back(tick)):
             self.standing_since_s = None
-            return
-        if self.standing_since_s is None:
+        elif self.standing_since_s is None:
             self.standing_since_s = tick.time_s
-        if tick.time_s - self.standing_since_s >= CONVERGED_S - 1e-9:
-            for recovery in self._open:
-                recovery.reformed_s = max(0.0, self.standing_since_s - recovery.t_s)
+        since_s = self.standing_since_s
+        for recovery, asked in self._open:
+            recovery.asked_s = asked.until(tick.time_s if since_s is None else since_s)
+        if since_s is not None and tick.time_s - since_s >= CONVERGED_S - 1e-9:
+            for recovery, _ in self._open:
+                recovery.reformed_s = recovery.asked_s
             self._open = []
 
     def _all_back(self, tick: Tick) -> bool:

@@ -126,8 +126,8 @@ class Judge:
         bounded = scenario.expect.attitude_within_deg is not None
         self._attitudes = HeldAttitudes(scenario) if bounded else None
         self._parting = PartingFaults(2.0 / scenario.fleet.tick_hz)
-        window_s = scenario.expect.reform_within_s or DISTURBED_S
-        self._held = HeldFormation(window_s, self._parting)
+        self._window_s = scenario.expect.reform_within_s or DISTURBED_S
+        self._held = HeldFormation(self._window_s, self._parting)
         strength = scenario.expect.min_lambda2 is not None
         self._strength = NetworkStrength(scenario) if strength else None
         self._missions = MissionOrder()
@@ -183,21 +183,30 @@ class Judge:
         if self._strength is not None:
             self._strength.handle_event(event)
         self._parting.handle_event(event)
+        self._note_parting(event.t_s)
         self._held.open_window(event.t_s)
         if not self._parting:
             self._recoveries.handle_radio(event)
 
     def _handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
         self._parting.handle_agent_fault(event)
+        self._note_parting(event.t_s)
         self._held.open_window(event.t_s)
         if not self._parting:
             self._recoveries.handle_agent_fault(event)
 
     def _handle_stop(self, event: WorldStopped | Reconnected) -> None:
         self._parting.handle_stop(event)
+        self._note_parting(event.t_s)
         self._held.open_window(event.t_s)
         if isinstance(event, Reconnected) and not self._parting:
             self._recoveries.handle_radio(event)
+
+    def _note_parting(self, t_s: float) -> None:
+        """Let no time to form count while a fault forbids it."""
+        forbidden = bool(self._parting)
+        self.phases[-1].note(t_s, forbidden=forbidden)
+        self._recoveries.note(t_s, forbidden=forbidden)
 
     def _change_team(self, event: LossEvent | ReturnEvent) -> None:
         if isinstance(event, Restarted | Joined):
@@ -319,6 +328,7 @@ class Judge:
 
     def _open_phase(self, event: MissionRunEvent) -> None:
         self.phases.append(self._phase(event.tables, event.t_s, event.path, event.mission))
+        self._note_parting(event.t_s)
         self.queues.append(QueueConvergence(self.phases[-1]))
         self.sub_formations.append(SubFormations(self.phases[-1]))
         if self._attitudes is not None:
@@ -349,13 +359,28 @@ class Judge:
         )
 
     def _converged(self, phase: Phase) -> Expectation:
-        within_s, got_s = self._scenario.expect.converge_within_s, phase.converge_s
+        within_s = self._scenario.expect.converge_within_s
+        asked_s = phase.asked_s(self._end_s(phase))
+        got_s = None if phase.converge_s is None else asked_s
         held: bool | None = got_s is not None and (within_s is None or got_s <= within_s)
-        limit_s = self._planned_end_s - phase.from_s if within_s is None else within_s
-        if got_s is None and phase.may_converge(limit_s, self._end_s(phase)):
+        if got_s is None and asked_s < self._time_to_converge_s(phase):
             held = None
         name = f"converge {phase.formation.name}"
         return Expectation(name=name, wanted=within_s, got=got_s, held=held)
+
+    def _time_to_converge_s(self, phase: Phase) -> float:
+        """Return the limit of a formation's convergence [s].
+
+        Without one it is the planned duration; after a fault that forbade it, at least the window
+        of a fault.
+        """
+        within_s, from_s = self._scenario.expect.converge_within_s, phase.timed_from_s
+        if within_s is not None:
+            return within_s
+        if from_s is None:
+            return inf
+        left_s = self._planned_end_s - from_s
+        return left_s if from_s == phase.from_s else max(left_s, self._window_s)
 
     def _end_s(self, phase: Phase) -> float:
         """Return until when a formation was asked for, so far [s]."""
@@ -374,15 +399,13 @@ class Judge:
 
     def _reformed(self, within_s: float) -> Expectation:
         known_s = [each.reformed_s for each in self.recoveries if each.reformed_s is not None]
-        standing_s = self._recoveries.standing_since_s
-        so_far_s = self._until_s if standing_s is None else standing_s
-        open_s = [so_far_s - each.t_s for each in self.recoveries if each.reformed_s is None]
+        open_s = [each.asked_s for each in self.recoveries if each.reformed_s is None]
         worst_s = max(known_s) if known_s and not open_s else None
-        held: bool | None = not any(time_s > within_s for time_s in known_s)
-        if open_s and held:
-            held = None if max(open_s) < within_s else False
-        if self._parting and not any(time_s > within_s for time_s in known_s):
-            held = None  # the fault that parts the team has not ended
+        too_late = any(time_s > within_s for time_s in known_s)
+        too_late = too_late or any(time_s >= within_s for time_s in open_s)
+        # While a fault parts the team, it has still to re-form after its end.
+        is_open = bool(open_s or self._parting)
+        held = False if too_late else None if is_open else True
         return Expectation(name="reform_within_s", wanted=within_s, got=worst_s, held=held)
 
     def _held_rows(self) -> list[Expectation]:

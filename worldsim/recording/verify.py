@@ -39,6 +39,8 @@ ADDED_LATER = (
     "margin",
     "min_lambda2",
     "I5",
+    "timed_from_s",
+    "asked_s",
 )
 """Keys that an older summary lacks."""
 MAX_NAMED = 4
@@ -66,6 +68,7 @@ class PhaseFigures:
     from_s: float
     converged: bool
     converge_s: Figure
+    timed_from_s: Figure
     residual_m: Figure
     queues_converge_s: dict[str, Figure]
 
@@ -219,6 +222,7 @@ def _phases(judge: Judge) -> Iterator[PhaseFigures]:
             from_s=phase.from_s,
             converged=phase.converge_s is not None,
             converge_s=phase.converge_s,
+            timed_from_s=phase.timed_from_s,
             residual_m=phase.residual_m,
             queues_converge_s=dict(zip(queues.names, queues.converge_s, strict=True)),
         )

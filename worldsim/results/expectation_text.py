@@ -24,7 +24,9 @@ class RecoveryRow(TypedDict):
     t_s: float
     kind: str
     agents: list[int]
-    reformed_s: float | None  # from the change until the formation is whole again
+    reformed_s: float | None  # from timed_from_s until the formation is whole again
+    timed_from_s: float | None  # t_s, or the end of the last fault that forbade it
+    asked_s: float  # the longest time without such a fault, until it is whole again or to the end
 
 
 class EncounterRow(TypedDict):
@@ -41,7 +43,11 @@ class Circumstances(NamedTuple):
     """What the words on an expectation depend on, beside its figures."""
 
     ended_s: float  # end of the run [s; simulated time]
-    phase_starts_s: Sequence[float]  # start of each formation [s; simulated time]
+    phases_s: Sequence[tuple[float, float | None]]
+    """When each formation is asked for, and from when its time counts [s; simulated time].
+
+    The latter is None where a fault in force forbids it.
+    """
     recoveries: Sequence[RecoveryRow]
 
 
@@ -50,6 +56,8 @@ class Span(NamedTuple):
 
     length_s: float
     end: str  # what ended it, in words
+    forbidden: bool = False  # whether a fault forbade it to the end
+    timed_from_s: float | None = None  # where a fault forbade it until then
 
 
 def expectation_texts(rows: Sequence[ExpectationRow], run: Circumstances) -> list[str]:
@@ -83,19 +91,32 @@ def figure(value: float | None, unit: str, digits: int) -> str:
 
 def _spans(run: Circumstances) -> Iterator[Span]:
     """Yield the time of each formation, in order."""
-    ends_s = [*run.phase_starts_s[1:], run.ended_s]
-    for index, (start_s, end_s) in enumerate(zip(run.phase_starts_s, ends_s, strict=True)):
-        last = index == len(ends_s) - 1
-        yield Span(end_s - start_s, "the run ended" if last else "the next mission came")
+    ends_s = [*(start_s for start_s, _ in run.phases_s[1:]), run.ended_s]
+    for index, ((start_s, timed_s), end_s) in enumerate(zip(run.phases_s, ends_s, strict=True)):
+        end = "the run ended" if index == len(ends_s) - 1 else "the next mission came"
+        if timed_s is None or timed_s == start_s:
+            yield Span(end_s - start_s, end, forbidden=timed_s is None)
+        else:
+            yield Span(end_s - timed_s, end, timed_from_s=timed_s)
 
 
 def _convergence(row: ExpectationRow, span: Span) -> str:
     name, got, wanted = row["name"].removeprefix(CONVERGE), row["got"], row["wanted"]
     if got is not None:
-        return f"{name}: converged in {got:.3g} s{_limit(row)}"
+        return f"{name}: converged in {got:.3g} s{_timed(span.timed_from_s)}{_limit(row)}"
+    timed = _timed(span.timed_from_s)
+    if row["held"] is None and span.forbidden:
+        return f"{name} did not converge: a fault that forbids it was in force to the end"
     if wanted is None:
-        return f"{name} did not converge in {span.length_s:.4g} s"
-    return f"{name} did not converge{_within(wanted, span)}"
+        return f"{name} did not converge in {span.length_s:.4g} s{timed}"
+    if row["held"] is False:
+        return f"{name} did not converge within {wanted:g} s{timed}"
+    return f"{name} did not converge{_within(wanted, span)}{timed}"
+
+
+def _timed(from_s: float | None) -> str:
+    """Return that the time counts from the end of a fault, where it does."""
+    return "" if from_s is None else f" from {from_s:.4g} s on, the end of a fault that forbids it"
 
 
 def _within(wanted_s: float, span: Span) -> str:
@@ -160,11 +181,12 @@ def _reform(row: ExpectationRow, run: Circumstances) -> str:
     worst = _slowest(row, run)
     if worst is None:
         return f"formation after a fault: one was in force to the end{limit}"
-    reformed_s = worst["reformed_s"]
+    reformed_s, from_s = worst["reformed_s"], worst["timed_from_s"]
+    timed = _timed(None if from_s == worst["t_s"] else from_s)
     if reformed_s is not None:
-        return f"{_change(worst)}: re-formed after {reformed_s:.3g} s{limit}"
-    left = Span(run.ended_s - worst["t_s"], "the run ended")
-    return f"{_change(worst)}: not re-formed{_within(row['wanted'], left)}"
+        return f"{_change(worst)}: re-formed after {reformed_s:.3g} s{timed}{limit}"
+    left = Span(worst["asked_s"], "the run ended")
+    return f"{_change(worst)}: not re-formed{_within(row['wanted'], left)}{timed}"
 
 
 def _slowest(row: ExpectationRow, run: Circumstances) -> RecoveryRow | None:
@@ -173,16 +195,13 @@ def _slowest(row: ExpectationRow, run: Circumstances) -> RecoveryRow | None:
     None where only a fault in force keeps the team from it.
     """
 
-    def lasted_s(recovery: RecoveryRow) -> float:
-        reformed_s = recovery["reformed_s"]
-        return run.ended_s - recovery["t_s"] if reformed_s is None else reformed_s
+    def asked_s(recovery: RecoveryRow) -> float:
+        return recovery["asked_s"]
 
     if row["held"] is not None:
-        return max(run.recoveries, key=lasted_s)
-    unended = [each for each in run.recoveries if each["reformed_s"] is None]
-    slowest = max(unended, key=lasted_s, default=None)
-    waits = slowest is not None and lasted_s(slowest) < row["wanted"]
-    return slowest if waits else None
+        return max(run.recoveries, key=asked_s)
+    timed = [each for each in run.recoveries if each["timed_from_s"] is not None]
+    return max((each for each in timed if each["reformed_s"] is None), key=asked_s, default=None)
 
 
 def _change(recovery: RecoveryRow) -> str:

@@ -102,6 +102,7 @@ class PhaseRow(TypedDict):
     from_s: float
     converged: bool
     converge_s: float | None  # from the phase's start
+    timed_from_s: float | None  # for its expectation; later than from_s where a fault forbade it
     residual_m: float | None  # largest slot error at the last tick of the phase
     queues_converge_s: dict[str, float | None]  # by queue name
 
@@ -318,8 +319,8 @@ def _with_words(invariants: list[str]) -> str:
 
 def _circumstances(run: FinishedRun) -> Circumstances:
     judge = run.loop.judge
-    starts_s = [phase.from_s for phase in judge.phases]
-    return Circumstances(run.duration_s, starts_s, _recovery_rows(judge))
+    spans_s = [(phase.from_s, phase.timed_from_s) for phase in judge.phases]
+    return Circumstances(run.duration_s, spans_s, _recovery_rows(judge))
 
 
 def _cut(run: FinishedRun) -> str | None:
@@ -381,6 +382,7 @@ def _phase_rows(judge: Judge) -> list[PhaseRow]:
             "from_s": phase.from_s,
             "converged": phase.converge_s is not None,
             "converge_s": phase.converge_s,
+            "timed_from_s": phase.timed_from_s,
             "residual_m": phase.residual_m,
             "queues_converge_s": dict(zip(queues.names, queues.converge_s, strict=True)),
         }
@@ -395,6 +397,8 @@ def _recovery_rows(judge: Judge) -> list[RecoveryRow]:
             "kind": recovery.kind,
             "agents": recovery.agents,
             "reformed_s": recovery.reformed_s,
+            "timed_from_s": recovery.timed_from_s,
+            "asked_s": recovery.asked_s,
         }
         for recovery in judge.recoveries
     ]

@@ -106,17 +106,14 @@ def _outcome(summary: Any, file: Path) -> str:
 
 
 def _circumstances(summary: Summary) -> Circumstances:
-    starts_s = [phase["from_s"] for phase in summary["phases"]]
-    return Circumstances(summary["duration_s"], starts_s, summary["recoveries"])
+    spans_s = [(phase["from_s"], phase["timed_from_s"]) for phase in summary["phases"]]
+    return Circumstances(summary["duration_s"], spans_s, summary["recoveries"])
 
 
 def _recorded_circumstances(verification: "Verification") -> Circumstances:
-    recoveries: list[RecoveryRow] = [
-        {"t_s": row.t_s, "kind": row.kind, "agents": row.agents, "reformed_s": row.reformed_s}
-        for row in verification.recoveries
-    ]
-    starts_s = [phase.from_s for phase in verification.phases]
-    return Circumstances(verification.until_s, starts_s, recoveries)
+    recoveries: list[RecoveryRow] = verification.figures["recoveries"]
+    spans_s = [(phase.from_s, phase.timed_from_s) for phase in verification.phases]
+    return Circumstances(verification.until_s, spans_s, recoveries)
 
 
 def _expectations(rows: list[ExpectationRow], run: Circumstances) -> list[str]:
