@@ -60,9 +60,29 @@ def test_two_faults_of_the_disk_end_by_themselves(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_to_which_nothing_is_written_proves_nothing(tmp_path: Path) -> None:
-    status, summary, _ = flown(tmp_path, FAULT.format(more="for_s = 0.1\n"), "--no-recording")
+    status, summary, told = flown(tmp_path, FAULT.format(more="for_s = 0.1\n"), "--no-recording")
     assert status == 3
-    assert summary["reason"] == "the disk_full at 1.5 s struck nothing"
+    reason = "the disk_full at 1.5 s (nothing was to be written meanwhile) struck nothing"
+    assert summary["reason"] == reason
+    assert "disk_full, 1.5 s to 1.6 s: struck nothing: nothing was to be written meanwhile" in told
+
+
+@pytest.mark.parametrize(
+    ("at_s", "more", "kept"),
+    [("1.5", "for_s = 0.05\n", "30 ticks, 1.45 s"), ("4.97", "", "100 ticks, 4.95 s")],
+)
+def test_what_a_full_disk_refuses_counts_however_short_and_late_it_is(
+    tmp_path: Path, at_s: str, more: str, kept: str
+) -> None:
+    fault = FAULT.format(more=more).replace("1.5", at_s)
+    jam = "[[event]]\nat_s = 1\nfor_s = 0.5\njam = { centre_m = [50, 0, 0], radius_m = 1 }\n"
+    _, summary, told = flown(tmp_path, fault + jam)
+    assert summary["reason"].startswith("results were lost: recording: run.rrd ends here")
+    assert summary["reason"].endswith("; the jam at 1 s struck nothing")
+    (row,) = (each for each in summary["faults"] if each["kind"] == "disk_full")
+    assert row["writes"] == 1
+    assert "let 1 write fail" in told
+    assert kept in qswarm_on(PLAIN, "verify", str(tmp_path / "run")).stdout
 
 
 def test_a_full_disk_cannot_be_denied() -> None:

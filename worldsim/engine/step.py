@@ -245,11 +245,14 @@ class SlotLoop:
         """Let the recorder's disk be full while any fault asks for it."""
         if self._recorder is None:
             return
+        number = operation.number
+        others = self._disk_full.keys() - {number}
+        # At the end of a fault, the recorder first writes what it holds: that fails too.
+        self._recorder.fill_disk(operation.full or bool(others))
         if operation.full:
-            self._disk_full[operation.number] = self._recorder.failed_writes
+            self._disk_full[number] = self._recorder.failed_writes
         else:
-            self._note_writes(operation.number)
-        self._recorder.fill_disk(bool(self._disk_full))
+            self._note_writes(number)
 
     def _note_writes(self, number: int) -> None:
         before = self._disk_full.pop(number, None)

@@ -70,6 +70,7 @@ class RunRecorder:
     ) -> None:
         self._report = report
         self._working, self._opened = True, False
+        self._sink: TolerantSink | None = None
         self._scenario = scenario
         tick_hz = scenario.fleet.tick_hz
         formation = self._formation_of(scenario.formation)
@@ -98,14 +99,14 @@ class RunRecorder:
 
     def fill_disk(self, full: bool) -> None:
         """Let the file's disk be full, or no longer; what has been recorded is written before."""
-        if self._opened:
+        if self._opened and self._sink is not None:
             self._attempt(self._send_block)
             self._sink.fill(full)
 
     @property
     def failed_writes(self) -> int:
-        """Number of writes that failed so far."""
-        return self._sink.failed_writes if self._opened else 0
+        """Number of writes that failed so far; of the last ones once the recorder is closed."""
+        return self._sink.failed_writes if self._sink is not None else 0
 
     def close(self) -> None:
         """Record what is left, and finish the file."""
@@ -127,7 +128,7 @@ class RunRecorder:
 
     def _open(self, path: Path, formation: Formation, run_id: str, mode: str) -> None:
         rr.set_strict_mode(True)
-        self._sink = TolerantSink(path, self._report)
+        self._sink = sink = TolerantSink(path, self._report)
         frame = path_of(self._scenario.frame)
         self._formation = FormationEntities(formation, frame)
         # No recording id is given: a viewer takes recordings with the same id for one.
@@ -138,8 +139,8 @@ class RunRecorder:
         slots = slot_positions(formation, agents, Track(frame).at(0.0))
         region = view_region(self._scenario, slots)
         blueprint = blueprint_of(region, obstacles=bool(self._scenario.obstacle))
-        self._stream.set_sinks(rr.FileSink(self._sink.path), default_blueprint=blueprint)
-        self._sink.release()
+        self._stream.set_sinks(rr.FileSink(sink.path), default_blueprint=blueprint)
+        sink.release()
         self._opened = True
         rr.set_log_time_enabled(False, recording=self._stream)
         rr.set_log_tick_enabled(False, recording=self._stream)
@@ -223,7 +224,8 @@ class RunRecorder:
 
     def _finish(self) -> None:
         self._stream.disconnect()
-        self._sink.wait()
+        if self._sink is not None:
+            self._sink.wait()
 
 
 class _BlockTimes:

@@ -8,7 +8,8 @@ file for as long as the disk allows.
 import os
 from collections.abc import Callable
 from pathlib import Path
-from threading import Thread
+from select import select
+from threading import Lock, Thread
 
 FULL = "/dev/full"
 """A file on which the kernel lets every write fail as on a full disk."""
@@ -31,6 +32,9 @@ class TolerantSink:
         """The file while a full one stands in for it."""
         self._file: int | None = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
         self._read_end, self._write_end = os.pipe()
+        os.set_blocking(self._read_end, False)
+        self._lock = Lock()
+        """Held from the reading of data until it is written."""
         self._thread = Thread(target=self._drain, name="recording-sink", daemon=True)
         self._thread.start()
 
@@ -40,7 +44,13 @@ class TolerantSink:
         return f"/proc/self/fd/{self._write_end}"
 
     def fill(self, full: bool) -> None:
-        """Let the file's disk be full, or no longer."""
+        """Let the file's disk be full, or no longer; what is in the pipe is written before."""
+        with self._lock:
+            while self._pass_on():
+                pass
+            self._replace_file(full)
+
+    def _replace_file(self, full: bool) -> None:
         if self._file is None:
             return
         if full and self._kept is None:
@@ -67,12 +77,25 @@ class TolerantSink:
             raise TimeoutError(f"{self._name} was not finished within {FINISH_TIMEOUT_S:g} s")
 
     def _drain(self) -> None:
-        while data := os.read(self._read_end, CHUNK_B):
-            self._write(data)
+        while True:
+            select([self._read_end], [], [])
+            with self._lock:
+                ended = self._pass_on() is None
+            if ended:
+                break
         os.close(self._read_end)
         for descriptor in (self._file, self._kept):
             if descriptor is not None:
                 os.close(descriptor)
+
+    def _pass_on(self) -> int | None:
+        """Write what is in the pipe, and return how much [bytes]; None at the pipe's end."""
+        try:
+            data = os.read(self._read_end, CHUNK_B)
+        except BlockingIOError:
+            return 0
+        self._write(data)
+        return len(data) or None
 
     def _write(self, data: bytes) -> None:
         rest = memoryview(data)

@@ -92,10 +92,21 @@ def _stopped_s(fault: FaultReport) -> float | None:
 
 def idle_text(rows: Sequence[FaultRow]) -> str | None:
     """Return which faults struck nothing, in words; None where each struck something."""
-    idle = [f"the {_what(row)} at {_rounded(row['from_s'])} s" for row in rows if _is_idle(row)]
+    idle = [_idle(row) for row in rows if _is_idle(row)]
     left = len(idle) - MAX_IDLE_NAMED
     named = idle if left <= 0 else [*idle[:MAX_IDLE_NAMED], f"{left} more"]
     return f"{' and '.join(named)} struck nothing" if idle else None
+
+
+def _idle(row: FaultRow) -> str:
+    """Return a fault that struck nothing, with the reason where it is known."""
+    reasons = "".join(f" ({why})" for why in _why_idle(row))
+    return f"the {_what(row)} at {_rounded(row['from_s'])} s{reasons}"
+
+
+def _why_idle(row: FaultRow) -> tuple[str, ...]:
+    """Return why a fault struck nothing: none or one reason."""
+    return ("nothing was to be written meanwhile",) if row["writes"] is not None else ()
 
 
 def _is_idle(row: FaultRow) -> bool:
@@ -126,7 +137,7 @@ def _what(row: FaultRow) -> str:
 
 def _struck(row: FaultRow) -> str:
     if _is_idle(row):
-        return "struck nothing"
+        return ": ".join(("struck nothing", *_why_idle(row)))
     if row["process"] is not None or row["writes"] is not None:
         return _stop(row)
     agents = _named(row["agents"] or [])

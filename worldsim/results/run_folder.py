@@ -121,11 +121,13 @@ class RunDirectory:
     def write_summary(self, summary: Content) -> Content:
         """Write summary.json completely or not at all, and return it. Raises RunWriteError.
 
-        A run of which results were lost is no pass: its summary says so.
+        A run of which results were lost is no pass: its summary says so, besides what else makes it
+        inconclusive.
         """
         written: Any = summary
-        if self.lost is not None and summary["outcome"] == "pass":
-            reason = f"results were lost: {self.lost}"
+        if self.lost is not None and summary["outcome"] != "fail":
+            others = (summary["reason"],) if summary["reason"] else ()
+            reason = "; ".join((f"results were lost: {self.lost}", *others))
             written = {**summary, "outcome": "inconclusive", "reason": reason}
         _free_room(self.path)
         write_json(self.summary, written)
