@@ -94,6 +94,23 @@ def test_a_radio_fault_is_reported_while_it_is_in_force() -> None:
     assert remaining == [RadioEvent(flap=Flap(3.0))]
 
 
+def test_an_operators_fault_sets_no_clock_below_0() -> None:
+    """Neither with what is in force, nor with what is to come."""
+    event = "[{ at_s = 0.5, clock = { agents = ['random:9'], offset_s = -0.4 } },"
+    fleet = OperatedFleet(event=event + "{ at_s = 4, clock = { agents = [2], offset_s = -2 } }]")
+    clocks = fleet.loop.world.clocks
+    fleet.ask(clock={"agents": [2], "offset_s": -0.5}, for_s=0.9)
+    for agent in (1, 2):
+        before_s = clocks.ahead_s(agent, 1.0)
+        with pytest.raises(RequestError, match=r"^clock.offset_s: -0.7; .* less than 0 s at 1 s"):
+            fleet.ask(clock={"agents": [agent], "offset_s": -0.7})
+        assert clocks.ahead_s(agent, 1.0) == before_s
+    fleet.fly(2.0)
+    with pytest.raises(RequestError, match=r"clock.offset_s: -2; .* at 4 s, the clock of agent 2"):
+        fleet.ask(clock={"agents": ["all"], "offset_s": -1.6, "drift_ppm": -10_000})
+    fleet.ask(clock={"agents": ["all"], "offset_s": -1.6, "drift_ppm": -10_000}, for_s=1.9)
+
+
 def test_a_saboteur_works_until_it_is_ended() -> None:
     fleet = OperatedFleet()
     answer = fleet.ask(sabotage={"kind": "flood", "agents": ["vertex:V1", 2]})

@@ -23,6 +23,7 @@ class Timeline:
         self._agents = scenario["fleet"]["agents"]
         self._sensors = sorted({*scenario["vehicle"]["sensors"]})
         self._times: list[float] = []
+        self._clock_is_behind = False
 
     def events(self) -> list[Tables]:
         count = self._draw.among((0, 1, 2, 4, 8))
@@ -43,8 +44,8 @@ class Timeline:
         makers = [maker for weight, maker in kinds for _ in range(weight)]
         made = draw.among(makers)()
         event: Tables = {"at_s": self._time(), **made}
-        if "clock" in event:  # no clock may show less than 0 s
-            event["clock"]["offset_s"] = max(event["clock"]["offset_s"], -event["at_s"])
+        if "clock" in event:
+            event["clock"]["offset_s"] = self._offset_s(event["clock"]["offset_s"], event["at_s"])
         if draw.chance(0.6) and not event.keys() & {"join", "formation", "frame", "heal"}:
             event["for_s"] = self._lasting(event["at_s"])
         return event
@@ -154,6 +155,13 @@ class Timeline:
         offset_s = draw.among((0.05, -0.05, 0.3, -0.3, 3.0, -3.0, 100.0, -100.0))
         drift_ppm = draw.among((10.0, -500.0, 10_000.0, -10_000.0))
         return {"offset_s": offset_s, "drift_ppm": drift_ppm}
+
+    def _offset_s(self, offset_s: float, at_s: float) -> float:
+        """Return an offset by which no clock may show less than 0 s: one of all is negative."""
+        if offset_s >= 0.0 or self._clock_is_behind:
+            return abs(offset_s)
+        self._clock_is_behind = True
+        return max(offset_s, -round(0.5 * at_s, 1)) or 1.0
 
     def _sensor(self) -> Tables:
         table: Tables = {"agents": self._selectors(by_place=True), "mode": self._draw.among(MODES)}

@@ -41,6 +41,38 @@ def test_an_invalid_fault_is_rejected(fault: str, key: str, detail: str) -> None
     assert detail in str(caught.value)
 
 
+def clock(at_s: float, offset_s: float, agents: str = "[1]", more: str = "") -> str:
+    return f"{{ at_s = {at_s}, clock = {{ agents = {agents}, offset_s = {offset_s} }}{more} }}"
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "refused"),
+    [
+        (clock(5, -3), clock(6, -4), True),
+        (clock(5, -3), clock(6, -4, "[2]"), False),
+        (clock(5, -3), clock(6, -4, "['all']"), True),
+        (clock(5, -3), clock(6, -4, "['random:1']"), True),
+        (clock(5, -3, more=", for_s = 1"), clock(6, -4), False),
+        (clock(5, -3, more=", for_s = 2"), clock(6, -4), True),
+        (clock(5, -3), clock(8, -4), False),
+        (clock(2, 9, more=", for_s = 5"), clock(5, -4), False),
+        (clock(2, 9), clock(5, -4.5), False),
+        (clock(5, -3), clock(6, -3), False),
+    ],
+)
+def test_clock_faults_together_show_no_time_below_0(first: str, second: str, refused: bool) -> None:
+    if not refused:
+        assert load(WEDGE, {"event": f"[{first}, {second}]"}).event
+        return
+    with pytest.raises(ScenarioError, match=r"event\[1\].clock.offset_s: -4; .* less than 0 s"):
+        load(WEDGE, {"event": f"[{first}, {second}]"})
+
+
+def test_a_clock_fault_again_and_again_shows_no_time_below_0() -> None:
+    with pytest.raises(ScenarioError, match="of agent 1 could show less than 0 s at 7 s"):
+        load(WEDGE, {"event": f"[{clock(5, -3, more=', every_s = 1')}]"})
+
+
 @pytest.mark.parametrize(("sensors", "warned"), [("['proximity']", False), ("[]", True)])
 def test_a_wrong_pose_among_vehicles_that_cannot_sense_each_other_is_warned_of(
     sensors: str, warned: bool

@@ -32,10 +32,11 @@ from worldsim.engine.operations import (
 from worldsim.engine.step import SlotLoop
 from worldsim.judge.event import By
 from worldsim.judge.run_events import RunEvent
+from worldsim.scenario.clock_checks import ClockErrorNow, ForeseenClocks
 from worldsim.scenario.decoding import decode
 from worldsim.scenario.event_checks import problem_now
 from worldsim.scenario.events import EventTable
-from worldsim.scenario.faults import Intruder, MissionChange, ProcessFault, StopWorld
+from worldsim.scenario.faults import ClockFault, Intruder, MissionChange, ProcessFault, StopWorld
 from worldsim.scenario.foreseen_fleet import FleetNow
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.timeline import Step
@@ -121,6 +122,7 @@ class Control:
                     carry_out(operation, "operator")
             else:
                 step = self._timeline.begin_now(event)
+                self._check_clocks(step)
                 carry_out(self._operation(step, request), "operator")
                 self._timeline.keep(step)
                 name = event.called(step.number) if event.is_fault else None
@@ -144,6 +146,19 @@ class Control:
         if isinstance(event.action, by_launcher) and not self._launcher:
             raise RequestError(f"{event.kind}: this fleet has no launcher; do it by hand")
         return event
+
+    def _check_clocks(self, begins: Step) -> None:
+        """Raise RequestError where a fault, with others now or later, puts a clock below 0 s."""
+        if not isinstance(begins.event.action, ClockFault):
+            return
+        in_force = {}
+        for number, errors in self._loop.world.clocks.in_force.items():
+            in_force[number] = ClockErrorNow(*next(iter(errors.values())), tuple(errors))
+        clocks = ForeseenClocks(self._scenario.rows, self._scenario.duration_s, in_force)
+        found = clocks.first_problem(self._timeline.foreseen(begins))
+        if found is not None:
+            _, problem = found
+            raise RequestError(f"{problem.key}: {problem.detail}")
 
     def _ends(self, name: str) -> Iterator[Operation]:
         """End a fault now, and all its repetitions; yield what undoes those that are in force.

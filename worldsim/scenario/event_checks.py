@@ -15,6 +15,7 @@ from agent.qstructure.mission_check import MissionError, check_mission
 from netem.faults import RadioFault
 from netem.link_parameters import Conditions
 from worldsim.scenario.agent_fault_checks import agent_fault_problem
+from worldsim.scenario.clock_checks import ForeseenClocks
 from worldsim.scenario.events import ACTIONS, UNDOABLE, EventTable
 from worldsim.scenario.faults import (
     AgentFault,
@@ -99,9 +100,10 @@ def check_timeline(scenario: Scenario, file: Path, sources: dict[int, FormationS
     _check_count(scenario, file)
     checks = EventChecks(scenario, ForeseenFleet(scenario))
     index_of = {number: each.origin for number, each in occurrences(scenario).items()}
+    clocks = ForeseenClocks(scenario.rows, scenario.duration_s)
     for step in steps(scenario):
         try:
-            problem = next(checks.problems(step), None)
+            problem = next(checks.problems(step), None) or clocks.problem(step)
         except FormationError as error:
             index = index_of[step.number]
             default = FormationSource(file, f"event[{index}].formation.")

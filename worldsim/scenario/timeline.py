@@ -55,12 +55,20 @@ def steps(scenario: Scenario) -> list[Step]:
     """
     found, ended = [], _ended_s(scenario)
     for number, (_, event) in occurrences(scenario).items():
-        found.append(Step(event.at_s, number, event, False))
-        ends_s = inf if event.for_s is None else _sum(event.at_s, event.for_s)
-        ends_s = min(ends_s, ended.get(event.called(number), inf))
-        if ends_s < inf:
-            found.append(Step(ends_s, number, event, True))
-    return sorted(found, key=lambda step: (step.at_s, not step.ends, step.number))
+        found += _steps_of(number, event, ended.get(event.called(number), inf))
+    return _in_order(found)
+
+
+def _steps_of(number: int, event: EventTable, ended_s: float = inf) -> list[Step]:
+    """Return an event's beginning, and its end where it has one. ended_s: by another event [s]."""
+    ends_s = inf if event.for_s is None else _sum(event.at_s, event.for_s)
+    begins = Step(event.at_s, number, event, False)
+    ends = Step(min(ends_s, ended_s), number, event, True)
+    return [begins, ends] if ends.at_s < inf else [begins]
+
+
+def _in_order(steps_: list[Step]) -> list[Step]:
+    return sorted(steps_, key=lambda step: (step.at_s, not step.ends, step.number))
 
 
 def _ended_s(scenario: Scenario) -> dict[str, float]:
@@ -121,6 +129,16 @@ class Timeline:
         while event.name is None and self.numbers_of(event.called(self._number)):
             self._number += 1
         return Step(event.at_s, self._number, event, False)
+
+    def foreseen(self, begins: Step) -> list[Step]:
+        """Return the steps to come if an operator's event begins now, its own with them.
+
+        Its repetitions have numbers below 0.
+        """
+        own = _steps_of(begins.number, begins.event)
+        for n, event in enumerate(_repetitions(begins.event, begins.number, self._duration_s)):
+            own += _steps_of(-1 - n, event)
+        return _in_order([*own, *self._steps[self._next :]])
 
     def keep(self, begun: Step) -> None:
         """Add an operator's event that was carried out: its end and repetitions, if it has any."""

@@ -45,12 +45,24 @@ class AgentClocks:
         if not errors:
             self._errors.pop(agent, None)
 
+    @property
+    def in_force(self) -> dict[int, dict[int, ClockError]]:
+        """The errors of each fault in force, by its number, by agent."""
+        found: dict[int, dict[int, ClockError]] = {}
+        for agent, errors in self._errors.items():
+            for number, error in errors.items():
+                found.setdefault(number, {})[agent] = error
+        return found
+
     def ahead_s(self, agent: int, time_s: float) -> float:
         """Return how far an agent's clock is ahead of the time [s]; negative where it is behind."""
         return sum(error.at(time_s) for error in self._errors.get(agent, {}).values())
 
     def shown_s(self, agent: int, time_s: float) -> float:
-        """Return the time that an agent's clock shows [s], at least 0, and count it."""
+        """Return the time that an agent's clock shows [s], and count it.
+
+        Faults that would let it show less than 0 s are refused; what is below is rounding.
+        """
         errors = self._errors.get(agent)
         if errors is None:
             return time_s
