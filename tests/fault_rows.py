@@ -205,7 +205,6 @@ ROWS = (
         "the world stopped for 5 s",
         (at("pause = ['world']", for_s=5.0),),
         10.0,
-        more=(("expect.idle_faults", "true"),),
     ),
     *(
         Row(f"sensors {mode}", (sensors(mode),), 15.0, lasts_s=50.0, converges_s=32.0)

@@ -10,6 +10,7 @@ from tests.small_scenario import SMALL
 from worldsim.campaign.flight import finished
 from worldsim.engine.step import SlotLoop, world_of
 from worldsim.engine.virtual import Flight, VirtualFleet, fly
+from worldsim.results.fault_rows import fault_texts
 from worldsim.results.summary import summarise
 from worldsim.scenario.file import parse
 
@@ -118,13 +119,16 @@ def test_a_killed_world_ends_the_run_inconclusive() -> None:
     assert kinds(found) == [(3.0, "world_outage")]
 
 
-def test_a_pause_of_the_world_changes_nothing_in_virtual_time_and_proves_nothing() -> None:
+def test_a_pause_of_the_world_changes_nothing_in_virtual_time_and_is_left_out() -> None:
     event = "at_s = 3\nfor_s = 1\npause = ['world']"
     assert flight(event).loop.trace.sha256 == flight().loop.trace.sha256
     summary = flown(event)
-    assert summary["outcome"] == "inconclusive"
-    assert summary["reason"] == "the pause of world at 3 s struck nothing"
-    assert summary["faults"][0]["to_s"] == 3.0
+    assert (summary["outcome"], summary["reason"]) == ("pass", None)
+    (row,) = summary["faults"]
+    assert (row["to_s"], row["stopped_s"]) == (3.0, None)
+    assert fault_texts([row]) == [
+        "pause of world, at 3 s: left out: virtual time has no process of the world to stop"
+    ]
 
 
 BAD = {

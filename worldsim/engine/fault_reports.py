@@ -29,8 +29,8 @@ class FaultReport:
     number: of its event, as in events.jsonl; kind: the event's key; from_s: when it began [s];
     to_s: when it ended [s], None while it is in force; agents: those that it struck, ascending;
     process: netem's or the world's, of a fault that struck that one. observations: how many did not
-    pass while netem was down; stopped_s: how long the world stood still [s; wall time]; writes: how
-    many failed.
+    pass while netem was down; stopped_s: how long the world stood still [s; wall time], None where
+    no process was stopped; writes: how many failed.
     """
 
     def __init__(
@@ -46,7 +46,8 @@ class FaultReport:
         self.agents = sorted(agents)
         self.process = process
         self.to_s: float | None = None
-        self.observations, self.stopped_s, self.writes = 0, 0.0, 0
+        self.observations = self.writes = 0
+        self.stopped_s: float | None = None
         self._held = set(agents)
 
     def release(self, agents: Collection[int], t_s: float) -> None:
@@ -133,7 +134,7 @@ class FaultReports:
         """Note that the world stood still for a pause [s; wall time]."""
         for each in self.all:
             if each.number == number:
-                each.stopped_s += stopped_s
+                each.stopped_s = (each.stopped_s or 0.0) + stopped_s
 
     def end(self, number: int, t_s: float) -> None:
         """Note that the time of a fault is over [s]; its agents may be held down by others."""

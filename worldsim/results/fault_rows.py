@@ -39,7 +39,7 @@ class FaultRow(TypedDict):
     messages: int | None  # of an intruder; None where there is no router, too
     process: str | None  # "netem" or "world", of a fault that strikes no agent
     observations: int | None  # that no agent got while netem was down
-    stopped_s: float | None  # wall time that the world stood still
+    stopped_s: float | None  # wall time that the world stood still; None in virtual time, too
     writes: int | None  # of events and recording, that failed on a full disk
 
 
@@ -69,7 +69,7 @@ def fault_rows(
             "messages": messages.get(each.number),
             "process": each.process,
             "observations": each.observations if each.process == "netem" else None,
-            "stopped_s": _stopped_s(each),
+            "stopped_s": None if each.stopped_s is None else round(each.stopped_s, 3),
             "writes": each.writes if each.kind == "disk_full" else None,
         }
         for each in faults
@@ -82,12 +82,6 @@ def _strikes_agents(fault: FaultReport) -> bool:
         and fault.kind != "disk_full"
         and (not fault.on_radio or fault.kind == "sabotage")
     )
-
-
-def _stopped_s(fault: FaultReport) -> float | None:
-    """Return how long the world stood still for a fault; None where it was not to."""
-    pauses = fault.process == "world" and fault.kind == "pause"
-    return round(fault.stopped_s, 3) if pauses else None
 
 
 def idle_text(rows: Sequence[FaultRow]) -> str | None:
@@ -127,8 +121,10 @@ def fault_texts(rows: Sequence[FaultRow]) -> list[str]:
 
 def _when(row: FaultRow) -> str:
     by = f" by the {row['by']}" if row["by"] is not None else ""
+    begins = _rounded(row["from_s"])
     until = "the end" if row["to_s"] is None else f"{_rounded(row['to_s'])} s"
-    return f"{_what(row)}{by}, {_rounded(row['from_s'])} s to {until}"
+    span = f"at {begins} s" if until == f"{begins} s" else f"{begins} s to {until}"
+    return f"{_what(row)}{by}, {span}"
 
 
 def _what(row: FaultRow) -> str:
@@ -177,6 +173,8 @@ def _stop(row: FaultRow) -> str:
         return f"kept {_counted(row['observations'], 'observation')} from agents"
     if row["stopped_s"] is not None:
         return f"the world stood still for {row['stopped_s']:.3g} s of wall time"
+    if row["kind"] == "pause":
+        return "left out: virtual time has no process of the world to stop"
     return "ended the run"
 
 
