@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import pytest
 
+from worldsim.fleet.late_under_attack import LateUnderAttack, attackers
 from worldsim.fleet.overload import (
     LEAST_FACTOR,
     LOOK_EVERY_S,
@@ -47,6 +48,21 @@ def test_the_share_is_that_of_the_last_seconds() -> None:
         share.add(float(second), 10, 10 if second <= 18 else 0)
     assert (share.of_last(2.0), share.of_last(10.0)) == (0.0, 0.8)
     assert (percent(0.1234), percent(0.0123), percent(1.0)) == ("12 %", "1.2 %", "100 %")
+
+
+def test_an_intruder_is_named_where_ticks_are_late_under_its_attack() -> None:
+    under = LateUnderAttack()
+    for late, intruders in ((0, [1]), (5, []), (15, [3])):
+        under.note(late, intruders)
+    assert str(under) == "75 % of them while intruder-3 attacked the router"
+    assert str(LateUnderAttack()) == ""
+    assert attackers([]) == ""
+    assert attackers([3]) == "intruder-3 attacks the router"
+    spells = LateSpells()
+    for second in range(4):
+        attack = attackers([0, 3]) if second >= 2 else ""
+        spells.add(float(second), 100, 30 if attack else 0, float(second), attack)
+    assert str(spells).endswith(", at 3.0 s, while intruder-0, intruder-3 attack the router")
 
 
 def test_a_spell_of_late_ticks_excuses_what_is_violated_in_it_and_nothing_else() -> None:

@@ -74,6 +74,10 @@ class FaultReports:
         """The numbers of the faults that have not ended, in the order in which they began."""
         return [each.number for each in self.all if each.to_s is None]
 
+    def of_kind(self, kind: str) -> list[FaultReport]:
+        """Return the faults of a kind, in the order in which they began."""
+        return [each for each in self.all if each.kind == kind]
+
     def take(self, operation: Operation, t_s: float, by: By) -> None:
         """Take an operation that was carried out at a time [s]: it may begin a fault, or end some.
 

@@ -42,6 +42,7 @@ from worldsim.fleet.control import Control, ControlServer
 from worldsim.fleet.culprits import Culprits
 from worldsim.fleet.delivery_latency import DeliveryLatency, LatencyCollector
 from worldsim.fleet.ipc import AgentProcess, IntruderEndRequest, IntruderRequest, ProcessAction
+from worldsim.fleet.late_under_attack import LateUnderAttack, attackers
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.netem_process import NetemProcess
 from worldsim.fleet.overload import REMEDIES, LateSpells, Overload, percent
@@ -93,13 +94,13 @@ class FreeRunningFleet:
         self.medium_counters: MediumCounters | None = None
         self.lateness = LatenessCounter(len(rows))
         self._unsafe = UnsafeAgents(scenario.control.separation_m, scenario.obstacle_bound_m)
-        self.overload, self.late_spells = overload, LateSpells()
+        self.overload = overload
+        self.late_spells, self._under_attack = LateSpells(), LateUnderAttack()
         self.real_time_factor: float | None = None
         self.resources = ResourceMeter(launcher.steps)
-        self._agent_steps = 0
+        self._agent_steps = self._ticks_seen = 0
         self._culprits = Culprits(launcher.steps, launcher.report_notice, speed)
         self._late_agents: list[int] = []
-        self._ticks_seen = 0
         self._scenario = scenario
         self._launcher = launcher
         self._startup = startup
@@ -149,7 +150,9 @@ class FreeRunningFleet:
             return None
         agent, share = latest
         world = f"; the world fell behind by {behind_s:.1f} s" if behind_s >= BEHIND_S else ""
-        return f"most often those of {agent_name(agent)} ({percent(share)}){world}; {REMEDIES}"
+        attack = f", {self._under_attack}" if str(self._under_attack) else ""
+        whose = f"most often those of {agent_name(agent)} ({percent(share)}){attack}"
+        return f"{whose}{world}; {REMEDIES}"
 
     @property
     def unsafe_on_time(self) -> bool:
@@ -182,8 +185,8 @@ class FreeRunningFleet:
     @property
     def messages(self) -> Mapping[int, int]:
         """How many messages each intruder has put, by its fault's number."""
-        numbers = [each.number for each in self.loop.effects.faults.all if each.kind == "intruder"]
-        put = {number: self._launcher.messages_put(number) for number in numbers}
+        intruders = self.loop.effects.faults.of_kind("intruder")
+        put = {each.number: self._launcher.messages_put(each.number) for each in intruders}
         return {number: count for number, count in put.items() if count is not None}
 
     @property
@@ -272,16 +275,20 @@ class FreeRunningFleet:
         self._late_agents.clear()
         ticks, self._ticks_seen = self.lateness.ticks - self._ticks_seen, self.lateness.ticks
         before = self.overload.speed
-        self._note_spell(ticks, late)
+        faults = self.loop.effects.faults
+        intruders = [each.number for each in faults.of_kind("intruder") if each.to_s is None]
+        self._under_attack.note(late, intruders)
+        attack = attackers(intruders)
+        self._note_spell(ticks, late, attack)
         report = self.overload.note(self._pacer.elapsed_s, ticks, late)
         if report is not None:
-            self._launcher.report_notice(report)
+            self._launcher.report_notice(f"{report} ({attack})" if attack else report)
         if self.overload.speed != before:
             self._pacer.change(slot, 1.0 / (self._scenario.slot_hz * self.overload.speed))
 
-    def _note_spell(self, ticks: int, late: int) -> None:
+    def _note_spell(self, ticks: int, late: int, attack: str) -> None:
         """Note how late ticks are, and which invariants are violated meanwhile."""
-        self.late_spells.add(self._pacer.elapsed_s, ticks, late, self.loop.world.time_s)
+        self.late_spells.add(self._pacer.elapsed_s, ticks, late, self.loop.world.time_s, attack)
         tallies = self.loop.judge.invariants()
         self.late_spells.note({name: tally.violations for name, tally in tallies.items()})
 

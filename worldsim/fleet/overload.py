@@ -57,15 +57,20 @@ class LateSpells:
 
     def __init__(self) -> None:
         self._share = LateShare()
-        self._worst = 0.0, 0.0
+        self._worst, self._under = (0.0, 0.0), ""
         self._noted: dict[str, int] = {}
         self.violated_in_time: set[str] = set()
         """The invariants of which a violation was found while no ticks were late."""
 
-    def add(self, now_s: float, ticks: int, late: int, time_s: float) -> None:
-        """Take the ticks since the last call, by a wall time and a simulated time [s]."""
+    def add(self, now_s: float, ticks: int, late: int, time_s: float, attack: str = "") -> None:
+        """Take the ticks since the last call, by a wall time and a simulated time [s].
+
+        attack: which intruders attack meanwhile, in words; empty: none.
+        """
         self._share.add(now_s, ticks, late)
-        self._worst = max(self._worst, (self._share.of_last(SHORT_S), time_s))
+        now = self._share.of_last(SHORT_S), time_s
+        if now > self._worst:
+            self._worst, self._under = now, attack
 
     def note(self, violations: Mapping[str, int]) -> None:
         """Take the number of violations of each invariant so far."""
@@ -81,7 +86,8 @@ class LateSpells:
         if share < SHORT_FRACTION:
             return ""
         share_text = f"{percent(share)} of the ticks of {SHORT_S:g} s were late"
-        return f"the host was too slow for a while: {share_text}, at {time_s:.1f} s"
+        under = f", while {self._under}" if self._under else ""
+        return f"the host was too slow for a while: {share_text}, at {time_s:.1f} s{under}"
 
 
 class SpeedLaw:
