@@ -21,6 +21,28 @@ from tests.commands.conftest import Command
             ("netem", "run", "explode"),
             "ACTION: 'explode'; allowed: show, set, partition, heal, jam, flap, sabotage",
         ),
+        (
+            ("fault", "run", "clock", "3", "offset_s=3", "offset_s=4"),
+            "KEY=VALUE: 'offset_s=4'; offset_s is given before",
+        ),
+        (
+            ("netem", "run", "set", "multihop={}", "multihop.delay_ms=4"),
+            "'multihop.delay_ms=4'; multihop is given before",
+        ),
+        (
+            ("mission", "run", "--frame", "yaw_deg=4", "--frame", "yaw_deg=4"),
+            "'yaw_deg=4'; yaw_deg is given before",
+        ),
+        (
+            ("fault", "run", "disk_full", "later"),
+            "SELECTOR: 'later'; disk_full strikes no agents; write it alone: it begins at once",
+        ),
+        (("fault", "run", "disk_full"), "run: no such folder"),
+        (("fault", "run", "disk_full", "now"), "run: no such folder"),
+        (("fault", "run", "intruder"), "run: no such folder"),
+        (("fault", "run", "kill"), "SELECTOR: name agents, or all"),
+        (("fault", "run", "join"), "SELECTOR: say how many agents join"),
+        (("fault", "run", "end"), "SELECTOR: name the fault to end"),
         (("netem", "run", "partition"), "partition: write groups, e.g. 0,1/2,3 (see qswarm netem"),
         (("netem", "run", "partition", "a,b"), "'a'; a whole number from 0"),
         (("netem", "run", "set", "loss"), "'loss'; write it as KEY=VALUE"),

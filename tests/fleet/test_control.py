@@ -163,6 +163,8 @@ def test_the_answer_says_by_which_name_a_fault_can_be_ended() -> None:
     assert fleet.ask(pause=[3], name="freeze").name == "freeze"
     assert fleet.ask(resume=[3]).name is None
     assert fleet.ask(end="kill-1").name is None
+    assert fleet.ask(pause=["world"], for_s=1).name is None, "it is over before an end can come"
+    assert fleet.ask(kill=["world"]).name is None, "nothing ends it"
 
 
 def test_a_fault_that_repeats_ends_for_good_between_two_of_its_times() -> None:

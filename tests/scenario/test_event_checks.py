@@ -123,6 +123,8 @@ INVALID = [
     (["at_s = 6, join = 1", "at_s = 5, kill = [0, 9]"], "event[1].kill[1]", "no agent 9"),
     (["at_s = 5, leave = ['vertex:V2']"], "event[0].leave[0]", "no vertex 'V2'"),
     (["at_s = 5, leave = ['queue:Q9']"], "event[0].leave[0]", "there are Q1, Q2, Q3, Q4"),
+    (["at_s = 5, restart = [1.5]"], "event[0].restart[0]", "allowed: an id, 'random:2' or 'all'"),
+    (["at_s = 5, kill = ['nettem']"], "event[0].kill[0]", "; or 'netem' or 'world', alone"),
     (["at_s = 5, kill = ['random:0']"], "event[0].kill[0]", "'random:2' or 'all'"),
     (["at_s = 5, kill = ['vertex:']"], "event[0].kill[0]", "an id, 'vertex:V1'"),
     (["at_s = 5, restart = ['vertex:V1']"], "event[0].restart[0]", "an id, 'random:2'"),
@@ -225,6 +227,13 @@ def test_an_error_names_the_key_of_an_invalid_event(
         timeline(*events)
     assert str(caught.value).startswith(f"{WEDGE}: {key}")
     assert detail in str(caught.value)
+
+
+@pytest.mark.parametrize("fault", ["leave = [1.5]", "leave = ['x']", "clock = { agents = [1.5] }"])
+def test_netem_is_suggested_only_where_it_can_be_struck(fault: str) -> None:
+    with pytest.raises(ScenarioError, match=r"'all'") as caught:
+        load(WEDGE, {"event": f"[{{ at_s = 5, {fault} }}]"})
+    assert "'netem'" not in str(caught.value)
 
 
 def test_a_join_beyond_the_size_of_the_formation_is_rejected() -> None:

@@ -37,6 +37,8 @@ EventName = Annotated[
 
 EventKeys = Mapping[str, float | str | None]
 NO_KEYS: EventKeys = {}
+_NEEDED = {"join": "say how many agents join", "end": "name the fault to end"}
+"""What is missing where no word follows an action; agents after the others."""
 
 commands = typer.Typer()
 
@@ -104,14 +106,16 @@ def fault(
         str, typer.Argument(metavar="ACTION", help="One of: " + ", ".join(FAULTS) + ".")
     ],
     selectors: Annotated[
-        list[str],
+        list[str] | None,
         typer.Argument(
             metavar="SELECTOR",
-            help="Agents: ids, vertex:V1, queue:Q1, random:2 or all; netem or world."
-            " With join: how many. With disk_full: now."
-            f" With end: a fault's name. With {', '.join(AGENT_FAULTS)}: KEY=VALUE too.",
+            help="Agents: ids, vertex:V1, queue:Q1, random:2 or all."
+            " With kill or pause: netem or world too, alone. With join: how many."
+            f" With end: a fault's name. With {', '.join(AGENT_FAULTS)}: KEY=VALUE too."
+            " With disk_full: none.",
+            show_default=False,
         ),
-    ],
+    ] = None,
     for_s: ForSeconds = None,
     every_s: EverySeconds = None,
     name: EventName = None,
@@ -124,26 +128,35 @@ def fault(
     slow lets each step of agents take delay_s. starve lets processes run for cpu_percent of each
     period_s only. intruder lets a process attack the router (per_s), with the passwords of agents
     or without any.
-    disk_full lets nothing more of recording and events be written. end ends a fault of any kind
-    before its time, by its name: its kind and number, as in "kill-2", unless --name gave it
-    another one.
+    disk_full lets nothing more of recording and events be written, at once. end ends a fault of
+    any kind before its time, by its name: its kind and number, as in "kill-2", unless --name gave
+    it another one.
     """
     if action not in FAULTS:
         raise _bad(action, "ACTION", f"allowed: {', '.join(FAULTS)}")
+    event = _fault(action, selectors or [])
+    return _request(run, event, {"for_s": for_s, "every_s": every_s, "name": name})
+
+
+def _fault(action: str, words: list[str]) -> dict[str, Any]:
+    """Return the event of a fault, from the words after it."""
+    if action == "disk_full":
+        if words not in ([], ["now"]):
+            detail = "disk_full strikes no agents; write it alone: it begins at once"
+            raise _bad(" ".join(words), "SELECTOR", detail)
+        return {"disk_full": True}
+    if not words and action != "intruder":
+        raise typer.BadParameter(_NEEDED.get(action, "name agents, or all"), param_hint="SELECTOR")
     match action:
         case "join":
-            event: dict[str, Any] = {"join": _number(" ".join(selectors), "SELECTOR")}
+            return {"join": _number(" ".join(words), "SELECTOR")}
         case "end":
-            event = _end(selectors)
-        case "disk_full":
-            event = {"disk_full": selectors == ["now"]}
+            return _end(words)
         case _ if action in AGENT_FAULTS:
-            keys = [word for word in selectors if "=" in word]
-            agents = [word for word in selectors if "=" not in word]
-            event = {action: {"agents": _selectors(agents), **_table(keys)}}
-        case _:
-            event = {action: _selectors(selectors)}
-    return _request(run, event, {"for_s": for_s, "every_s": every_s, "name": name})
+            keys = [word for word in words if "=" in word]
+            agents = [word for word in words if "=" not in word]
+            return {action: {"agents": _selectors(agents), **_table(keys)}}
+    return {action: _selectors(words)}
 
 
 def change_radio(run: Path, action: str, words: list[str], more: EventKeys) -> int:
@@ -252,10 +265,15 @@ def _table(settings: list[str]) -> dict[str, Any]:
     from worldsim.commands.options import overrides_of
     from worldsim.scenario.toml import override
 
+    given: list[str] = []
     for setting in settings:
-        key, equals, _ = setting.partition("=")
-        if not equals or not key.strip():
+        key, equals, _ = (part.strip() for part in setting.partition("="))
+        if not equals or not key:
             raise _bad(setting, "KEY=VALUE", "write it as KEY=VALUE")
+        for before in given:
+            if f"{key}.".startswith(f"{before}.") or f"{before}.".startswith(f"{key}."):
+                raise _bad(setting, "KEY=VALUE", f"{before} is given before")
+        given.append(key)
     table: dict[str, Any] = {}
     override(table, overrides_of(settings, None, None, None), "KEY=VALUE")
     return table

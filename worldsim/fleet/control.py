@@ -125,7 +125,8 @@ class Control:
                 self._check_clocks(step)
                 carry_out(self._operation(step, request), "operator")
                 self._timeline.keep(step)
-                name = event.called(step.number) if event.is_fault else None
+                endless = isinstance(event.action, StopWorld)  # it is over at once, or the run is
+                name = event.called(step.number) if event.is_fault and not endless else None
         return self._answer(self._loop.events[first:], name)
 
     def _event(self, keys: dict[str, Any]) -> EventTable:

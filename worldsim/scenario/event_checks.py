@@ -39,6 +39,9 @@ from worldsim.scenario.problem import Problem
 from worldsim.scenario.radio_checks import radio_problems
 from worldsim.scenario.rules import start_problem, tilt_problem
 from worldsim.scenario.selectors import (
+    AGENTS,
+    RETURNING,
+    STOPPABLE,
     AllAgents,
     OneAgent,
     OtherProcess,
@@ -260,15 +263,16 @@ class EventChecks:
     ) -> Iterator[Problem]:
         match action:
             case Kill() | Leave() | Pause():
-                return self._selectors(kind, action.selectors, hold_places=True)
+                allowed = AGENTS if isinstance(action, Leave) else STOPPABLE
+                return self._selectors(kind, action.selectors, allowed)
             case Restart() | Resume():
-                return self._selectors(kind, action.selectors, hold_places=False)
+                return self._selectors(kind, action.selectors, RETURNING)
             case SensorFault() | SabotageFault():
-                return self._selectors(f"{kind}.agents", action.agents, hold_places=True)
+                return self._selectors(f"{kind}.agents", action.agents)
         assert_never(action)
 
     def _agent_fault(self, kind: str, fault: AgentFault, at_s: float) -> Iterator[Problem]:
-        yield from self._selectors(f"{kind}.agents", fault.agents, hold_places=True)
+        yield from self._selectors(f"{kind}.agents", fault.agents)
         broken = agent_fault_problem(fault, at_s)
         if broken is not None:
             yield broken.within(kind)
@@ -278,19 +282,22 @@ class EventChecks:
             yield Problem("heal", "no partition to heal at that time")
         yield from radio_problems(event, self._scenario.rows)
 
-    def _selectors(self, key: str, selectors: Selectors, hold_places: bool) -> Iterator[Problem]:
-        """Check selectors; hold_places: whether the candidates hold places to be selected by."""
+    def _selectors(
+        self, key: str, selectors: Selectors, allowed: str = AGENTS
+    ) -> Iterator[Problem]:
+        """Check selectors; allowed: which are, in words."""
         for index, selector in enumerate(selectors):
-            detail = self._selector(selector, hold_places)
+            detail = self._selector(selector, allowed)
             if detail is not None:
                 yield Problem(f"{key}[{index}]", detail)
 
-    def _selector(self, selector: Selector, hold_places: bool) -> str | None:
+    def _selector(self, selector: Selector, allowed: str) -> str | None:
         """Return what makes a selector invalid, or None."""
+        hold_places = allowed != RETURNING
         try:
             kind = parsed(selector)
         except SelectorError:
-            return _not_allowed(selector, hold_places)
+            return _not_allowed(selector, allowed)
         match kind:
             case OneAgent(agent):
                 known = 0 <= agent < self.fleet.id_count
@@ -301,7 +308,7 @@ class EventChecks:
             case QueueAgents(name) if hold_places:
                 return self._name("queue", name, [queue.name for queue in self.fleet.spec.queue])
             case VertexAgent() | QueueAgents():
-                return _not_allowed(selector, hold_places)
+                return _not_allowed(selector, allowed)
             case RandomAgents() | AllAgents() | OtherProcess():
                 return _other_process_problem(kind)
         assert_never(kind)
@@ -402,9 +409,8 @@ def _world_problems(event: EventTable) -> Iterator[Problem]:
             yield Problem(key, "not with kill = ['world']: it ends the run")
 
 
-def _not_allowed(selector: Selector, hold_places: bool) -> str:
-    places = " 'vertex:V1', 'queue:Q1'," if hold_places else ""
-    return f"got the text {selector!r}; allowed: an id,{places} 'random:2' or 'all'"
+def _not_allowed(selector: Selector, allowed: str) -> str:
+    return f"got the text {selector!r}; allowed: {allowed}"
 
 
 def _listed(start: ListStart, joiners: int) -> Iterator[Problem]:

@@ -32,7 +32,13 @@ from worldsim.scenario.faults import (
     StarveFault,
     StopWorld,
 )
-from worldsim.scenario.selectors import ProcessName, Selectors, other_process
+from worldsim.scenario.selectors import (
+    ProcessName,
+    ReturningSelectors,
+    Selectors,
+    StoppableSelectors,
+    other_process,
+)
 from worldsim.scenario.target_frame import FrameChange, Time
 
 Name = Annotated[
@@ -72,11 +78,11 @@ class EventTable(RadioKeys[SabotageFault], frozen=True, kw_only=True, omit_defau
     for_s: Positive | None = None
     every_s: Positive | None = None
     name: Name | None = None
-    kill: Selectors | None = None
+    kill: StoppableSelectors | None = None
     leave: Selectors | None = None
-    restart: Selectors | None = None
-    pause: Selectors | None = None
-    resume: Selectors | None = None
+    restart: ReturningSelectors | None = None
+    pause: StoppableSelectors | None = None
+    resume: ReturningSelectors | None = None
     join: Joiners | Join | None = None
     sensor: SensorFault | None = None
     clock: ClockFault | None = None

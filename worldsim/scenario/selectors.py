@@ -5,12 +5,18 @@ from typing import Annotated, Literal, NamedTuple
 
 from msgspec import Meta
 
-Selector = Annotated[
-    int | str,
-    Meta(description="an id, 'vertex:V1', 'queue:Q1', 'random:2' or 'all'; 'netem' or 'world'"),
-]
+AGENTS = "an id, 'vertex:V1', 'queue:Q1', 'random:2' or 'all'"
+"""Selectors of agents, in words."""
+STOPPABLE = f"{AGENTS}; or 'netem' or 'world', alone"
+"""Selectors of processes to kill or pause, in words."""
+RETURNING = "an id, 'random:2' or 'all'"
+"""Selectors of agents that come back, and hold no places to be selected by, in words."""
+Selector = Annotated[int | str, Meta(description=AGENTS)]
 """As a scenario writes it."""
-Selectors = Annotated[tuple[Selector, ...], Meta(min_length=1, max_length=1000)]
+_Many = Meta(min_length=1, max_length=1000)
+Selectors = Annotated[tuple[Selector, ...], _Many]
+StoppableSelectors = Annotated[tuple[Annotated[int | str, Meta(description=STOPPABLE)], ...], _Many]
+ReturningSelectors = Annotated[tuple[Annotated[int | str, Meta(description=RETURNING)], ...], _Many]
 
 ProcessName = Literal["netem", "world"]
 """The processes that the whole fleet needs; netem: those of all shards."""
