@@ -107,7 +107,7 @@ def draft(draw: Draw, steps: int) -> Tables:
             "in_formation_fraction": draw.number(0.0, 1.0),
             "max_slot_error_m": draw.number(0.0, 2.0),
             "idle_faults": draw.chance(0.5),
-            "min_lambda2": draw.number(0.0, 9.0),
+            "min_lambda2": draw.number(0.0, made["fleet"]["agents"]),
         }
     made["event"] = repeated_and_ended(draw, made["event"], made["duration_s"])
     return made

@@ -22,6 +22,8 @@ def timeline(*events: str) -> Scenario:
 
 VALID = [
     ["at_s = 5, kill = [2, 'vertex:V1', 'queue:Q1', 'random:2', 'all'], for_s = 3"],
+    ["at_s = 5, for_s = 2, sabotage = { kind = 'replay', agents = [1], delay_s = 1.9 }"],
+    ["at_s = 5, for_s = 2, sabotage = { kind = 'spoof', agents = [1] }"],
     ["at_s = 5, join = 2", "at_s = 6, kill = [10]", "at_s = 7, restart = ['all', 10]"],
     ["at_s = 5, join = { count = 1, start = { kind = 'box', centre_m = [9, 9, 9] } }"],
     ["at_s = 5, partition = [[0, 1], [2]]", "at_s = 7, heal = true"],
@@ -124,6 +126,16 @@ INVALID = [
     (["at_s = 5, leave = ['vertex:V2']"], "event[0].leave[0]", "no vertex 'V2'"),
     (["at_s = 5, leave = ['queue:Q9']"], "event[0].leave[0]", "there are Q1, Q2, Q3, Q4"),
     (["at_s = 5, restart = [1.5]"], "event[0].restart[0]", "allowed: an id, 'random:2' or 'all'"),
+    (
+        ["at_s = 5, for_s = 2, sabotage = { kind = 'replay', agents = [1] }"],
+        "event[0].sabotage.delay_s",
+        "2; below for_s = 2",
+    ),
+    (
+        ["at_s = 15, sabotage = { kind = 'replay', agents = [1], delay_s = 5 }"],
+        "event[0].sabotage.delay_s",
+        "the run ends 5 s later",
+    ),
     (["at_s = 5, kill = ['nettem']"], "event[0].kill[0]", "; or 'netem' or 'world', alone"),
     (["at_s = 5, kill = ['random:0']"], "event[0].kill[0]", "'random:2' or 'all'"),
     (["at_s = 5, kill = ['vertex:']"], "event[0].kill[0]", "an id, 'vertex:V1'"),

@@ -128,6 +128,14 @@ def test_a_box_without_room_is_refused_quickly(tmp_path: Path, agents: str) -> N
     assert refusal(tmp_path, scenario).startswith("/s.toml: fleet.start: no room for ")
 
 
+def test_no_network_is_connected_more_than_by_all() -> None:
+    joined = {"event": "[{ at_s = 1, join = 1 }]"}
+    assert wedge(expect__min_lambda2="9").expect.min_lambda2 == 9.0
+    assert wedge(expect__min_lambda2="10", **joined).expect.min_lambda2 == 10.0
+    with pytest.raises(ScenarioError, match=r"expect.min_lambda2: 9.1; at most 9, the number of"):
+        wedge(expect__min_lambda2="9.1")
+
+
 def test_a_laser_has_no_more_rays_than_a_scan_holds() -> None:
     many = {"sensor__laser__rays": "600", "sensor__laser__elevation_deg": "80"}
     assert wedge(**many, sensor__laser__rings="50").sensor.laser.rays == 600

@@ -229,22 +229,17 @@ class EventChecks:
             return self._radio(event)
         if isinstance(action, AgentFault):
             return self._agent_fault(event.kind, action, event.at_s)
+        if isinstance(action, SabotageFault):
+            return self._sabotage(event, action)
         return self._other_problems(event, action)
 
     def _other_problems(
         self,
         event: EventTable,
-        action: ProcessFault
-        | FaultOfWorld
-        | SensorFault
-        | SabotageFault
-        | MissionChange
-        | EndFault,
+        action: ProcessFault | FaultOfWorld | SensorFault | MissionChange | EndFault,
     ) -> Iterator[Problem]:
         match action:
-            case (
-                Kill() | Leave() | Pause() | Restart() | Resume() | SensorFault() | SabotageFault()
-            ):
+            case Kill() | Leave() | Pause() | Restart() | Resume() | SensorFault():
                 return self._selection(event.kind, action)
             case Join():
                 return self._join(action)
@@ -259,7 +254,7 @@ class EventChecks:
     def _selection(
         self,
         kind: str,
-        action: Kill | Leave | Pause | Restart | Resume | SensorFault | SabotageFault,
+        action: Kill | Leave | Pause | Restart | Resume | SensorFault,
     ) -> Iterator[Problem]:
         match action:
             case Kill() | Leave() | Pause():
@@ -267,9 +262,22 @@ class EventChecks:
                 return self._selectors(kind, action.selectors, allowed)
             case Restart() | Resume():
                 return self._selectors(kind, action.selectors, RETURNING)
-            case SensorFault() | SabotageFault():
+            case SensorFault():
                 return self._selectors(f"{kind}.agents", action.agents)
         assert_never(action)
+
+    def _sabotage(self, event: EventTable, fault: SabotageFault) -> Iterator[Problem]:
+        yield from self._selectors("sabotage.agents", fault.agents)
+        if fault.kind != "replay":
+            return
+        for_s, delay_s = event.for_s, fault.delay_s
+        if for_s is not None and delay_s >= for_s:
+            detail = f"{delay_s:g}; below for_s = {for_s:g}, or no frame is sent again before it"
+            yield Problem("sabotage.delay_s", detail)
+        left_s = self._scenario.duration_s - event.at_s
+        if delay_s >= left_s:
+            detail = f"{delay_s:g}; the run ends {left_s:g} s later: no frame would be sent again"
+            yield Problem("sabotage.delay_s", detail)
 
     def _agent_fault(self, kind: str, fault: AgentFault, at_s: float) -> Iterator[Problem]:
         yield from self._selectors(f"{kind}.agents", fault.agents)

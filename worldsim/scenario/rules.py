@@ -243,6 +243,15 @@ def _rates_up_to_tick_rate(scenario: Scenario) -> Problem | None:
     return None
 
 
+def _connected_at_most_by_all(scenario: Scenario) -> Problem | None:
+    """Bound the algebraic connectivity by the number of the nodes (Fiedler 1973)."""
+    wanted, most = scenario.expect.min_lambda2, scenario.rows
+    if wanted is None or wanted <= most:
+        return None
+    detail = f"{wanted:g}; at most {most}, the number of agents, where each hears each"
+    return Problem("expect.min_lambda2", detail)
+
+
 def _frame_consistent(scenario: Scenario) -> Problem | None:
     problem = frame_problem(scenario.frame)
     return problem.within("frame") if problem is not None else None
@@ -390,6 +399,7 @@ RULES = (
     _rates_up_to_tick_rate,
     _laser_rings_apart,
     _laser_fits_a_scan,
+    _connected_at_most_by_all,
     _frame_consistent,
     _obstacles_consistent,
 )
