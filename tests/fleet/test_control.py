@@ -127,13 +127,40 @@ def test_a_saboteur_works_until_it_is_ended() -> None:
         fleet.ask(sabotage={"kind": "flood", "agents": [2]})
 
 
+def test_every_fault_in_force_is_reported_with_whom_it_strikes_and_until_when() -> None:
+    fleet = OperatedFleet(event="[{ at_s = 0.5, for_s = 3, kill = [4, 5] }]")
+    fleet.ask(clock={"agents": [3], "offset_s": 3}, for_s=2)
+    fleet.ask(sensor={"agents": [1], "mode": "silent", "kind": "proximity"}, name="blind")
+    fleet.ask(jam={"centre_m": [0, 0, 0], "radius_m": 2}, for_s=1)
+    fleet.ask(netem={"loss_percent": 5})
+    fleet.ask(sabotage={"kind": "spoof", "agents": [2]})
+    fleet.ask(kill=["netem"], for_s=9)
+    fleet.ask(disk_full=True)
+    found = fleet.ask(restart=[4]).faults
+    assert [(each.name, each.kind, each.until_s, each.agents, each.process) for each in found] == [
+        ("kill-0", "kill", 3.5, (5,), None),
+        ("clock-2", "clock", 3.0, (3,), None),
+        ("blind", "sensor", None, (1,), None),
+        ("jam-4", "jam", 2.0, None, None),
+        ("netem-5", "netem", None, None, None),
+        ("sabotage-6", "sabotage", None, (2,), None),
+        ("kill-7", "kill", 10.0, None, "netem"),
+        ("disk_full-8", "disk_full", None, None, None),
+    ]
+    assert [each.since_s for each in found] == [0.5] + [1.0] * 7
+    assert found[1].values == {"offset_s": 3.0, "drift_ppm": 0.0}
+    assert found[2].values == {"mode": "silent", "kind": "proximity"}
+    fleet.fly(4.0)
+    assert [each.number for each in fleet.ask().faults] == [3, 5, 6, 7, 8]
+
+
 def test_a_fault_ends_early_by_its_name() -> None:
     fleet = OperatedFleet(event="[{ at_s = 0.5, kill = [4] }]")
     fleet.ask(jam={"centre_m": [0, 0, 0], "radius_m": 2}, for_s=9, name="storm")
     fleet.ask(jam={"centre_m": [9, 0, 0], "radius_m": 2})
-    assert [each.name for each in fleet.ask().faults] == ["storm", "jam-3"]
+    assert [each.name for each in fleet.ask().faults] == ["kill-0", "storm", "jam-3"]
     assert [event.kind for event in fleet.ask(end="storm").events] == ["jam"]
-    assert [each.name for each in fleet.ask().faults] == ["jam-3"]
+    assert [each.name for each in fleet.ask().faults] == ["kill-0", "jam-3"]
     assert [event.agent for event in fleet.ask(end="kill-0").events] == [4]
     fleet.fly(12.0)  # the jam's own end finds nothing to end
     assert [(each.kind, each.to_s) for each in fleet.loop.effects.faults.all] == [

@@ -4,14 +4,19 @@ A running fleet is found by its run directory. Its world carries out the request
 the events that followed.
 """
 
+from collections import Counter
 from collections.abc import Mapping
+from itertools import starmap
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from worldsim.commands.options import RunFolder, examples
 from worldsim.results.exit_status import PASS
+
+if TYPE_CHECKING:
+    from worldsim.fleet.active_fault import ActiveFault
 
 AGENT_FAULTS = ("clock", "pose", "slow", "starve", "intruder")
 FAULTS = (
@@ -220,7 +225,7 @@ def _request(
 
 
 def _print_radio(run: Path) -> int:
-    """Print the radio's state as TOML: the keys of [netem], and the faults in force."""
+    """Print a fleet's state as TOML: the keys of [netem], and a [[fault]] for each in force."""
     import msgspec
 
     from worldsim.fleet.control import Request
@@ -228,25 +233,30 @@ def _print_radio(run: Path) -> int:
     from worldsim.scenario.file import as_toml
 
     answer = ask(run, Request())
-    in_force: dict[str, list[dict[str, Any]]] = {}
-    for active in answer.faults:
-        if active.outage is not None:
-            found = {"name": active.name, "since_s": active.since_s, "cause": active.outage}
-            in_force.setdefault("outage", []).append(found)
-        for kind, keys in msgspec.to_builtins(active.fault).items():
-            if kind != "netem":  # the conditions below include it
-                found = {"name": active.name, "since_s": active.since_s, **keys}
-                in_force.setdefault(kind, []).append(found)
-    counts = [_counted(kind, len(each)) for kind, each in in_force.items() if kind != "partition"]
-    parted = "partitioned" if "partition" in in_force else "not partitioned"
-    print(f"# at {answer.t_s:.2f} s: {', '.join([parted, *counts])}")
+    counts = Counter(each.kind for each in answer.faults if each.kind != "partition")
+    parted = any(each.kind == "partition" for each in answer.faults)
+    told = ["partitioned" if parted else "not partitioned", *starmap(_counted, counts.items())]
+    print(f"# at {answer.t_s:.2f} s: {', '.join(told)}")
     changes = [each.name for each in answer.faults if each.fault.netem is not None]
     if changes:
         print(f"# [netem] as changed by {', '.join(changes)}")
     tables = msgspec.to_builtins(answer.conditions)
     conditions = {key: value for key, value in tables.items() if value != {}}
-    print(as_toml({"netem": conditions, **in_force}), end="")
+    print(as_toml({"netem": conditions, "fault": [*map(_shown, answer.faults)]}), end="")
     return PASS
+
+
+def _shown(active: "ActiveFault") -> dict[str, Any]:
+    """Return a fault in force as a table: what it is, whom it strikes, when, and its values."""
+    import msgspec
+
+    keys = ("name", "kind", "since_s", "until_s", "agents", "process")
+    table = {key: getattr(active, key) for key in keys}
+    of_radio = msgspec.to_builtins(active.fault).get(active.kind, {})
+    for key, value in {**of_radio, **active.values}.items():
+        # Of a partition, a sabotage and a sensor fault, a value is called kind too.
+        table[f"{active.kind}_kind" if key == "kind" else key] = value
+    return table
 
 
 def _counted(kind: str, count: int) -> str:

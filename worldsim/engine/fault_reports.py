@@ -58,6 +58,11 @@ class FaultReport:
                 self.to_s = t_s
 
     @property
+    def held(self) -> tuple[int, ...]:
+        """The agents that it strikes still, in ascending order."""
+        return tuple(sorted(self._held))
+
+    @property
     def on_radio(self) -> bool:
         """Whether it strikes frames, not agents."""
         return self.kind in RadioEvent.__struct_fields__

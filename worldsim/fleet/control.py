@@ -12,7 +12,7 @@ import numpy as np
 import zenoh
 
 from agent.comms.mission import last_version
-from netem.faults import FaultOrder, LastingFault, Outage, OutageCause, RadioEvent, Sabotage
+from netem.faults import FaultOrder, Outage, RadioEvent, Sabotage
 from netem.link_parameters import Conditions
 from netem.wire.bus import Bus, Handler, drain
 from worldsim.engine.operations import (
@@ -30,6 +30,7 @@ from worldsim.engine.operations import (
     ThrottleProcesses,
 )
 from worldsim.engine.step import SlotLoop
+from worldsim.fleet.active_fault import ActiveFault, active_faults
 from worldsim.judge.event import By
 from worldsim.judge.run_events import RunEvent
 from worldsim.scenario.clock_checks import ClockErrorNow, ForeseenClocks
@@ -59,26 +60,6 @@ class Request(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     """The mission's version; None: the next one."""
 
 
-class ActiveFault(msgspec.Struct, frozen=True):
-    """A radio fault in force."""
-
-    number: int
-    name: str
-    """By which it can be ended."""
-    since_s: float
-    """When it began [s; simulated time]."""
-    fault: RadioEvent = RadioEvent()
-    outage: OutageCause | None = None
-    """Instead of a fault: netem is down."""
-
-    @staticmethod
-    def of(number: int, name: str, since_s: float, fault: LastingFault) -> "ActiveFault":
-        """Return a fault in force."""
-        if isinstance(fault, Outage):
-            return ActiveFault(number, name, since_s, outage=fault.cause)
-        return ActiveFault(number, name, since_s, RadioEvent.of(fault))
-
-
 class Answer(msgspec.Struct, frozen=True):
     """The answer to a request that was carried out."""
 
@@ -89,7 +70,7 @@ class Answer(msgspec.Struct, frozen=True):
     conditions: Conditions
     """The link conditions in force afterwards."""
     faults: tuple[ActiveFault, ...]
-    """The radio faults in force afterwards, in the order in which they began."""
+    """The faults in force afterwards, in the order in which they began."""
     name: str | None = None
     """By which the fault that the request began can be ended; None: it began none."""
 
@@ -251,10 +232,7 @@ class Control:
 
     def _answer(self, events: list[RunEvent], name: str | None) -> Answer:
         network = self._loop.network
-        faults = tuple(
-            ActiveFault.of(number, self._timeline.name_of(number), since_s, fault)
-            for number, (since_s, fault) in network.in_force.items()
-        )
+        faults = tuple(active_faults(self._loop.effects.faults, self._timeline, network))
         t_s = round(self._loop.world.time_s, 6)
         return Answer(t_s, tuple(events), network.conditions, faults, name)
 

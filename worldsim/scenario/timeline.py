@@ -174,6 +174,15 @@ class Timeline:
         """Return the step that ends an event at a time [s]."""
         return Step(at_s, number, self._events[number], True)
 
+    def ends_s(self, number: int) -> float | None:
+        """Return when an event that has begun is to end [s; simulated time]; None: not planned."""
+        to_come = self._steps[self._next :]
+        return next((each.at_s for each in to_come if each.ends and each.number == number), None)
+
+    def event_of(self, number: int) -> EventTable:
+        """Return the event of a number."""
+        return self._events[number]
+
     def is_operators(self, number: int) -> bool:
         """Return whether the event of a number is an operator's, or a repetition of one."""
         return number >= self._first_of_operator
