@@ -10,6 +10,7 @@ from rerun.chunk import Chunk, RrdReader
 
 from agent.messages import DISTRESS, FramePath
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
+from agent.qstructure.frame_path import Track
 from agent.qstructure.shape import Ray
 from tests.recording.flights import straight_flight, wedge
 from worldsim.judge.phase import Phase
@@ -198,3 +199,38 @@ def test_an_agent_without_a_place_in_a_team_that_forms_is_in_distress(tmp_path: 
     states = values(chunks, "/roles/a0", "StateChange:state")
     assert states == [(0.0, ["no place"]), (1.0, ["distress"])]
     assert values(chunks, SLOTS, "Points3D:positions")[0][0] == 1.0
+
+
+@pytest.mark.parametrize("time_s", [0.0, 0.6, 0.95, 1.3, 2.0, 2.65, 4.0])
+def test_queue_curves_move_with_the_frame(chunks: list[Chunk], time_s: float) -> None:
+    spec, path = (LINE, NEW_PATH) if time_s >= GIVEN_S else (SCENARIO.formation, path_of(CORNER))
+    frame = Track(path).at(time_s)
+    rows = values(chunks, "/world/formation/queues", "LineStrips3D:strips")
+    strips = [v for t, v in rows if t <= time_s + 1e-9][-1]
+    for queue, strip in zip(Formation(spec, 1.0).queues, strips, strict=True):
+        drawn = in_world(chunks, np.array(strip), time_s)
+        along_m = np.linspace(0.0, np.linalg.norm(drawn[-1] - drawn[0]), len(strip))
+        true = np.array([frame.to_world(queue.point(float(at))) for at in along_m])
+        np.testing.assert_allclose(drawn, true, atol=1e-4)
+
+
+def test_agents_on_the_mission_before_keep_their_formation(tmp_path: Path) -> None:
+    """The radio keeps a new mission from agents 5 to 8 until 3 s; then all fly it."""
+    late = np.arange(AGENTS) >= 5
+    ticks = []
+    for tick, old in zip(moving_flight(), straight_flight(SCENARIO), strict=True):
+        if GIVEN_S < tick.time_s < 3.0:
+            mission = np.where(late, 0, MISSION)
+            place = np.where(late[:, None], old.place, tick.place)
+            ticks.append(replace(tick, mission=mission, place=place))
+        else:
+            ticks.append(tick)
+    chunks = recorded(tmp_path / "run.rrd", ticks, GIVEN)
+    drawn = values(chunks, "/world/formation_before/slots", "Points3D:positions")
+    times_s = [t for t, _ in drawn]
+    assert times_s[0] == pytest.approx(2.05)
+    assert len(shown(chunks, "/world/formation_before/slots", "Points3D:positions", 2.9)) == 4
+    (offset,) = shown(chunks, "/world/formation_before", "Transform3D:translation", 2.9)
+    np.testing.assert_allclose(offset, Track(path_of(CORNER)).at(2.9).origin, atol=1e-4)
+    cleared = values(chunks, "/world/formation_before", "Clear:is_recursive")
+    assert [t for t, _ in cleared] == [pytest.approx(3.0)]

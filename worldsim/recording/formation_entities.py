@@ -5,6 +5,7 @@ which the frame has moved; the formation is logged where a mission or the team c
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import ceil, cos, sin
 
 import numpy as np
@@ -33,62 +34,107 @@ Slots = dict[Place, Slot]
 class FormationEntities:
     """Draws the formation of each phase of a run, which the agents report by their claims.
 
-    Nothing is drawn before an agent claims a place: a controller may form nothing.
+    While some agents still fly the mission before, because a new one has not reached their side of
+    a partition, the formation before is drawn too, with a transform of its own. Nothing is drawn
+    before an agent claims a place: a controller may form nothing.
     """
 
     def __init__(self, formation: Formation, path: FramePath) -> None:
-        self._formation = formation
-        self._track = Track(path)
-        self._mission = 0
+        self._newest = _Drawing(layout.FORMATION, formation, Track(path), mission=0)
+        self._before: _Drawing | None = None
         self._team = 0
-        self._claims: frozenset[Place] = frozenset()
-        self._shown: tuple[object, ...] = ()
-        self._pose: tuple[Vector, float] | None = None
 
     def begin_phase(
         self, formation: Formation, path: FramePath, mission: int, time_s: float
     ) -> Iterator[Entity]:
         """Replace the formation by that of a new mission, given at a time [s]; mission: its key."""
-        self._formation, self._track, self._mission = formation, Track(path), mission
-        yield from self._moved(time_s)
-        if self._shown:
-            self._claims = frozenset()
-            yield from self._changed()
+        last, drawn = self._newest, self._newest.drawn
+        if self._before is not None:
+            yield from self._before.clear()
+        self._before = last.moved_to(layout.FORMATION_BEFORE) if drawn else None
+        self._newest = _Drawing(layout.FORMATION, formation, Track(path), mission)
+        yield from self._newest.place(time_s)
+        if drawn:
+            slots = formation.layout(self._team).slots
+            yield from self._newest.draw(dict(slots), self._team)
 
     def see(self, tick: Tick) -> Iterator[Entity]:
         """Yield what has moved or changed at a tick; ticks come in order."""
-        yield from self._moved(tick.time_s)
-        self._claims = _claims(tick, self._mission)
+        newest = self._newest
+        yield from newest.place(tick.time_s)
+        claims = _claims(tick, newest.mission)
         self._team = int(np.count_nonzero(tick.alive)) or self._team
-        if self._shown or self._claims:
-            yield from self._changed()
+        if newest.drawn or claims:
+            yield from newest.draw(self._slots(claims), self._team)
+        if self._before is not None:
+            yield from self._see_before(self._before, tick)
 
-    def _moved(self, time_s: float) -> Iterator[Entity]:
+    def _see_before(self, before: "_Drawing", tick: Tick) -> Iterator[Entity]:
+        """Yield the formation before as far as agents still claim its places."""
+        flown = (tick.mission >= before.mission) & (tick.mission < self._newest.mission)
+        claims = _claims(replace(tick, place=tick.place[flown], mission=tick.mission[flown]), 0)
+        if claims:
+            yield from before.place(tick.time_s)
+            slots = ((place, before.formation.slot(place, self._team)) for place in sorted(claims))
+            yield from before.draw({place: slot for place, slot in slots if slot}, self._team)
+        else:
+            yield from before.clear()
+
+    def _slots(self, claims: frozenset[Place]) -> Slots:
+        """Return the slots that the team fills by itself, and those claimed beyond them.
+
+        Agents claim other slots where vehicles that are no members occupy some (E18).
+        """
+        formation = self._newest.formation
+        slots = dict(formation.layout(self._team).slots)
+        for place in sorted(claims - slots.keys()):
+            slot = formation.slot(place, self._team)
+            if slot is not None:
+                slots[place] = slot
+        return slots
+
+
+class _Drawing:
+    """One formation in its frame, under an entity of its own, and what is shown of it."""
+
+    def __init__(self, entity: str, formation: Formation, track: Track, mission: int) -> None:
+        self.formation = formation
+        self.mission = mission
+        self._entity = entity
+        self._track = track
+        self._shown: tuple[object, ...] = ()
+        self._pose: tuple[Vector, float] | None = None
+
+    @property
+    def drawn(self) -> bool:
+        """Whether anything of it is shown."""
+        return bool(self._shown)
+
+    def moved_to(self, entity: str) -> "_Drawing":
+        """Return the same formation under another entity, where nothing is shown yet."""
+        return _Drawing(entity, self.formation, self._track, self.mission)
+
+    def place(self, time_s: float) -> Iterator[Entity]:
         """Yield the transform from the target's frame to the world, where it has changed."""
         frame = self._track.at(time_s)
         pose = (frame.origin, frame.yaw)
         if pose != self._pose:
             self._pose = pose
-            yield Entity(layout.FORMATION, _transform(frame))
+            yield Entity(self._entity, _transform(frame))
 
-    def _changed(self) -> Iterator[Entity]:
-        """Yield the formation, where it is not the one that is shown."""
-        shown = (self._formation, self._team, self._claims)
+    def draw(self, slots: Slots, team: int) -> Iterator[Entity]:
+        """Yield the formation with these slots of a team, where it is not what is shown."""
+        shown = (team, frozenset(slots))
         if shown != self._shown:
             self._shown = shown
-            yield from _entities(self._formation, self._slots())
+            yield from _entities(self._entity, self.formation, slots)
 
-    def _slots(self) -> Slots:
-        """Return the slots that the team fills by itself, and those claimed beyond them.
-
-        Agents claim other slots where vehicles that are no members occupy some (E18).
-        """
-        slots = dict(self._formation.layout(self._team).slots)
-        for place in sorted(self._claims - slots.keys()):
-            slot = self._formation.slot(place, self._team)
-            if slot is not None:
-                slots[place] = slot
-        return slots
+    def clear(self) -> Iterator[Entity]:
+        """Yield the end of what is shown."""
+        if self._shown:
+            self._shown = ()
+            yield Entity(self._entity, rr.Clear(recursive=True))
+            self._pose = None
 
 
 def slot_positions(formation: Formation, team: int, frame: Frame) -> NDArray[np.float64]:
@@ -112,15 +158,16 @@ def _transform(frame: Frame) -> rr.Transform3D:
     )
 
 
-def _entities(formation: Formation, slots: Slots) -> Iterator[Entity]:
+def _entities(entity: str, formation: Formation, slots: Slots) -> Iterator[Entity]:
     """Yield a formation with these slots, in the target's frame."""
     shared = np.array(formation.common, dtype=np.int16).reshape(-1, 2)
     places = np.array(list(slots), dtype=np.int16).reshape(-1, 2)
     colours = palette.place_colours(places, shared)
     points = [slot.point for slot in slots.values()]
-    yield Entity(layout.SLOTS, rr.Points3D(points, colors=colours, radii=[SLOT_RADIUS_M]))
-    yield Entity(layout.ARRIVAL_SPHERES, _arrival_spheres(points, colours))
-    yield Entity(layout.QUEUES, _queue_lines(formation, slots))
+    dots = rr.Points3D(points, colors=colours, radii=[SLOT_RADIUS_M])
+    yield Entity(f"{entity}/{layout.SLOTS_PART}", dots)
+    yield Entity(f"{entity}/{layout.SPHERES_PART}", _arrival_spheres(points, colours))
+    yield Entity(f"{entity}/{layout.QUEUES_PART}", _queue_lines(formation, slots))
 
 
 def _arrival_spheres(points: Sequence[Vector], colours: palette.Colours) -> rr.Ellipsoids3D:
