@@ -21,6 +21,8 @@ from agent.vectors import apart
 
 HELD_M: Final = 0.2
 """An agent nearer than this to the place that it claims stands in it."""
+IDENTIFIED_M: Final = 0.1
+"""A member nearer than this to a place is the vehicle that somebody saw there."""
 FREED_S: Final = 1.0
 """How long a place that a vehicle has left stays unavailable."""
 GROWN_S: Final = 1.0
@@ -72,7 +74,10 @@ class OccupiedSlots:
         if not (seen or reported or self._recent):
             self.seen = ()
             return NO_PLACES
-        occupied = self._occupied(senses, mission, holders, reported, seen)
+        identified = self._with_member(mission, holders, reported.union(self._recent))
+        for place in identified:
+            self._recent.pop(place, None)
+        occupied = self._occupied(senses, mission, holders, reported - identified, seen)
         return self._with_recent(senses.now_s, occupied)
 
     def _carry_over(self, mission: Flown, agents: int) -> None:
@@ -125,6 +130,22 @@ class OccupiedSlots:
                 if point is not None and apart(point, position) < HELD_M:
                     held.add(place)
         return held
+
+    def _with_member(
+        self, mission: Flown, holders: Sequence[Holder], places: frozenset[Place]
+    ) -> frozenset[Place]:
+        """Return which of some places a member stands in, whatever it claims.
+
+        After a heal all that were unidentified are heard again. What others reported of them, and
+        what the agent remembers, would part the team's knowledge for seconds.
+        """
+        points = [(place, self._points.point(mission, self._agents, place)) for place in places]
+        return frozenset(
+            place
+            for place, point in points
+            if point is not None
+            and any(apart(point, position) < IDENTIFIED_M for _, position in holders)
+        )
 
     def _with_recent(self, now_s: float, blocked: frozenset[Place]) -> frozenset[Place]:
         """Return the places that are blocked now or were until just now.

@@ -125,5 +125,15 @@ def test_a_vehicle_that_turns_out_to_be_a_member_blocks_nothing(occupied):
     assert update(occupied, senses(START_S + 0.2), grown) == frozenset()
 
 
+@pytest.mark.parametrize("reported", [frozenset(), {SECOND}])
+def test_a_known_member_that_is_heard_again_blocks_nothing(occupied, reported):
+    """The team has not grown: the member was told of by others, and not heard itself."""
+    there = (-1.0, 0.0, 0.0)
+    update(occupied, senses(START_S, unidentified=[there]), reported=reported)
+    near = senses(START_S + 0.2, vehicles=[there])
+    assert update(occupied, near, (ME, (THIRD, there)), reported) == frozenset()
+    assert occupied.seen == ()
+
+
 def test_a_reported_vehicle_is_believed_unless_the_agent_sees_the_place_empty(occupied):
     assert update(occupied, senses(START_S), reported={SECOND, THIRD}) == {THIRD}
