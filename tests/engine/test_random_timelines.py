@@ -7,6 +7,7 @@ one time.
 
 from dataclasses import dataclass, field
 from random import Random
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -15,7 +16,9 @@ from netem.conditions import NetworkConditions
 from tests.engine.test_timeline_effects import scenario
 from worldsim.engine.process_life import ALIVE, ENDED, State
 from worldsim.engine.step import SlotLoop, world_of
+from worldsim.judge.fault_spans import FaultSpans
 from worldsim.judge.radio_events import RadioRunEvent, order_of
+from worldsim.results.fault_rows import FaultRow, fault_rows
 
 AGENTS = 4
 UNTIL = 80
@@ -252,7 +255,15 @@ def check(faults: list[Fault]) -> int:
         loop.open()
         loop.close(b"")
         ticks += 1
+    spans = FaultSpans(flown, operated=False).rows(loop.events)
+    assert spans == told_of(fault_rows(loop.effects.faults.all, {}, {}, {}, {})), where
     return ticks
+
+
+def told_of(rows: list[FaultRow]) -> dict[str, dict[str, Any]]:
+    """Return what events and scenario tell of a run's faults, by their numbers."""
+    keys = ("number", "kind", "from_s", "to_s", "by", "agents", "process")
+    return {str(row["number"]): {key: row[key] for key in keys} for row in rows}  # type: ignore[literal-required]
 
 
 @pytest.mark.parametrize("block", range(10))

@@ -37,6 +37,7 @@ from worldsim.judge.event import By
 from worldsim.judge.radio_events import applied
 from worldsim.judge.run_events import (
     NOBODY_TO_RESTART,
+    WORKS_AGAIN,
     DiskFilled,
     FormationGiven,
     FrameGiven,
@@ -177,9 +178,17 @@ class TimelineEffects:
             return applied(operation, self.network, self._t_s, by)
         if isinstance(operation, FillDisk):
             over = not operation.full
-            return DiskFilled(t_s=self._t_s, agent=None, planned=True, by=by, over=over)
-        cause = operation.cause
-        return WorldStopped(t_s=self._t_s, agent=None, planned=True, by=by, cause=cause)
+            return DiskFilled(
+                t_s=self._t_s, agent=None, planned=True, by=by, over=over, number=operation.number
+            )
+        return WorldStopped(
+            t_s=self._t_s,
+            agent=None,
+            planned=True,
+            by=by,
+            cause=operation.cause,
+            number=operation.number,
+        )
 
     def _apply_to_agents(self, operation: ChangeOfAgents, by: By) -> None:
         match operation:
@@ -278,11 +287,14 @@ class TimelineEffects:
         by: By,
     ) -> None:
         """Emit an event for each agent, or one event where the selectors select none."""
+        number, t_s = operation.number, self._t_s
         for agent in operation.agents:
-            self._emit(event(t_s=self._t_s, agent=agent, planned=True, by=by))
+            self._emit(event(t_s=t_s, agent=agent, planned=True, by=by, number=number))
         if not operation.agents:
-            selectors = operation.selectors
-            self._emit(event(t_s=self._t_s, agent=None, planned=True, by=by, nobody=selectors))
+            nobody = operation.selectors
+            self._emit(
+                event(t_s=t_s, agent=None, planned=True, by=by, number=number, nobody=nobody)
+            )
 
     def _start(self, operation: StartProcesses, by: By) -> None:
         self.members.apply(operation, self._world.time_s)
@@ -300,7 +312,7 @@ class TimelineEffects:
             self._emit(event(t_s=self._t_s, agent=None, planned=True, by=by, refused=refused))
 
     def _set_sensors(self, operation: SetSensorMode, by: By) -> None:
-        sensor, mode = operation.sensor or "all", operation.mode or "works again"
+        sensor, mode = operation.sensor or "all", operation.mode or WORKS_AGAIN
         for agent in operation.agents:
             if operation.mode is None:
                 self._world.sensor_faults.end(operation.number, agent)
@@ -310,7 +322,13 @@ class TimelineEffects:
                 )
             self._emit(
                 SensorChanged(
-                    t_s=self._t_s, agent=agent, planned=True, by=by, sensor=sensor, mode=mode
+                    t_s=self._t_s,
+                    agent=agent,
+                    planned=True,
+                    by=by,
+                    sensor=sensor,
+                    mode=mode,
+                    number=operation.number,
                 )
             )
 

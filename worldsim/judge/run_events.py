@@ -18,6 +18,8 @@ from worldsim.judge.radio_events import RadioRunEvent
 class ProcessEvent(PlannedEvent, frozen=True, kw_only=True):
     """A change of an agent's process; without an agent where the selectors selected none."""
 
+    number: int | None = None
+    """The event's number; None for an unplanned exit."""
     nobody: tuple[int | str, ...] | None = None
     """The selectors, where they selected no agent."""
 
@@ -62,13 +64,18 @@ class Joined(StartEvent, frozen=True, tag="join"):
     """A new agent started."""
 
 
+WORKS_AGAIN = "works again"
+
+
 class SensorChanged(PlannedEvent, frozen=True, kw_only=True, tag="sensor"):
     """An agent's sensor fails, or works again."""
 
     sensor: str
     """The sensor's kind, or "all"."""
     mode: str
-    """stuck, silent, wrong, or "works again"."""
+    """stuck, silent, wrong, or WORKS_AGAIN."""
+    number: int | None = None
+    """The fault's number; None in an older recording."""
 
 
 class AgentFaultEvent(PlannedEvent, frozen=True, kw_only=True):
@@ -184,12 +191,16 @@ class WorldStopped(PlannedEvent, frozen=True, kw_only=True, tag="world_outage"):
     """The world's process was stopped: simulated time stands still, or the run ends."""
 
     cause: OutageCause
+    number: int | None = None
+    """The fault's number; None in an older recording."""
 
 
 class DiskFilled(PlannedEvent, frozen=True, kw_only=True, tag="disk_full"):
     """Nothing more of recording and events can be written, or all can again."""
 
     over: bool = False
+    number: int | None = None
+    """The fault's number; None in an older recording."""
 
 
 class Reconnected(Event, frozen=True, kw_only=True, tag="reconnect"):

@@ -16,6 +16,7 @@ from typing import Any
 import msgspec
 
 from worldsim.judge.event import PlannedEvent
+from worldsim.judge.fault_spans import FaultSpans
 from worldsim.judge.finding import Expectation, InvariantTally
 from worldsim.judge.recovery import Recovery
 from worldsim.judge.run_events import RunEvent
@@ -189,7 +190,7 @@ def _figures(readback: Readback, judge: Judge) -> dict[str, Any]:
     """Return the figures of a run that its recording shows, under the keys of summary.json."""
     scenario, last = readback.scenario, readback.ticks[-1:]
     packets = last[0].packets if last and readback.mode in REPEATABLE else {}
-    figures = {
+    figures: dict[str, Any] = {
         "scenario": scenario.name,
         "seed": scenario.seed,
         "mode": readback.mode,
@@ -212,6 +213,10 @@ def _figures(readback: Readback, judge: Judge) -> dict[str, Any]:
             name: msgspec.structs.asdict(tally) for name, tally in judge.invariants().items()
         },
     }
+    operated = readback.mode != "virtual"
+    faults = FaultSpans(scenario, operated=operated).rows(_in_order(readback.events))
+    if faults is not None:
+        figures["faults"] = faults
     return {key: _finite(value) for key, value in figures.items()}
 
 
@@ -231,13 +236,17 @@ def _phases(judge: Judge) -> Iterator[PhaseFigures]:
 def _judge_of(readback: Readback) -> Judge:
     """Return a judge that took the recorded ticks and events, in the run's order."""
     judge, noted = Judge(readback.scenario), 0
-    events = sorted(readback.events, key=lambda event: event.t_s)
+    events = _in_order(readback.events)
     for tick in readback.ticks:
         while noted < len(events) and _comes_before(events[noted], tick):
             judge.handle_event(events[noted])
             noted += 1
         judge.see(tick)
     return judge
+
+
+def _in_order(events: list[RunEvent]) -> list[RunEvent]:
+    return sorted(events, key=lambda event: event.t_s)
 
 
 def _comes_before(event: RunEvent, tick: Tick) -> bool:
@@ -275,15 +284,37 @@ def _differences(summary: Any, judged: Verification) -> Iterator[Difference]:
     """Yield the figures that differ; a figure that the summary lacks differs too."""
     for key, recorded in judged.figures.items():
         summarised = _value_at(summary, key)
-        if summarised == ABSENT and (recorded == [] or key in ADDED_LATER):
+        if summarised == ABSENT and (recorded in ([], {}) or key in ADDED_LATER):
             continue  # an older summary has no such list
         if key == "packets" and isinstance(summarised, dict):
             summarised = {name: summarised[name] for name in recorded if name in summarised}
+        if key == "faults":
+            operated = judged.figures["mode"] != "virtual"
+            summarised = _comparable(summarised, recorded, operated)
         yield from _unequal(key, summarised, recorded)
     outcome = _value_at(summary, "outcome")
     recorded = "pass" if judged.passes else "fail"
     if str(outcome) not in {"inconclusive", recorded}:
         yield Difference("outcome", outcome, recorded)
+
+
+def _comparable(faults: Any, recorded: dict[str, Any], operated: bool) -> Any:
+    """Return a summary's faults by number, with the keys that a recording shows of each.
+
+    operated: whether there may be faults that found no agent and left no event.
+    """
+    if not isinstance(faults, list) or not all(isinstance(each, dict) for each in faults):
+        return faults
+    found: dict[str, Any] = {}
+    for each in faults:
+        number = str(each.get("number"))
+        if number in found:
+            return faults
+        if operated and number not in recorded and each.get("agents") == []:
+            continue
+        names = set(recorded.get(number) or each)
+        found[number] = {name: value for name, value in each.items() if name in names}
+    return found
 
 
 def _unequal(key: str, summarised: Any, recorded: Any) -> Iterator[Difference]:
