@@ -5,13 +5,14 @@ of a recording, it reaches the same verdict.
 """
 
 from math import inf, isnan
-from typing import Final, NamedTuple, assert_never, final
+from typing import NamedTuple, assert_never, final
 
 import numpy as np
 
 from agent.guidance.cone import cone_of
 from agent.messages import FramePath
 from agent.qstructure.formation import FormationSpec, formation_of
+from worldsim.judge.expectations import Measured, RunExpectations, fault_window_s
 from worldsim.judge.expected_places import ExpectedPlaces
 from worldsim.judge.finding import Expectation, InvariantTally
 from worldsim.judge.held_attitudes import HeldAttitudes
@@ -62,8 +63,6 @@ from worldsim.scenario.tables import Scenario
 from worldsim.scenario.target_frame import path_of
 from worldsim.truth.vehicle import Floats
 
-DISTURBED_S: Final = 10.0
-"""A fault disturbs the formation for so long [s], unless ``expect.reform_within_s`` is given."""
 TURN_LIMIT_SLACK_DEG = 1e-6
 
 
@@ -126,8 +125,7 @@ class Judge:
         bounded = scenario.expect.attitude_within_deg is not None
         self._attitudes = HeldAttitudes(scenario) if bounded else None
         self._parting = PartingFaults(2.0 / scenario.fleet.tick_hz)
-        self._window_s = scenario.expect.reform_within_s or DISTURBED_S
-        self._held = HeldFormation(self._window_s, self._parting)
+        self._held = HeldFormation(fault_window_s(scenario), self._parting)
         strength = scenario.expect.min_lambda2 is not None
         self._strength = NetworkStrength(scenario) if strength else None
         self._missions = MissionOrder()
@@ -289,18 +287,21 @@ class Judge:
 
     def expectations(self) -> list[Expectation]:
         """Return every expectation of the run with its measured value."""
-        expect = self._scenario.expect
-        rows = [self._separated()]
-        if self.clearance:
-            rows.append(self._cleared())
-        if expect.converge:
-            rows += [self._converged(phase) for phase in self.phases]
-        if expect.reform_within_s is not None:
-            rows.append(self._reformed(expect.reform_within_s))
-        rows += self._held_rows()
-        if self._attitudes is not None:
-            rows.append(self._oriented(self._attitudes, expect.attitude_within_deg))
-        return [*rows, *map(_started, self._without_room)]
+        attitudes = self._attitudes
+        measured = Measured(
+            until_s=0.0 if self._last is None else self._last.time_s,
+            min_separation_m=self.min_separation_m,
+            clearance=self.clearance,
+            phases=self.phases,
+            recoveries=self.recoveries,
+            parted=bool(self._parting),
+            in_formation_fraction=self.in_formation_fraction,
+            max_slot_error_m=self.max_slot_error_m,
+            min_lambda2=self.min_lambda2,
+            worst_attitude_deg=None if attitudes is None else attitudes.worst_deg,
+            without_room=self._without_room,
+        )
+        return RunExpectations(self._scenario, measured).rows()
 
     def invariants(self) -> dict[str, InvariantTally]:
         """Return the tally of each invariant.
@@ -341,108 +342,6 @@ class Judge:
         expected = ExpectedPlaces(spec, spacing_m)
         return Phase(formation_of(spec, spacing_m), from_s, path, mission, expected)
 
-    def _separated(self) -> Expectation:
-        wanted_m = self._scenario.separation_bound_m
-        least_m = self.min_separation_m
-        held = keeps(least_m, wanted_m) if least_m is not None else self._scenario.fleet.agents == 1
-        name = "min_separation_m"
-        return Expectation(name=name, wanted=wanted_m, got=least_m, held=held, at_least=True)
-
-    def _cleared(self) -> Expectation:
-        clearance = self.clearance
-        return Expectation(
-            name="min_obstacle_distance_m",
-            wanted=clearance.bound_m,
-            got=clearance.answerable_m,
-            held=clearance.held,
-            at_least=True,
-        )
-
-    def _converged(self, phase: Phase) -> Expectation:
-        within_s = self._scenario.expect.converge_within_s
-        asked_s = phase.asked_s(self._end_s(phase))
-        got_s = None if phase.converge_s is None else asked_s
-        held: bool | None = got_s is not None and (within_s is None or got_s <= within_s)
-        if got_s is None and asked_s < self._time_to_converge_s(phase):
-            held = None
-        name = f"converge {phase.formation.name}"
-        return Expectation(name=name, wanted=within_s, got=got_s, held=held)
-
-    def _time_to_converge_s(self, phase: Phase) -> float:
-        """Return the limit of a formation's convergence [s].
-
-        Without one it is the planned duration; after a fault that forbade it, at least the window
-        of a fault.
-        """
-        within_s, from_s = self._scenario.expect.converge_within_s, phase.timed_from_s
-        if within_s is not None:
-            return within_s
-        if from_s is None:
-            return inf
-        left_s = self._planned_end_s - from_s
-        return left_s if from_s == phase.from_s else max(left_s, self._window_s)
-
-    def _end_s(self, phase: Phase) -> float:
-        """Return until when a formation was asked for, so far [s]."""
-        later = self.phases[self.phases.index(phase) + 1 :]
-        return later[0].from_s if later else self._until_s
-
-    @property
-    def _planned_end_s(self) -> float:
-        """When the run is to end, less a tick [s]: where nothing else is asked for, the limit."""
-        return self._scenario.duration_s - 1.0 / self._scenario.fleet.tick_hz
-
-    @property
-    def _until_s(self) -> float:
-        """The time of the last tick [s]."""
-        return 0.0 if self._last is None else self._last.time_s
-
-    def _reformed(self, within_s: float) -> Expectation:
-        known_s = [each.reformed_s for each in self.recoveries if each.reformed_s is not None]
-        open_s = [each.asked_s for each in self.recoveries if each.reformed_s is None]
-        worst_s = max(known_s) if known_s and not open_s else None
-        too_late = any(time_s > within_s for time_s in known_s)
-        too_late = too_late or any(time_s >= within_s for time_s in open_s)
-        # While a fault parts the team, it has still to re-form after its end.
-        is_open = bool(open_s or self._parting)
-        held = False if too_late else None if is_open else True
-        return Expectation(name="reform_within_s", wanted=within_s, got=worst_s, held=held)
-
-    def _held_rows(self) -> list[Expectation]:
-        """Return what is expected of the formation once it has converged."""
-        expect = self._scenario.expect
-        fraction, worst_m = self.in_formation_fraction, self.max_slot_error_m
-        rows = []
-        if expect.in_formation_fraction is not None:
-            wanted = expect.in_formation_fraction
-            held = None if fraction is None else fraction >= wanted
-            name = "in_formation_fraction"
-            rows.append(
-                Expectation(name=name, wanted=wanted, got=fraction, held=held, at_least=True)
-            )
-        if expect.max_slot_error_m is not None:
-            wanted = expect.max_slot_error_m
-            held = None if worst_m is None else worst_m <= wanted
-            name = "max_slot_error_m"
-            rows.append(Expectation(name=name, wanted=wanted, got=worst_m, held=held))
-        if expect.min_lambda2 is not None:
-            rows.append(self._connected(expect.min_lambda2))
-        return rows
-
-    def _connected(self, wanted: float) -> Expectation:
-        least = self.min_lambda2
-        held = None if least is None else least >= wanted
-        return Expectation(name="min_lambda2", wanted=wanted, got=least, held=held, at_least=True)
-
-    def _oriented(self, attitudes: HeldAttitudes, within_deg: float | None) -> Expectation:
-        worst_deg = attitudes.worst_deg
-        if worst_deg is None or within_deg is None:
-            held = not any(phase.formation.oriented for phase in self.phases)
-        else:
-            held = worst_deg <= within_deg
-        name = "attitude_within_deg"
-        return Expectation(name=name, wanted=within_deg, got=worst_deg, held=held)
-
     def _check_packets(self, packets: Packets) -> None:
         if "addressed" in packets:
             self._conservation.count(not conserved(packets))
@@ -464,9 +363,3 @@ class Judge:
         if self.min_separation_m is None or least < self.min_separation_m:
             self.min_separation_m = least
         return not keeps(least, self._scenario.control.separation_m)
-
-
-def _started(event: Restarted | Joined) -> Expectation:
-    """Return the expectation that a start without room does not meet: that agents start."""
-    name = f"{event.kind} at {event.t_s:g} s"
-    return Expectation(name=name, wanted=None, got=None, held=False)
