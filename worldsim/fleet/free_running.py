@@ -7,8 +7,7 @@ is due move the vehicles.
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import assert_never
+from collections.abc import Callable, Mapping
 
 import msgspec
 import numpy as np
@@ -16,7 +15,6 @@ import numpy as np
 from agent.codec import decode_command, encode
 from agent.messages import Observation
 from agent.rejection import RejectedError
-from netem.faults import FaultOrder
 from netem.messages import MediumCounters, Truth
 from netem.wire.bus import Bus
 from netem.wire.frame import WireError, pack, unpack
@@ -24,15 +22,10 @@ from netem.wire.keys import agent_name
 from netem.wire.shutdown import RUN_OVER
 from worldsim.engine.operations import (
     AdmitAgents,
-    DisturbAgents,
     EndProcesses,
-    FillDisk,
-    GiveMission,
     Operation,
     PauseProcesses,
     ResumeProcesses,
-    SetSensorMode,
-    StartProcesses,
     StopWorldProcess,
     ThrottleProcesses,
 )
@@ -41,12 +34,12 @@ from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
 from worldsim.fleet.control import Control, ControlServer
 from worldsim.fleet.culprits import Culprits
 from worldsim.fleet.delivery_latency import DeliveryLatency, LatencyCollector
-from worldsim.fleet.ipc import AgentProcess, IntruderEndRequest, IntruderRequest, ProcessAction
 from worldsim.fleet.late_under_attack import LateUnderAttack, attackers
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.netem_process import NetemProcess
 from worldsim.fleet.overload import REMEDIES, LateSpells, Overload, percent
 from worldsim.fleet.pacing import LatenessCounter, Pacer
+from worldsim.fleet.process_actions import ProcessActions
 from worldsim.fleet.progress import ProgressReporter
 from worldsim.fleet.reconnection import Reconnection
 from worldsim.fleet.resources import ResourceMeter
@@ -57,11 +50,8 @@ from worldsim.judge.event import By
 from worldsim.judge.run_events import LateStart
 from worldsim.judge.tick import Packets
 from worldsim.results.summary import OverloadRow
-from worldsim.scenario.faults import Intruder
 from worldsim.scenario.tables import Scenario
 
-START_WITHIN_S = 5.0
-"""How long before the end of a long boot the process starts: it waits at most 30 s for messages."""
 REPORTS_RING = 4
 POLL_S = 0.25
 BEHIND_S = 0.1
@@ -420,71 +410,3 @@ class FreeRunningFleet:
 
     def _packets(self) -> Packets:
         return self.medium_counters.packets() if self.medium_counters is not None else {}
-
-
-class ProcessActions:
-    """Carries operations out on the other processes: signals and starts, and orders to the medium.
-
-    It waits for nothing: an operation is done within milliseconds, or reported as late.
-    """
-
-    def __init__(
-        self, netem: NetemProcess, startup: Startup, launcher: LauncherLink, boot_wall_s: float
-    ) -> None:
-        self._netem = netem
-        self._startup = startup
-        self._launcher = launcher
-        self._after_s = max(0.0, boot_wall_s - START_WITHIN_S)
-
-    def carry_out(self, operation: Operation, slot: int, incarnations: Sequence[int]) -> list[int]:
-        """Carry out an operation before a slot; return admitted agents that are not up.
-
-        incarnations: of all agents, as they were before the operation.
-        """
-        match operation:
-            case EndProcesses() | PauseProcesses() | ResumeProcesses():
-                processes = _processes(operation.agents, incarnations)
-                self._launcher.request(_action(operation), processes)
-            case ThrottleProcesses(stops=stops, continues=continues):
-                self._launcher.request("pause", _processes(stops, incarnations))
-                self._launcher.request("resume", _processes(continues, incarnations))
-            case StartProcesses(incarnations=started):
-                self._startup.expect(started)
-                starting = [AgentProcess(*each) for each in started.items()]
-                self._launcher.request("start", starting, self._after_s)
-            case AdmitAgents(agents=agents):
-                return self._startup.absent(agents)
-            case FaultOrder():
-                self._netem.order(operation, slot)
-            case DisturbAgents(fault=Intruder() as intruder):
-                self._intrude(operation, intruder)
-            case (
-                SetSensorMode() | DisturbAgents() | GiveMission() | StopWorldProcess() | FillDisk()
-            ):
-                pass  # the world's own matters; its stop waits for the slot's end
-            case _:
-                assert_never(operation)
-        return []
-
-    def _intrude(self, operation: DisturbAgents, intruder: Intruder) -> None:
-        """Start or end an intruder; one for which no agent was found does not start."""
-        number, agents = operation.number, operation.agents
-        if operation.ends:
-            self._launcher.request_intruder(IntruderEndRequest(number))
-        elif agents or not intruder.agents:
-            self._launcher.request_intruder(IntruderRequest(number, agents, intruder.rate))
-
-
-def _action(operation: EndProcesses | PauseProcesses | ResumeProcesses) -> ProcessAction:
-    match operation:
-        case EndProcesses():
-            return "kill"
-        case PauseProcesses():
-            return "pause"
-        case ResumeProcesses():
-            return "resume"
-    assert_never(operation)
-
-
-def _processes(agents: Iterable[int], incarnations: Sequence[int]) -> list[AgentProcess]:
-    return [AgentProcess(agent, incarnations[agent]) for agent in agents]
