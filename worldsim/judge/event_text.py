@@ -136,35 +136,23 @@ def _returned(event: ReturnEvent) -> str:
 def _agent_fault(event: AgentFaultRunEvent | Intruded) -> str:
     if isinstance(event, Intruded):
         return _intruded(event)
-    return _agent_fault_over(event) if event.ends else _agent_fault_begun(event)
-
-
-def _agent_fault_begun(event: AgentFaultRunEvent) -> str:
     agent = f"a{event.agent}"
     match event:
         case ClockChanged():
-            return f"the clock of {agent} goes wrong by {_error(event)}"
+            begins = f"the clock of {agent} goes wrong by {_error(event)}"
+            ends = f"the clock of {agent} is set right: {_error(event)} no more"
         case PoseChanged():
-            return f"{agent} measures its pose wrong: {_pose_error(event)}"
+            begins = f"{agent} measures its pose wrong: {_pose_error(event)}"
+            ends = f"{agent} measures its pose rightly: {_pose_error(event)} no more"
         case SlowChanged(delay_s=delay_s):
-            return f"{agent} is slow: each step takes {delay_s:g} s"
+            begins = f"{agent} is slow: each step takes {delay_s:g} s"
+            ends = f"{agent} is no longer slow by {delay_s:g} s a step"
         case Starved(cpu_percent=percent, period_s=period_s):
-            return f"{agent} gets {percent:g} % of the CPU in each {period_s:g} s"
-    assert_never(event)
-
-
-def _agent_fault_over(event: AgentFaultRunEvent) -> str:
-    agent = f"a{event.agent}"
-    match event:
-        case ClockChanged():
-            return f"the clock of {agent} is set right: {_error(event)} no more"
-        case PoseChanged():
-            return f"{agent} measures its pose rightly: {_pose_error(event)} no more"
-        case SlowChanged(delay_s=delay_s):
-            return f"{agent} is no longer slow by {delay_s:g} s a step"
-        case Starved(cpu_percent=percent):
-            return f"{agent} has the CPU as before, not only {percent:g} % of it"
-    assert_never(event)
+            begins = f"{agent} gets {percent:g} % of the CPU in each {period_s:g} s"
+            ends = f"{agent} has the CPU as before, not only {percent:g} % of it"
+        case _:
+            assert_never(event)
+    return ends if event.ends else begins
 
 
 def _error(event: ClockChanged) -> str:
