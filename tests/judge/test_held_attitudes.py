@@ -9,6 +9,7 @@ import pytest
 
 from agent.qstructure.orientation import OrientationSpec
 from tests.recording.flights import straight_flight, wedge
+from worldsim.judge.run_events import PoseChanged
 from worldsim.judge.verdict import Judge
 from worldsim.scenario.tables import Expectations
 
@@ -26,11 +27,13 @@ TURNED = msgspec.structs.replace(
 )
 
 
-def expectation(yaw_deg_at, scenario=TURNED, change=lambda tick: tick):
+def expectation(yaw_deg_at, scenario=TURNED, change=lambda tick: tick, events=()):
     """Return what a run shows whose first agent has these yaws over the time [s], and its judge."""
     expect = Expectations(min_separation_m=0.0, attitude_within_deg=WITHIN_DEG)
-    judge = Judge(msgspec.structs.replace(scenario, expect=expect))
+    judge, waiting = Judge(msgspec.structs.replace(scenario, expect=expect)), list(events)
     for tick in straight_flight(scenario):
+        while waiting and waiting[0].t_s <= tick.time_s:
+            judge.handle_event(waiting.pop(0))
         attitude = np.zeros_like(tick.attitude)
         attitude[:, 0] = radians(YAW_DEG)
         attitude[0, 0] = radians(yaw_deg_at(tick.time_s))
@@ -44,6 +47,35 @@ def test_an_agent_that_stands_otherwise_than_its_queue_fails(off_deg, held):
     row, _ = expectation(lambda time_s: YAW_DEG + off_deg)
     assert (row.wanted, row.held) == (WITHIN_DEG, held)
     assert row.got == pytest.approx(abs(off_deg), abs=1e-3)
+
+
+def wrong_yaw(from_s, to_s=None, agent=0, bias_yaw_deg=30.0):
+    """Return the events of a fault of an agent's pose."""
+    fault = PoseChanged(t_s=from_s, agent=agent, planned=True, number=3, bias_yaw_deg=bias_yaw_deg)
+    ends = [] if to_s is None else [msgspec.structs.replace(fault, t_s=to_s, ends=True)]
+    return [fault, *ends]
+
+
+@pytest.mark.parametrize(
+    ("events", "held"),
+    [
+        ([], False),
+        (wrong_yaw(8.0), True),
+        (wrong_yaw(8.0, agent=1), False),
+        (wrong_yaw(8.0, bias_yaw_deg=0.0), False),
+        (wrong_yaw(8.0, 9.5), True),  # it has 3 s to turn back
+        (wrong_yaw(5.0, 8.0), False),
+    ],
+)
+def test_an_agent_does_not_answer_for_its_yaw_while_it_measures_it_wrong(events, held):
+    row, _ = expectation(lambda time_s: YAW_DEG + 30.0 * (8.0 < time_s < 11.6), events=events)
+    assert row.held is held
+
+
+def test_a_yaw_that_is_wrong_all_the_time_is_not_judged():
+    events = [each for agent in range(AGENTS) for each in wrong_yaw(0.0, agent=agent)]
+    row, _ = expectation(lambda time_s: 0.0, events=events)
+    assert (row.got, row.held) == (None, None)
 
 
 def test_the_way_to_the_slot_and_the_first_turn_there_do_not_count():

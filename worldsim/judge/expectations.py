@@ -153,8 +153,11 @@ class RunExpectations:
 
     def _oriented(self, within_deg: float) -> Expectation:
         worst_deg = self._measured.worst_attitude_deg
+        held: bool | None
         if worst_deg is None:
-            held = not any(phase.formation.oriented for phase in self._measured.phases)
+            oriented = any(phase.formation.oriented for phase in self._measured.phases)
+            # While yaws are measured wrong, none counts.
+            held = (None if self._measured.parted else False) if oriented else True
         else:
             held = worst_deg <= within_deg
         name = "attitude_within_deg"

@@ -187,6 +187,8 @@ class Judge:
             self._recoveries.handle_radio(event)
 
     def _handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
+        if self._attitudes is not None:
+            self._attitudes.handle_event(event)
         self._parting.handle_agent_fault(event)
         self._note_parting(event.t_s)
         self._held.open_window(event.t_s)
