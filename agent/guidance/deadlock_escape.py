@@ -4,7 +4,9 @@ The safety filter slides past what is off the axis. Straight ahead there is no s
 two agents that must swap places hold each other for ever. After a second without progress an agent
 adds a sideways velocity until nothing is ahead. It escapes up or down, since vehicles climb without
 turning: under a higher vehicle, over a lower one, which leads forward and so stays in the cone. Of
-two agents on one level, the lower id goes up. Directly above or below a vehicle it goes ahead.
+two agents on one level, the lower id goes up. Directly above or below a vehicle it goes to the side
+on which it is. It keeps on round the vehicle the way that it began, and so does the other one: two
+that chose anew on the way would undo what they had gained.
 
 Round an obstacle it goes along the surface, to the side to which the way to the target leans there,
 or up where it does not lean. A side that brings no progress for some seconds is changed for the
@@ -12,7 +14,7 @@ next one, a quarter turn on.
 """
 
 from collections.abc import Sequence
-from math import cos, dist, hypot, sin
+from math import dist, hypot
 from typing import Final
 
 from agent.comms.unidentified_vehicles import SAME_MEMBER_M
@@ -50,7 +52,8 @@ class DeadlockEscape:
         self._target: Vector | None = None
         self._nearest_m = 0.0
         self._since_s = 0.0
-        self._vertical: float | None = None
+        self._past: Vector | None = None
+        """Where it goes past a vehicle, of unit length [world axes]."""
         self._side: Vector | None = None
         self._side_s = 0.0
 
@@ -65,19 +68,18 @@ class DeadlockEscape:
         target [m; world frame].
         """
         if self._is_free(senses, target):
-            self._vertical = self._side = None
+            self._past = self._side = None
             return None
         if senses.now_s - self._since_s < PATIENCE_S:
             return None
         way = _way(senses.position, target)
         vehicle = _nearest_ahead(way, senses.vehicles, VEHICLE_NEAR_M)
         if vehicle is None:
-            self._vertical = None
+            self._past = None
             lags = self._side is not None or apart(senses.position, target) > MIN_LAG_M
             return self._round_obstacle(senses, way) if lags else None
-        if self._vertical is None:
-            self._vertical = self._choose_vertical(senses, vehicle)
-        return _past_vehicle(vehicle, senses.yaw, self._vertical)
+        self._past = _across(self._past or self._first_way_past(senses, vehicle), vehicle)
+        return self._past
 
     def _is_free(self, senses: Senses, target: Vector) -> bool:
         """Whether the agent has arrived or has a new target; notes its progress."""
@@ -90,7 +92,7 @@ class DeadlockEscape:
             self._nearest_m += away_m - apart(senses.position, before)
         if away_m < self._nearest_m - PROGRESS_M:
             self._nearest_m = away_m
-            if self._vertical is None and self._side is None:
+            if self._past is None and self._side is None:
                 self._since_s = senses.now_s
         return False
 
@@ -106,14 +108,23 @@ class DeadlockEscape:
             self._side, self._side_s = _next_side(self._side, point), senses.now_s
         return _across(self._side, point)
 
-    def _choose_vertical(self, senses: Senses, vehicle: Vector) -> float:
-        """Return 1 to pass over a vehicle, -1 to pass under it."""
-        if abs(vehicle[2]) > LEVEL * hypot(*vehicle):
-            return -1.0 if vehicle[2] > 0.0 else 1.0
+    def _first_way_past(self, senses: Senses, vehicle: Vector) -> Vector:
+        """Return where to begin to pass a vehicle: two that hold each other begin opposite ways."""
+        away_m, aside_m = hypot(*vehicle), hypot(vehicle[0], vehicle[1])
+        if abs(vehicle[2]) >= STEEP * away_m:
+            if aside_m > LEVEL * away_m:
+                return (-vehicle[0] / aside_m, -vehicle[1] / aside_m, 0.0)
+            return (1.0 if self._comes_first(senses, vehicle) else -1.0, 0.0, 0.0)
+        if abs(vehicle[2]) > LEVEL * away_m:
+            return (0.0, 0.0, -1.0 if vehicle[2] > 0.0 else 1.0)
+        return (0.0, 0.0, 1.0 if self._comes_first(senses, vehicle) else -1.0)
+
+    def _comes_first(self, senses: Senses, vehicle: Vector) -> bool:
+        """Whether the own id is lower than that of a vehicle, or that is of nobody known."""
         x, y, z = senses.position
         there = (x + vehicle[0], y + vehicle[1], z + vehicle[2])
         other = _neighbour_at(there, senses.neighbours)
-        return 1.0 if other is None or self._own_id < other else -1.0
+        return other is None or self._own_id < other
 
 
 def _way(position: Vector, target: Vector) -> Vector:
@@ -139,12 +150,6 @@ def _neighbour_at(there: Vector, neighbours: Sequence[Heard]) -> int | None:
     """Return the id of the neighbour at a position [m; world frame]; None if there is none."""
     near = [other for other in neighbours if dist(other.position, there) < SAME_MEMBER_M]
     return min(near, key=lambda other: dist(other.position, there)).id if near else None
-
-
-def _past_vehicle(vehicle: Vector, yaw: float, vertical: float) -> Vector:
-    """Return the unit vector across the line to a vehicle: vertical, or along the heading."""
-    steep = abs(vehicle[2]) >= STEEP * hypot(*vehicle)
-    return _across((cos(yaw), sin(yaw), 0.0) if steep else (0.0, 0.0, vertical), vehicle)
 
 
 def _first_side(way: Vector, point: Vector) -> Vector:

@@ -13,14 +13,14 @@ SWAP = """
 duration_s = 24.0
 [fleet]
 agents = 2
-start = {{ kind = "list", positions_m = {starts}, yaws_deg = [180, 0] }}
+start = {{ kind = "list", positions_m = {starts}, yaws_deg = {yaws} }}
 [vehicle]
 kind = "{kind}"
 [control]
 controller = "tests.closed_loop.swapping:Swapping"
 [formation]
 name = "ends"
-vertices = {{ V1 = [-2, 0, 0], V2 = [2, 0, 0] }}
+vertices = {{ V1 = {ends[0]}, V2 = {ends[1]} }}
 [[formation.queue]]
 name = "Q1"
 vertices = ["V1"]
@@ -42,7 +42,25 @@ STARTS = {
 @pytest.mark.parametrize("starts", STARTS.values(), ids=STARTS.keys())
 @pytest.mark.pure
 def test_two_agents_that_must_swap_pass_each_other(starts: list[list[float]], kind: str) -> None:
-    judge = fly(parse(SWAP.format(starts=starts, kind=kind))).loop.judge
+    assert_they_pass(starts, kind, "[180, 0]", ("[-2, 0, 0]", "[2, 0, 0]"))
+
+
+@pytest.mark.parametrize("kind", ["kinematic", "accelerating", "forward"])
+@pytest.mark.parametrize("aside_m", [0.0, 0.02, 0.2])
+@pytest.mark.parametrize("yaws", ["[0, 0]", "[90, 0]"])
+@pytest.mark.pure
+def test_two_that_must_swap_one_above_the_other_pass_whatever_their_headings(
+    aside_m: float, kind: str, yaws: str
+) -> None:
+    starts = [[aside_m, 0, 1.2], [0, 0, -1.2]]
+    assert_they_pass(starts, kind, yaws, ("[0, 0, -1]", "[0, 0, 1]"))
+
+
+def assert_they_pass(
+    starts: list[list[float]], kind: str, yaws: str, ends: tuple[str, str]
+) -> None:
+    text = SWAP.format(starts=starts, kind=kind, yaws=yaws, ends=ends)
+    judge = fly(parse(text)).loop.judge
     assert judge.phases[0].converge_s is not None
     assert judge.phases[0].converge_s <= WITHIN_S
     assert judge.min_separation_m is not None
