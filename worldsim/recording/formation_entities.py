@@ -10,7 +10,6 @@ from math import ceil, cos, sin
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
 from agent.messages import FramePath, Place, Vector
 from agent.qstructure.formation import Formation, Slot
@@ -135,12 +134,6 @@ class _Drawing:
             self._shown = ()
             yield Entity(self._entity, rr.Clear(recursive=True))
             self._pose = None
-
-
-def slot_positions(formation: Formation, team: int, frame: Frame) -> NDArray[np.float64]:
-    """Return the slots (M, 3) [m; world frame] of a team, with the target's frame at a pose."""
-    slots = formation.layout(team).slots.values()
-    return np.array([frame.to_world(slot.point) for slot in slots])
 
 
 def _claims(tick: Tick, mission: int) -> frozenset[Place]:

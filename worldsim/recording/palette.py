@@ -32,6 +32,7 @@ NOT_RUNNING = np.uint32(0x5A5F69FF)
 LINK = np.uint32(0x333D4DFF)
 LIMIT = np.uint32(0xFF5252FF)
 OBSTACLE = np.uint32(0x6F6256FF)
+GROUND = np.uint32(0x222A37FF)
 
 ABSENT = "absent"
 """The role shown of an agent that is not running (dead, paused or booting)."""

@@ -16,18 +16,18 @@ import numpy as np
 import rerun as rr
 
 from agent.qstructure.formation import Formation, FormationSpec
-from agent.qstructure.frame_path import Track
 from worldsim.judge.event_text import WARNINGS, sentence
 from worldsim.judge.run_events import FormationGiven, FrameGiven, MissionRunEvent, RunEvent, as_row
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout
-from worldsim.recording.blueprint import blueprint_of, view_region
+from worldsim.recording.blueprint import blueprint_of
 from worldsim.recording.columns import ColumnBlock, Entity
-from worldsim.recording.formation_entities import FormationEntities, slot_positions
+from worldsim.recording.formation_entities import FormationEntities
 from worldsim.recording.hierarchy_columns import HierarchyColumns, ShownRoles
 from worldsim.recording.obstacle_shapes import ObstacleEntities
 from worldsim.recording.static_entities import max_queues, metric_limits, static_entities
+from worldsim.recording.team_view import TeamView
 from worldsim.recording.tick_columns import TickColumns
 from worldsim.recording.tolerant_sink import TolerantSink
 from worldsim.scenario.tables import Scenario
@@ -79,6 +79,7 @@ class RunRecorder:
         self._hierarchy_columns = HierarchyColumns(tick_hz, scenario.rows, max_queues(scenario))
         self._shown_roles = ShownRoles()
         self._obstacles = ObstacleEntities(Obstacles(scenario.obstacle))
+        self._team_view = TeamView(1.0 / tick_hz)
         self._ticks_per_block = max(1, round(tick_hz * BLOCK_S))
         self._ticks: list[Tick] = []
         self._figures: list[Figures] = []
@@ -135,10 +136,7 @@ class RunRecorder:
         self._stream = rr.RecordingStream(
             APPLICATION, batcher_config=rr.ChunkBatcherConfig(flush_tick=1.0)
         )
-        agents = self._scenario.fleet.agents
-        slots = slot_positions(formation, agents, Track(frame).at(0.0))
-        region = view_region(self._scenario, slots)
-        blueprint = blueprint_of(region, obstacles=bool(self._scenario.obstacle))
+        blueprint = blueprint_of(obstacles=bool(self._scenario.obstacle))
         self._stream.set_sinks(rr.FileSink(sink.path), default_blueprint=blueprint)
         sink.release()
         self._opened = True
@@ -173,6 +171,7 @@ class RunRecorder:
         yield from self._tick_columns.blocks(self._ticks, self._figures)
         yield from self._hierarchy_columns.blocks(self._ticks, self._figures)
         yield from self._obstacles.blocks(self._ticks)
+        yield from self._team_view.blocks(self._ticks)
 
     def _log_formation(self) -> None:
         """Log the formation's changes and the frame's motion, in the order of time."""

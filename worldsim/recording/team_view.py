@@ -1,0 +1,114 @@
+"""The camera's own frame: it follows the team and zooms so that every running agent is in view.
+
+The 3D view is drawn in the coordinates of this frame. Its origin lies amid the running agents, and
+its unit of length is the distance of the farthest one: a camera at rest in it shows the team at
+every time. The unit grows at once and shrinks slowly, so that the picture is calm. The ground is a
+grid that rests in the world: it moves by whole cells, to stay below the team.
+"""
+
+from collections.abc import Iterator, Sequence
+from math import ceil, exp, log10
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from worldsim.judge.tick import Tick
+from worldsim.recording import layout, palette
+from worldsim.recording.columns import ColumnBlock
+
+LEAST_RADIUS_M = 1.5
+MARGIN = 1.08
+"""The view's radius to the distance of the farthest agent."""
+FOLLOW_S = 1.0
+"""Time constant with which the centre follows the team."""
+SHRINK_S = 4.0
+"""Time constant with which the radius shrinks."""
+CELLS = 14
+"""Cells of the ground from its centre to each side."""
+BELOW = 0.8
+"""Height of the view's centre over the ground [radii]."""
+CELL = 0.3
+"""Least size of a cell [radii]."""
+LINE_RADIUS = 0.0012  # [radii]
+
+
+class TeamView:
+    """Follows the team from tick to tick."""
+
+    def __init__(self, tick_s: float) -> None:
+        self._follow = 1.0 - exp(-tick_s / FOLLOW_S)
+        self._shrink = exp(-tick_s / SHRINK_S)
+        self._centre: NDArray[np.float64] | None = None
+        self._radius_m = LEAST_RADIUS_M
+        self._cell_m = 0.0
+        self._corner: NDArray[np.int64] | None = None
+
+    def blocks(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
+        """Yield the view's transforms and the ground of a block of ticks; blocks come in order."""
+        seen = [(row, *self._see(tick)) for row, tick in enumerate(ticks)]
+        rows = [row for row, _, _ in seen]
+        centres = np.array([centre for _, centre, _ in seen])
+        scales = np.array([[radius_m] * 3 for _, _, radius_m in seen])
+        columns = rr.Transform3D.columns(translation=centres, scale=scales)
+        yield ColumnBlock(layout.TEAM, rows, columns)
+        for row, centre, radius_m in seen:
+            yield from self._ground(row, centre, radius_m)
+
+    def _see(self, tick: Tick) -> tuple[NDArray[np.float64], float]:
+        """Return the view's centre [m; world frame] and radius [m] at a tick."""
+        in_world = np.isfinite(tick.position).all(axis=1)
+        running = in_world & tick.alive
+        team = tick.position[running if running.any() else in_world]
+        if len(team):
+            middle = 0.5 * (team.min(axis=0) + team.max(axis=0))
+            before = middle if self._centre is None else self._centre
+            self._centre = before + self._follow * (middle - before)
+            reach_m = float(np.linalg.norm(team - self._centre, axis=1).max())
+            shrunk_m = self._radius_m * self._shrink
+            self._radius_m = max(MARGIN * reach_m, shrunk_m, LEAST_RADIUS_M)
+        if self._centre is None:
+            return np.zeros(3), self._radius_m
+        return self._centre, self._radius_m
+
+    def _ground(
+        self, row: int, centre: NDArray[np.float64], radius_m: float
+    ) -> Iterator[ColumnBlock]:
+        """Yield the grid where its cells change, and its place where that is another cell."""
+        cell_m = self._cell_m
+        if not CELL * radius_m <= cell_m <= 2.6 * CELL * radius_m:
+            cell_m = _round_length(CELL * radius_m)
+        height = centre[2] - BELOW * radius_m
+        corner = np.array(
+            [*np.rint(centre[:2] / cell_m), np.floor(height / cell_m)], dtype=np.int64
+        )
+        last = self._corner
+        if cell_m == self._cell_m and last is not None:
+            # The height is kept for a cell more, lest the ground jumps with every breath.
+            corner[2] = last[2] if 0 <= height / cell_m - last[2] + 1.0 <= 3.0 else corner[2]
+            if (corner == last).all():
+                return
+        if cell_m != self._cell_m:
+            yield _grid(row, cell_m)
+        self._cell_m, self._corner = cell_m, corner
+        columns = rr.Transform3D.columns(translation=[corner * cell_m])
+        yield ColumnBlock(layout.GROUND, [row], columns)
+
+
+def _round_length(least_m: float) -> float:
+    """Return the least of 1, 2, 5, 10 ... (or 0.5, 0.2 ...) that is no less [m]."""
+    power = 10.0 ** (ceil(log10(least_m)) - 1)
+    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= least_m - 1e-9)
+
+
+def _grid(row: int, cell_m: float) -> ColumnBlock:
+    ends = CELLS * cell_m
+    at = np.linspace(-ends, ends, 2 * CELLS + 1)
+    along_x = [[(-ends, y, 0.0), (ends, y, 0.0)] for y in at]
+    along_y = [[(x, -ends, 0.0), (x, ends, 0.0)] for x in at]
+    lines = rr.LineStrips3D.columns(
+        strips=[*along_x, *along_y],
+        colors=[int(palette.GROUND)] * (2 * len(at)),
+        radii=[LINE_RADIUS * cell_m / CELL] * (2 * len(at)),
+    )
+    return ColumnBlock(layout.GROUND, [row], lines.partition([2 * len(at)]))
