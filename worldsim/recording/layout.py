@@ -44,6 +44,7 @@ PACKETS = f"{METRICS}/packets"
 EVENTS = "/log/events"
 ROLES = "/roles"
 SCENARIO = "/run/scenario"
+LEGEND = "/run/legend"
 RUN_PROPERTIES = "/__properties/run"
 
 AGENT_STATE = "/state/agents"

@@ -1,5 +1,6 @@
 """Colours of the viewer, as 0xRRGGBBAA: one for each queue, tier and role."""
 
+from colorsys import hsv_to_rgb
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ QUEUES = np.array(
     ],
     dtype=np.uint32,
 )
+QUEUE_COLOUR_NAMES = ("blue", "orange", "green", "magenta", "cyan", "pink", "lime", "violet")
+"""The colours of QUEUES in words."""
 _GOLD, _BLUE, _RED = 0xFFD54FFF, 0x4FC3F7FF, 0xFF3B30FF
 TIERS = np.array([_GOLD, 0x7BE0ADFF, _BLUE, 0x7E8CFFFF, 0xC77DFFFF], dtype=np.uint32)
 """Tier 1 first; all deeper tiers have the last colour."""
@@ -52,6 +55,17 @@ def queue_colours(queues: NDArray[np.integer[Any]]) -> Colours:
     """Return the colours (Q,) of queues, given by their indices; they repeat after the last."""
     colours: Colours = QUEUES[queues % len(QUEUES)]
     return colours
+
+
+def agent_colours(agents: int) -> Colours:
+    """Return a colour for each of N agents (N,): hues by the golden angle, as far apart as any."""
+    colours = [
+        hsv_to_rgb((0.58 + 0.618034 * agent) % 1.0, (0.62, 0.38)[agent // 8 % 2], 1.0)
+        for agent in range(agents)
+    ]
+    red, green, blue = np.rint(255.0 * np.array(colours)).astype(np.uint32).T
+    packed: Colours = (red << 24) | (green << 16) | (blue << 8) | np.uint32(0xFF)
+    return packed
 
 
 def place_colours(place: NDArray[np.int16], shared: NDArray[np.int16]) -> Colours:

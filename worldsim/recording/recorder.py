@@ -21,10 +21,12 @@ from worldsim.judge.run_events import FormationGiven, FrameGiven, MissionRunEven
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout
+from worldsim.recording.agent_colours import AgentColours
 from worldsim.recording.blueprint import blueprint_of
 from worldsim.recording.columns import ColumnBlock, Entity
 from worldsim.recording.formation_entities import FormationEntities
 from worldsim.recording.hierarchy_columns import HierarchyColumns, ShownRoles
+from worldsim.recording.legend import agent_legend, queue_legend
 from worldsim.recording.obstacle_shapes import ObstacleEntities
 from worldsim.recording.static_entities import max_queues, metric_limits, static_entities
 from worldsim.recording.team_view import TeamView
@@ -37,6 +39,8 @@ from worldsim.truth.obstacles import Obstacles
 APPLICATION = "qswarm"
 BLOCK_S = 1.0
 FLUSH_TIMEOUT_S = 5.0
+FORMING_CONTROLLER = "q_structure"
+"""The controller that is known to take up formations."""
 EVENT_TIME_SLACK_S = 1e-6
 """Event times are rounded to the microsecond."""
 
@@ -74,8 +78,9 @@ class RunRecorder:
         self._scenario = scenario
         tick_hz = scenario.fleet.tick_hz
         formation = self._formation_of(scenario.formation)
-        shared = np.array(formation.common, dtype=np.int16).reshape(-1, 2)
-        self._tick_columns = TickColumns(shared, tick_hz, metric_limits(scenario))
+        forms = scenario.control.controller == FORMING_CONTROLLER
+        self._colours = AgentColours(scenario.rows, formation, forms)
+        self._tick_columns = TickColumns(self._colours, tick_hz, metric_limits(scenario))
         self._hierarchy_columns = HierarchyColumns(tick_hz, scenario.rows, max_queues(scenario))
         self._shown_roles = ShownRoles()
         self._obstacles = ObstacleEntities(Obstacles(scenario.obstacle))
@@ -85,6 +90,8 @@ class RunRecorder:
         self._figures: list[Figures] = []
         self._events: list[RunEvent] = []
         self._queue_names = [queue.name for queue in scenario.formation.queue]
+        self._spec = scenario.formation
+        self._legend: str | None = None
         self._attempt(self._open, path, formation, run_id, mode)
 
     def tick(self, tick: Tick, figures: Figures) -> None:
@@ -156,6 +163,8 @@ class RunRecorder:
         self._stream.send_property("run", properties)
 
     def _send_block(self) -> None:
+        for event in self._missions_given():
+            self._colours.begin_phase(self._formation_of(event.tables), event.mission)
         if self._ticks:
             times = _BlockTimes(self._ticks)
             # All blocks are made before any is sent, so that a failure leaves no partial second.
@@ -175,7 +184,9 @@ class RunRecorder:
 
     def _log_formation(self) -> None:
         """Log the formation's changes and the frame's motion, in the order of time."""
-        given = deque(e for e in self._events if isinstance(e, FormationGiven | FrameGiven))
+        given = deque(self._missions_given())
+        for tick in self._ticks[:1]:
+            self._log_at(tick.time_s, tick.index, self._new_legend())
         for tick in self._ticks:
             while given and given[0].t_s <= tick.time_s + EVENT_TIME_SLACK_S:
                 self._log_new_phase(given.popleft())
@@ -183,11 +194,25 @@ class RunRecorder:
         for event in given:
             self._log_new_phase(event)
 
+    def _missions_given(self) -> list[MissionRunEvent]:
+        """Return the missions given in the present block."""
+        return [e for e in self._events if isinstance(e, FormationGiven | FrameGiven)]
+
     def _log_new_phase(self, event: MissionRunEvent) -> None:
         """Log the formation and frame of a new mission, at the time of its event."""
         formation = self._formation_of(event.tables)
         changed = self._formation.begin_phase(formation, event.path, event.mission, event.t_s)
         self._log_at(event.t_s, self._tick_at(event.t_s), changed)
+        self._spec = event.tables
+        self._log_at(event.t_s, self._tick_at(event.t_s), self._new_legend())
+
+    def _new_legend(self) -> Iterator[Entity]:
+        """Yield the meaning of the colours, where it has changed."""
+        names = [queue.name for queue in self._spec.queue]
+        text = queue_legend(self._spec.name, names) if self._colours.forms else agent_legend()
+        if text != self._legend:
+            self._legend = text
+            yield Entity(layout.LEGEND, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
 
     def _log_at(self, time_s: float, tick: int, entities: Iterator[Entity]) -> None:
         self._stream.set_time(layout.SIM_TIME, duration=time_s)

@@ -8,12 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
-from agent.messages import DISTRESS
 from worldsim.judge.tick import Float32s, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout, palette
+from worldsim.recording.agent_colours import AgentColours
 from worldsim.recording.columns import ChangeDetector, ColumnBlock, number_column
 from worldsim.recording.link_columns import LinkColumns
 
@@ -21,17 +20,17 @@ from worldsim.recording.link_columns import LinkColumns
 class TickColumns:
     """Makes the columns of one block of ticks after the other.
 
-    shared: (K, 2), the places that belong to several queues. tick_hz: ticks in a second. limits:
-    the reference lines of each metric, in its unit.
+    tick_hz: ticks in a second. limits: the reference lines of each metric, in its unit.
     """
 
     def __init__(
-        self, shared: NDArray[np.int16], tick_hz: float, limits: Mapping[str, list[float]]
+        self, colours: AgentColours, tick_hz: float, limits: Mapping[str, list[float]]
     ) -> None:
-        self._shared = shared
+        self._colours = colours
         self._limits = limits
         self._links = LinkColumns(tick_hz)
         self._colour_changes = ChangeDetector()
+        self._series_changes = ChangeDetector()
         self._mission_changes = ChangeDetector()
         self._counter_changes: dict[str, ChangeDetector] = {}
         self._agent_metrics = layout.agent_metrics(obstacles=layout.OBSTACLE_DISTANCE in limits)
@@ -48,30 +47,20 @@ class TickColumns:
         yield from self._reference_lines(len(ticks) - 1)
 
     def _coloured_entities(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
-        series = self._colours(ticks)
-        agents = series.shape[1]
-        rows = self._colour_changes.changed_rows(series)
-        yield _trails(ticks, series.ravel())
-        if not rows:
-            return
-        changed = series[rows].ravel()
-        for entity, archetype in ((layout.VEHICLES, rr.Boxes3D), (layout.TARGETS, rr.Points3D)):
-            yield ColumnBlock.of_batches(entity, rows, archetype.columns(colors=changed), agents)
-        latest = rr.SeriesLines.columns(colors=series[rows[-1]]).partition([agents])
-        for entity in self._agent_metrics:
-            yield ColumnBlock(entity, (), latest)
-
-    def _colours(self, ticks: Sequence[Tick]) -> palette.Colours:
-        """Return agents' colours (T, N): of their queues, or of distress or a stopped process."""
-        colours = palette.place_colours(
-            np.concatenate([tick.place for tick in ticks]), self._shared
-        )
-        colours = colours.reshape(len(ticks), -1)
-        for row, tick in enumerate(ticks):
-            if tick.hierarchy is not None:
-                colours[row, tick.hierarchy.role == DISTRESS] = palette.IN_DISTRESS
-            colours[row, ~tick.alive] = palette.NOT_RUNNING
-        return colours
+        colours = self._colours.vehicles(ticks)
+        agents = colours.shape[1]
+        yield _trails(ticks, colours.ravel())
+        rows = self._colour_changes.changed_rows(colours)
+        changed = colours[rows].ravel()
+        if rows:
+            for entity, archetype in ((layout.VEHICLES, rr.Boxes3D), (layout.TARGETS, rr.Points3D)):
+                columns = archetype.columns(colors=changed)
+                yield ColumnBlock.of_batches(entity, rows, columns, agents)
+        series = self._colours.series()
+        if self._series_changes.changed_rows(series[None]):
+            latest = rr.SeriesLines.columns(colors=series).partition([agents])
+            for entity in self._agent_metrics:
+                yield ColumnBlock(entity, (), latest)
 
     def _missions(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         series = np.stack([tick.mission for tick in ticks])
