@@ -39,9 +39,14 @@ def ticks(*, placed: bool, role: int = MEMBER, dead: int | None = None) -> list[
     ]
 
 
+def coloured(colours: AgentColours, flown: list[Tick], dead: tuple[int, ...] = ()) -> np.ndarray:
+    ended = [np.isin(np.arange(AGENTS), dead)] * len(flown)
+    return colours.vehicles(flown, ended)
+
+
 def test_a_controller_that_forms_nothing_has_a_colour_for_each_agent() -> None:
     colours = AgentColours(AGENTS, FORMATION, forms=False)
-    (row,) = colours.vehicles(ticks(placed=False)[:1])
+    (row,) = coloured(colours, ticks(placed=False)[:1])
     assert len(set(row.tolist())) == AGENTS
     assert not {int(palette.IN_DISTRESS), int(palette.UNPLACED)} & set(row.tolist())
     assert colours.series().tolist() == row.tolist()
@@ -49,13 +54,14 @@ def test_a_controller_that_forms_nothing_has_a_colour_for_each_agent() -> None:
 
 def test_curves_keep_the_colour_of_their_queue_through_distress_and_death() -> None:
     colours = AgentColours(AGENTS, FORMATION, forms=True)
-    placed = colours.vehicles(ticks(placed=True)[:1])[0]
+    placed = coloured(colours, ticks(placed=True)[:1])[0]
     series = colours.series()
     assert series.tolist() == placed.tolist()
-    lost = colours.vehicles(ticks(placed=False, role=DISTRESS, dead=3)[:1])[0]
+    lost = coloured(colours, ticks(placed=False, role=DISTRESS, dead=3)[:1])[0]
     assert lost[3] == palette.NOT_RUNNING
     assert set(np.delete(lost, 3).tolist()) == {int(palette.IN_DISTRESS)}
     assert colours.series().tolist() == series.tolist()
+    assert coloured(colours, ticks(placed=True, dead=3)[:1], (3,))[0, 3] == palette.DEAD
 
 
 def test_agents_have_the_colours_of_their_own_mission() -> None:
@@ -66,7 +72,7 @@ def test_agents_have_the_colours_of_their_own_mission() -> None:
     line = msgspec.structs.replace(spec, queue=spec.queue[:1])
     colours.begin_phase(Formation(line, 1.0), 1024)
     apex = int(np.flatnonzero((tick.place == 0).all(axis=1))[0])
-    before, after = colours.vehicles([tick, replace(tick, mission=np.full(AGENTS, 1024))])
+    before, after = coloured(colours, [tick, replace(tick, mission=np.full(AGENTS, 1024))])
     assert before[apex] == palette.SHARED_VERTEX
     assert after[apex] == palette.QUEUES[0]
 

@@ -8,6 +8,7 @@ a stopped process show in the vehicle, not in the agent's curves.
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agent.messages import DISTRESS
 from agent.qstructure.formation import Formation
@@ -39,9 +40,13 @@ class AgentColours:
         """Whether agents have the colours of queues."""
         return self._forms
 
-    def vehicles(self, ticks: Sequence[Tick]) -> palette.Colours:
-        """Return the colours of agents' vehicles (T, N); blocks come in order."""
+    def vehicles(self, ticks: Sequence[Tick], dead: Sequence[NDArray[np.bool_]]) -> palette.Colours:
+        """Return the colours of agents' vehicles (T, N); blocks come in order.
+
+        dead: for each tick, whose processes have ended (N,).
+        """
         colours = np.stack([self._vehicles(tick) for tick in ticks])
+        colours[np.stack(dead)] = palette.DEAD
         return colours.astype(np.uint32)
 
     def series(self) -> palette.Colours:
@@ -71,6 +76,6 @@ class AgentColours:
         return colours
 
 
-def _shared_places(formation: Formation) -> np.ndarray:
+def _shared_places(formation: Formation) -> NDArray[np.int16]:
     """Return the places that belong to several queues (K, 2)."""
     return np.array(formation.common, dtype=np.int16).reshape(-1, 2)

@@ -20,6 +20,7 @@ from worldsim.recording.columns import (
     LineRateLimiter,
     line_strips,
 )
+from worldsim.recording.situation import DEAD, Situation
 from worldsim.truth.vehicle import Floats
 
 SAMPLES_HZ = 4.0
@@ -68,12 +69,19 @@ class HierarchyColumns:
         self._queues = queues
         self._ticks_per_sample = max(1, round(tick_hz / SAMPLES_HZ))
         self._line_rate = LineRateLimiter(tick_hz, LINES_PER_S)
+        self._notes: dict[str, int] = {}
+        """The number of each note, in the order in which they came."""
         self._label_changes = ChangeDetector()
         self._role_changes = ChangeDetector()
 
-    def blocks(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
+    def blocks(
+        self,
+        ticks: Sequence[Tick],
+        figures: Sequence[Figures],
+        situations: Sequence[Situation],
+    ) -> Iterator[ColumnBlock]:
         """Yield the columns of a block; blocks come in order."""
-        yield from self._vehicle_labels(ticks)
+        yield from self._vehicle_labels(ticks, situations)
         yield from self._queue_residuals(ticks, figures)
         hierarchies = [tick.hierarchy for tick in ticks if tick.hierarchy is not None]
         if len(hierarchies) == len(ticks):
@@ -81,12 +89,15 @@ class HierarchyColumns:
             yield from self._figures(ticks, hierarchies)
             yield from self._roles(hierarchies)
 
-    def _vehicle_labels(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
-        """Yield the vehicles' labels: name, and the role where it is not member.
+    def _vehicle_labels(
+        self, ticks: Sequence[Tick], situations: Sequence[Situation]
+    ) -> Iterator[ColumnBlock]:
+        """Yield the vehicles' labels: name, the role where it is not member, and what is in force.
 
         Large fleets show a label only under the mouse pointer, so one row for each block is enough.
         """
-        keys = np.stack([_label_keys(tick) for tick in ticks])
+        pairs = zip(ticks, situations, strict=True)
+        keys = np.stack([self._label_keys(tick, each) for tick, each in pairs])
         rows = self._label_changes.changed_rows(keys)
         if len(self._names) > layout.NAMED_MAX:
             rows = rows[-1:]
@@ -95,11 +106,24 @@ class HierarchyColumns:
             columns = rr.Boxes3D.columns(labels=labels)
             yield ColumnBlock.of_batches(layout.VEHICLES, rows, columns, len(self._names))
 
+    def _label_keys(self, tick: Tick, situation: Situation) -> NDArray[np.int16]:
+        """Return role, tier and note (N, 3), which a label is made of; -1 where unknown."""
+        numbers = [self._notes.setdefault(note, len(self._notes)) for note in situation.notes]
+        note = np.array(numbers, dtype=np.int16)
+        if tick.hierarchy is None:
+            unknown = np.full(len(note), -1, dtype=np.int16)
+            return np.stack((unknown, unknown, note), axis=1)
+        return np.stack((tick.hierarchy.role, tick.hierarchy.tier, note), axis=1).astype(np.int16)
+
     def _labels(self, keys: NDArray[np.int16]) -> list[str]:
-        return [
-            name + LABEL_SUFFIXES[role].format(tier=tier)
-            for name, (role, tier) in zip(self._names, keys.tolist(), strict=True)
-        ]
+        """Return a label for each vehicle; the cross of a dead one has its own."""
+        notes = list(self._notes)
+        labels = []
+        for name, (role, tier, note) in zip(self._names, keys.tolist(), strict=True):
+            said = f" ({notes[note]})" if notes[note] else ""
+            dead = notes[note].startswith(DEAD)
+            labels.append("" if dead else name + LABEL_SUFFIXES[role].format(tier=tier) + said)
+        return labels
 
     def _parent_lines(
         self, ticks: Sequence[Tick], hierarchies: Sequence[HierarchyRows]
@@ -176,13 +200,6 @@ def parent_lines(position: Floats, hierarchy: HierarchyRows) -> tuple[Floats, ND
     ends = np.stack((position[children], position[parent[children]]), axis=1)
     in_world = ~np.isnan(ends).any(axis=(1, 2))
     return ends[in_world], hierarchy.tier[children[in_world]]
-
-
-def _label_keys(tick: Tick) -> NDArray[np.int16]:
-    """Return role and tier (N, 2), which a label is made of; NO_ROLE and -1 where unknown."""
-    if tick.hierarchy is None:
-        return np.full((len(tick.alive), 2), -1, dtype=np.int16)
-    return np.stack((tick.hierarchy.role.astype(np.int16), tick.hierarchy.tier), axis=1)
 
 
 def _tiers(hierarchy: HierarchyRows) -> NDArray[np.float64]:

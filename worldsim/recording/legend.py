@@ -9,7 +9,7 @@ MAX_ROWS = 16
 STATES = (
     ("red", "in distress: without a place in a queue"),
     ("grey, a wire box", "paused"),
-    ("black, crossed", "dead or stopped; it hovers"),
+    ("black, a white cross", "its process is dead; it hovers"),
     ("pale", "without a place yet"),
 )
 

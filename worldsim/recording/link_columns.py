@@ -3,7 +3,7 @@
 The matrix has a row where it changed. Lines are drawn at as many ticks as their rate limit allows.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 
 import numpy as np
 import rerun as rr
@@ -18,6 +18,7 @@ from worldsim.recording.columns import (
     line_strips,
     number_column,
 )
+from worldsim.recording.situation import Situation
 from worldsim.truth.vehicle import Floats
 
 LINES_MAX = 400
@@ -33,12 +34,17 @@ class LinkColumns:
 
     def __init__(self, tick_hz: float) -> None:
         self._matrix_changes = ChangeDetector()
+        self._missed: dict[str, int] = {}
+        """How many lines each entity of missing links shows."""
         self._line_rate = LineRateLimiter(tick_hz, LINES_PER_S)
 
-    def blocks(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
+    def blocks(
+        self, ticks: Sequence[Tick], situations: Sequence[Situation]
+    ) -> Iterator[ColumnBlock]:
         """Yield the columns of a block; blocks come in order."""
         yield from self._matrix(ticks)
-        yield from self._lines(ticks)
+        rows = yield from self._lines(ticks)
+        yield from self._verdicts(ticks, situations, rows)
 
     def _matrix(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         hears = np.zeros((len(ticks), len(ticks[0].alive) ** 2), dtype=np.bool_)
@@ -50,7 +56,8 @@ class LinkColumns:
         if rows:
             yield ColumnBlock(layout.LINK_STATE, rows, [number_column(layout.HEARS, bits[rows])])
 
-    def _lines(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
+    def _lines(self, ticks: Sequence[Tick]) -> Generator[ColumnBlock, None, list[int]]:
+        """Yield the lines of links; return the rows in which they are drawn."""
         rows, drawn = [], []
         for row, tick in enumerate(ticks):
             if self._line_rate.allows(tick.index):
@@ -58,9 +65,64 @@ class LinkColumns:
                 drawn.append(link_lines(tick))
                 self._line_rate.count(tick.index, len(drawn[-1]))
         if rows:
-            columns = rr.LineStrips3D.columns(strips=line_strips(np.concatenate(drawn)))
-            lengths = [len(lines) for lines in drawn]
-            yield ColumnBlock(layout.LINKS, rows, columns.partition(lengths))
+            yield _strips(layout.LINKS, rows, drawn)
+        return rows
+
+    def _verdicts(
+        self, ticks: Sequence[Tick], situations: Sequence[Situation], rows: Sequence[int]
+    ) -> Iterator[ColumnBlock]:
+        """Yield the pairs that do not hear each other, by the reason, where they have changed.
+
+        Of a large fleet only at the first row of a block, since there are very many pairs.
+        """
+        if len(ticks[0].alive) > layout.NAMED_MAX:
+            rows = rows[:1]
+        missing = [missing_links(ticks[row], situations[row]) for row in rows]
+        for entity in (layout.LINKS_LOST, layout.LINKS_CUT, layout.LINKS_OUT_OF_RANGE):
+            drawn = [each[entity] for each in missing]
+            # While there are none, nothing is repeated.
+            before = [self._missed.get(entity, 0), *map(len, drawn)]
+            some = [at for at in range(len(drawn)) if before[at] or before[at + 1]]
+            self._missed[entity] = before[-1]
+            if some:
+                yield _strips(entity, [rows[at] for at in some], [drawn[at] for at in some])
+
+
+def missing_links(tick: Tick, situation: Situation) -> dict[str, Floats]:
+    """Return a line (K, 2, 3) [m; world frame] for each pair that does not hear each other.
+
+    By entity. A pair of running agents is cut where a fault cuts a direction in which it is not
+    heard, else lost where such a direction is within its range, else out of range. Of more than
+    LINES_MAX, the shortest are kept; of large fleets, none out of range.
+    """
+    agents = len(tick.alive)
+    heard = np.zeros((agents, agents), dtype=np.bool_)  # from row to column
+    hearer, source = np.divmod(_pair_codes(tick), agents)
+    heard[source, hearer] = True
+    unheard = ~heard & tick.alive[:, None] & tick.alive
+    np.fill_diagonal(unheard, val=False)
+    one, other = np.nonzero(np.triu(unheard | unheard.T))
+    distance = np.full((agents, agents), np.nan)
+    away = np.linalg.norm(tick.position[one] - tick.position[other], axis=1)
+    distance[one, other] = distance[other, one] = away
+    near = situation.radio.in_range(distance) & unheard
+    cut = near & situation.radio.cut(tick)
+    found = {}
+    for entity, links in (
+        (layout.LINKS_CUT, cut),
+        (layout.LINKS_LOST, near & ~(cut | cut.T)),
+        (layout.LINKS_OUT_OF_RANGE, unheard & ~(near | near.T)),
+    ):
+        pairs = np.argwhere(np.triu(links | links.T))
+        if entity == layout.LINKS_OUT_OF_RANGE and agents > layout.NAMED_MAX:
+            pairs = pairs[:0]
+        found[entity] = _shortest(tick.position[pairs])
+    return found
+
+
+def _strips(entity: str, rows: Sequence[int], drawn: Sequence[Floats]) -> ColumnBlock:
+    columns = rr.LineStrips3D.columns(strips=line_strips(np.concatenate(drawn)))
+    return ColumnBlock(entity, rows, columns.partition([len(lines) for lines in drawn]))
 
 
 def link_lines(tick: Tick) -> Floats:
@@ -74,6 +136,11 @@ def link_lines(tick: Tick) -> Floats:
     low, high = np.minimum(hearer, heard), np.maximum(hearer, heard)
     pairs = np.unique((low * agents + high)[low < high])
     ends: Floats = tick.position[np.stack(np.divmod(pairs, agents), axis=1)]
+    return _shortest(ends)
+
+
+def _shortest(ends: Floats) -> Floats:
+    """Return the LINES_MAX shortest of lines (K, 2, 3), of those between vehicles in the world."""
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     if len(ends) > LINES_MAX:
         shortest = np.sort(np.argsort(length, kind="stable")[:LINES_MAX])

@@ -31,8 +31,16 @@ TIERS = np.array([_GOLD, 0x7BE0ADFF, _BLUE, 0x7E8CFFFF, 0xC77DFFFF], dtype=np.ui
 SHARED_VERTEX = np.uint32(_GOLD)
 UNPLACED = np.uint32(0xC8CDD6FF)
 IN_DISTRESS = np.uint32(_RED)
-NOT_RUNNING = np.uint32(0x5A5F69FF)
+NOT_RUNNING = np.uint32(0x8A909CFF)
 LINK = np.uint32(0x333D4DFF)
+LINK_LOST = np.uint32(0xD9A441FF)
+LINK_CUT = np.uint32(0xC23B4BFF)
+LINK_OUT_OF_RANGE = np.uint32(0x55406EFF)
+JAM = np.uint32(0xFF5C8A60)
+PAUSED = np.uint32(0xA8AFBAFF)
+DEAD = np.uint32(0x0B0C0EFF)
+DEAD_CROSS = np.uint32(0xF2F4F7FF)
+SIDES = np.array([0xFFFFFFFF, 0xFFB000FF, 0x00D1B2FF, 0xB388FFFF], dtype=np.uint32)
 LIMIT = np.uint32(0xFF5252FF)
 OBSTACLE = np.uint32(0x6F6256FF)
 GROUND = np.uint32(0x222A37FF)
@@ -82,6 +90,12 @@ def place_colours(place: NDArray[np.int16], shared: NDArray[np.int16]) -> Colour
 def tier_colours(tier: NDArray[np.int16]) -> Colours:
     """Return the colours (K,) of agents in tiers of 1 and more."""
     return TIERS[np.clip(tier - 1, 0, len(TIERS) - 1)]
+
+
+def side_colours(side: NDArray[np.integer[Any]]) -> Colours:
+    """Return the colours (K,) of sides of a partition; they repeat after the last."""
+    colours: Colours = SIDES[side % len(SIDES)]
+    return colours
 
 
 def with_opacity(colours: Colours, alpha: int) -> Colours:

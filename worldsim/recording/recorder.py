@@ -24,11 +24,18 @@ from worldsim.recording import layout
 from worldsim.recording.agent_colours import AgentColours
 from worldsim.recording.blueprint import blueprint_of
 from worldsim.recording.columns import ColumnBlock, Entity
+from worldsim.recording.fault_columns import FaultColumns
 from worldsim.recording.formation_entities import FormationEntities
 from worldsim.recording.hierarchy_columns import HierarchyColumns, ShownRoles
 from worldsim.recording.legend import agent_legend, queue_legend
 from worldsim.recording.obstacle_shapes import ObstacleEntities
-from worldsim.recording.static_entities import max_queues, metric_limits, static_entities
+from worldsim.recording.situation import Situations
+from worldsim.recording.static_entities import (
+    half_sizes,
+    max_queues,
+    metric_limits,
+    static_entities,
+)
 from worldsim.recording.team_view import TeamView
 from worldsim.recording.tick_columns import TickColumns
 from worldsim.recording.tolerant_sink import TolerantSink
@@ -83,6 +90,9 @@ class RunRecorder:
         self._tick_columns = TickColumns(self._colours, tick_hz, metric_limits(scenario))
         self._hierarchy_columns = HierarchyColumns(tick_hz, scenario.rows, max_queues(scenario))
         self._shown_roles = ShownRoles()
+        radius_m = np.array([vehicle.radius_m for vehicle in scenario.vehicles])
+        self._situations = Situations(scenario.rows, scenario.netem)
+        self._fault_columns = FaultColumns(radius_m, half_sizes(scenario))
         self._obstacles = ObstacleEntities(Obstacles(scenario.obstacle))
         self._team_view = TeamView(1.0 / tick_hz)
         self._ticks_per_block = max(1, round(tick_hz * BLOCK_S))
@@ -163,6 +173,8 @@ class RunRecorder:
         self._stream.send_property("run", properties)
 
     def _send_block(self) -> None:
+        for each in self._events:
+            self._situations.handle_event(each)
         for event in self._missions_given():
             self._colours.begin_phase(self._formation_of(event.tables), event.mission)
         if self._ticks:
@@ -177,8 +189,10 @@ class RunRecorder:
         self._flush()
 
     def _blocks(self) -> Iterator[ColumnBlock]:
-        yield from self._tick_columns.blocks(self._ticks, self._figures)
-        yield from self._hierarchy_columns.blocks(self._ticks, self._figures)
+        situations = [self._situations.at(tick) for tick in self._ticks]
+        yield from self._tick_columns.blocks(self._ticks, self._figures, situations)
+        yield from self._hierarchy_columns.blocks(self._ticks, self._figures, situations)
+        yield from self._fault_columns.blocks(self._ticks, situations)
         yield from self._obstacles.blocks(self._ticks)
         yield from self._team_view.blocks(self._ticks)
 

@@ -9,10 +9,17 @@ from worldsim.recording import layout, palette
 from worldsim.recording.columns import Entity
 from worldsim.scenario.file import dump
 from worldsim.scenario.tables import CONVERGED_M, Scenario
+from worldsim.truth.vehicle import Floats
 
 TRAIL_RADIUS_M = 0.018
 TARGET_RADIUS_M = 0.035
 LINK_RADIUS_M = 0.004
+LINK_STYLES = (
+    (layout.LINKS, palette.LINK, LINK_RADIUS_M),
+    (layout.LINKS_LOST, palette.LINK_LOST, 1.6 * LINK_RADIUS_M),
+    (layout.LINKS_CUT, palette.LINK_CUT, 1.6 * LINK_RADIUS_M),
+    (layout.LINKS_OUT_OF_RANGE, palette.LINK_OUT_OF_RANGE, LINK_RADIUS_M),
+)
 PARENT_LINE_RADIUS_M = 0.012
 SERIES_WIDTH = 1.2  # [UI points]
 LIMIT_WIDTH = 1.0  # [UI points]
@@ -50,19 +57,34 @@ def max_queues(scenario: Scenario) -> int:
 def _world_styles(scenario: Scenario) -> Iterator[Entity]:
     yield Entity(layout.AGENTS, rr.Points3D.from_fields(radii=[TRAIL_RADIUS_M]))
     yield Entity(layout.TARGETS, rr.Points3D.from_fields(radii=[TARGET_RADIUS_M]))
-    links = rr.LineStrips3D.from_fields(colors=np.array([palette.LINK]), radii=[LINK_RADIUS_M])
-    yield Entity(layout.LINKS, links)
+    for entity, colour, width in LINK_STYLES:
+        style = rr.LineStrips3D.from_fields(colors=np.array([colour]), radii=[width])
+        yield Entity(entity, style)
     yield Entity(layout.HIERARCHY, rr.LineStrips3D.from_fields(radii=[PARENT_LINE_RADIUS_M]))
-    yield Entity(layout.VEHICLES, _vehicle_boxes(scenario))
-
-
-def _vehicle_boxes(scenario: Scenario) -> rr.Boxes3D:
-    agents, radius_m = scenario.rows, scenario.vehicle.radius_m
-    return rr.Boxes3D.from_fields(
-        half_sizes=[[radius_m, 0.62 * radius_m, 0.3 * radius_m]] * agents,
-        show_labels=agents <= layout.NAMED_MAX,
-        fill_mode=rr.components.FillMode.Solid,
+    boxes = rr.Boxes3D.from_fields(
+        show_labels=scenario.rows <= layout.NAMED_MAX, fill_mode=rr.components.FillMode.Solid
     )
+    yield Entity(layout.VEHICLES, boxes)
+    yield from _fault_styles()
+
+
+def half_sizes(scenario: Scenario) -> Floats:
+    """Return half the length, width and height of each vehicle's body (N, 3) [m]."""
+    radius_m = np.array([vehicle.radius_m for vehicle in scenario.vehicles])
+    sizes: Floats = radius_m[:, None] * np.array([1.0, 0.62, 0.3])
+    return sizes
+
+
+def _fault_styles() -> Iterator[Entity]:
+    filled = rr.components.FillMode.TransparentFillMajorWireframe
+    jams = rr.Ellipsoids3D.from_fields(colors=np.array([palette.JAM]), fill_mode=filled)
+    yield Entity(layout.JAMS, jams)
+    yield Entity(layout.SIDES, rr.Ellipsoids3D.from_fields(fill_mode=rr.components.FillMode.Solid))
+    wire = rr.components.FillMode.MajorWireframe
+    paused = np.array([palette.PAUSED])
+    yield Entity(layout.PAUSED, rr.Boxes3D.from_fields(colors=paused, fill_mode=wire))
+    dead = rr.LineStrips3D.from_fields(colors=np.array([palette.DEAD_CROSS]), show_labels=True)
+    yield Entity(layout.DEAD, dead)
 
 
 def _series_styles(scenario: Scenario) -> Iterator[Entity]:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
 from worldsim.judge.tick import Float32s, Tick
 from worldsim.judge.verdict import Figures
@@ -15,6 +16,7 @@ from worldsim.recording import layout, palette
 from worldsim.recording.agent_colours import AgentColours
 from worldsim.recording.columns import ChangeDetector, ColumnBlock, number_column
 from worldsim.recording.link_columns import LinkColumns
+from worldsim.recording.situation import Situation
 
 
 class TickColumns:
@@ -35,19 +37,26 @@ class TickColumns:
         self._counter_changes: dict[str, ChangeDetector] = {}
         self._agent_metrics = layout.agent_metrics(obstacles=layout.OBSTACLE_DISTANCE in limits)
 
-    def blocks(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
+    def blocks(
+        self,
+        ticks: Sequence[Tick],
+        figures: Sequence[Figures],
+        situations: Sequence[Situation],
+    ) -> Iterator[ColumnBlock]:
         """Yield the columns of a block; blocks come in order."""
         yield from _poses(ticks)
         yield from _metrics(ticks, figures)
         yield _state(ticks)
         yield from self._missions(ticks)
-        yield from self._coloured_entities(ticks)
-        yield from self._links.blocks(ticks)
+        yield from self._coloured_entities(ticks, [each.dead for each in situations])
+        yield from self._links.blocks(ticks, situations)
         yield from self._packets(ticks)
         yield from self._reference_lines(len(ticks) - 1)
 
-    def _coloured_entities(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
-        colours = self._colours.vehicles(ticks)
+    def _coloured_entities(
+        self, ticks: Sequence[Tick], dead: Sequence[NDArray[np.bool_]]
+    ) -> Iterator[ColumnBlock]:
+        colours = self._colours.vehicles(ticks, dead)
         agents = colours.shape[1]
         yield _trails(ticks, colours.ravel())
         rows = self._colour_changes.changed_rows(colours)
