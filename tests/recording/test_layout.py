@@ -4,7 +4,7 @@ import pytest
 from rerun.chunk import Chunk, RrdReader
 
 from tests.recording.flights import record, straight_flight, wedge
-from worldsim.judge.run_events import Killed
+from worldsim.judge.run_events import Killed, QueueChanged, SlotChanged
 from worldsim.recording.recorder import RunRecorder
 
 AGENTS = 9
@@ -16,6 +16,8 @@ def chunks(tmp_path_factory: pytest.TempPathFactory) -> list[Chunk]:
     scenario = wedge(AGENTS, duration_s=2.0)
     recorder = RunRecorder(path, scenario, "layout", mode="virtual")
     recorder.event(Killed(t_s=0.5, agent=4, planned=True))
+    recorder.event(SlotChanged(t_s=0.5125, agent=4, place=(2, 1), before=None))
+    recorder.event(QueueChanged(t_s=0.5125, agent=4, queue=2))
     record(recorder, scenario, list(straight_flight(scenario)))
     return list(RrdReader(path).stream())
 
@@ -72,10 +74,12 @@ def test_series_are_named_after_their_agents(chunks: list[Chunk]) -> None:
     assert names == [[[f"a{agent}" for agent in range(AGENTS)]]]
 
 
-def test_a_kill_is_logged_as_a_warning(chunks: list[Chunk]) -> None:
+def test_events_are_sentences_with_their_time_by_what_they_matter(chunks: list[Chunk]) -> None:
     (log,) = [chunk.to_record_batch() for chunk in chunks if chunk.entity_path == "/log/events"]
     assert log.column("TextLog:text").to_pylist() == [
-        ["a4 is killed; its vehicle hovers (scheduled)"]
+        ["0.50 s  a4 is killed; its vehicle hovers (scheduled)"],
+        ["0.51 s  a4 takes slot 2 of queue Q2"],
+        ["0.51 s  a4 enters queue Q2"],
     ]
-    assert log.column("TextLog:level").to_pylist() == [["WARN"]]
-    assert log.column("tick").to_pylist() == [10]
+    assert log.column("TextLog:level").to_pylist() == [["WARN"], ["INFO"], ["DEBUG"]]
+    assert log.column("tick").to_pylist() == [10, 10, 10]

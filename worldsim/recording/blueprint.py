@@ -78,8 +78,14 @@ def _trail() -> rrb.VisibleTimeRanges:
 
 
 def _event_view() -> rrb.TextLogView:
-    columns = rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
-    return rrb.TextLogView(origin=layout.EVENTS, name="Events", columns=columns)
+    """Return the list of events: their text begins with the time, which the viewer would cut."""
+    times = [
+        rrb.encodings.TimelineColumn(timeline, visible=False)
+        for timeline in (layout.SIM_TIME, layout.TICK)
+    ]
+    columns = rrb.TextLogColumns(timeline_columns=times, text_log_columns=["LogLevel", "Body"])
+    listed = rrb.TextLogRows(filter_by_log_level=["CRITICAL", "ERROR", "WARN", "INFO"])
+    return rrb.TextLogView(origin=layout.EVENTS, name="Events", columns=columns, rows=listed)
 
 
 def _series(name: str, origin: str) -> rrb.TimeSeriesView:

@@ -17,7 +17,15 @@ import rerun as rr
 
 from agent.qstructure.formation import Formation, FormationSpec
 from worldsim.judge.event_text import WARNINGS, sentence
-from worldsim.judge.run_events import FormationGiven, FrameGiven, MissionRunEvent, RunEvent, as_row
+from worldsim.judge.run_events import (
+    FormationGiven,
+    FrameGiven,
+    MissionRunEvent,
+    QueueChanged,
+    RoleChanged,
+    RunEvent,
+    as_row,
+)
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout
@@ -237,7 +245,7 @@ class RunRecorder:
     def _send_events(self) -> None:
         times_s = [event.t_s for event in self._events]
         texts = [self._text(event) for event in self._events]
-        levels = ["WARN" if isinstance(event, WARNINGS) else "INFO" for event in self._events]
+        levels = [_level(event) for event in self._events]
         columns = [
             *rr.TextLog.columns(text=texts, level=levels),
             *rr.AnyValues.columns(event=[json.dumps(as_row(event)) for event in self._events]),
@@ -246,10 +254,10 @@ class RunRecorder:
         rr.send_columns(layout.EVENTS, at, columns, recording=self._stream)
 
     def _text(self, event: RunEvent) -> str:
-        """Return an event as a sentence, with the queues' names at its time."""
+        """Return an event as its time and a sentence, with the queues' names at its time."""
         if isinstance(event, FormationGiven | FrameGiven):
             self._queue_names = [queue.name for queue in event.tables.queue]
-        return sentence(event, self._queue_names)
+        return f"{event.t_s:.2f} s  {sentence(event, self._queue_names)}"
 
     def _tick_at(self, time_s: float) -> int:
         return int(time_s * self._scenario.fleet.tick_hz + 1e-6)
@@ -264,6 +272,17 @@ class RunRecorder:
         self._stream.disconnect()
         if self._sink is not None:
             self._sink.wait()
+
+
+def _level(event: RunEvent) -> str:
+    """Return the level at which an event is listed.
+
+    A change of queue comes with the slot in it, and roles have a timeline of their own: both are
+    hidden until asked for.
+    """
+    if isinstance(event, WARNINGS):
+        return "WARN"
+    return "DEBUG" if isinstance(event, QueueChanged | RoleChanged) else "INFO"
 
 
 class _BlockTimes:
