@@ -38,7 +38,7 @@ from pathlib import Path
 from tests.recording.flights import record, straight_flight, wedge
 from worldsim.recording.recorder import RunRecorder
 
-resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+resource.setrlimit(resource.RLIMIT_FSIZE, (700_000, 700_000))
 scenario = wedge(30, duration_s=8.0)
 recorder = RunRecorder(Path(sys.argv[1]), scenario, "full", mode="virtual")
 judge = record(recorder, scenario, list(straight_flight(scenario)))

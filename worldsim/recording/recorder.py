@@ -95,10 +95,11 @@ class RunRecorder:
         formation = self._formation_of(scenario.formation)
         forms = scenario.control.controller == FORMING_CONTROLLER
         self._colours = AgentColours(scenario.rows, formation, forms)
-        self._tick_columns = TickColumns(self._colours, tick_hz, metric_limits(scenario))
+        radius_m = np.array([vehicle.radius_m for vehicle in scenario.vehicles])
+        limits = metric_limits(scenario)
+        self._tick_columns = TickColumns(self._colours, tick_hz, limits, radius_m)
         self._hierarchy_columns = HierarchyColumns(tick_hz, scenario.rows, max_queues(scenario))
         self._shown_roles = ShownRoles()
-        radius_m = np.array([vehicle.radius_m for vehicle in scenario.vehicles])
         self._situations = Situations(scenario.rows, scenario.netem)
         self._fault_columns = FaultColumns(radius_m, half_sizes(scenario))
         self._obstacles = ObstacleEntities(Obstacles(scenario.obstacle))

@@ -21,6 +21,9 @@ LINK_STYLES = (
     (layout.LINKS_OUT_OF_RANGE, palette.LINK_OUT_OF_RANGE, LINK_RADIUS_M),
 )
 PARENT_LINE_RADIUS_M = 0.012
+HEADING_RADIUS_M = 0.012
+MAX_NAMES = 5
+"""Of more agents with a limit, the first are named."""
 SERIES_WIDTH = 1.2  # [UI points]
 LIMIT_WIDTH = 1.0  # [UI points]
 
@@ -37,15 +40,36 @@ def static_entities(scenario: Scenario) -> Iterator[Entity]:
 
 def metric_limits(scenario: Scenario) -> dict[str, list[float]]:
     """Return the reference lines of each metric that has any, in the metric's unit."""
-    turn_deg = scenario.vehicle.max_turn_deg
     near = {layout.OBSTACLE_DISTANCE: [scenario.obstacle_bound_m]} if scenario.obstacle else {}
     return {
         **near,
         layout.SEPARATION: [scenario.separation_bound_m],
         layout.SLOT_ERROR: [CONVERGED_M],
         layout.QUEUE_RESIDUAL: [CONVERGED_M],
-        layout.TURN_DEG: [-turn_deg, turn_deg],
+        layout.TURN_DEG: list(turn_limits(scenario)),
     }
+
+
+def turn_limits(scenario: Scenario) -> dict[float, str]:
+    """Return the limits of the wanted turn [deg], positive to the left, and whose they are.
+
+    Agents may have other limits than the rest, and each side its own.
+    """
+    holders: dict[float, list[int]] = {}
+    for agent, vehicle in enumerate(scenario.vehicles):
+        left, right = vehicle.max_turn_left_deg, vehicle.max_turn_right_deg
+        holders.setdefault(vehicle.max_turn_deg if left is None else left, []).append(agent)
+        holders.setdefault(-(vehicle.max_turn_deg if right is None else right), []).append(agent)
+    return {limit: _whose(limit, agents, scenario.rows) for limit, agents in holders.items()}
+
+
+def _whose(limit: float, agents: list[int], rows: int) -> str:
+    side = "left" if limit > 0.0 else "right"
+    if len(agents) == rows:
+        return f"limit to the {side}"
+    names = [layout.agent_name(agent) for agent in agents[:MAX_NAMES]]
+    more = f" and {len(agents) - MAX_NAMES} more" if len(agents) > MAX_NAMES else ""
+    return f"limit to the {side} of {', '.join(names)}{more}"
 
 
 def max_queues(scenario: Scenario) -> int:
@@ -65,6 +89,8 @@ def _world_styles(scenario: Scenario) -> Iterator[Entity]:
         show_labels=scenario.rows <= layout.NAMED_MAX, fill_mode=rr.components.FillMode.Solid
     )
     yield Entity(layout.VEHICLES, boxes)
+    heading = rr.Arrows3D.from_fields(colors=np.array([palette.HEADING]), radii=[HEADING_RADIUS_M])
+    yield Entity(layout.HEADINGS, heading)
     yield from _fault_styles()
 
 
@@ -93,7 +119,8 @@ def _series_styles(scenario: Scenario) -> Iterator[Entity]:
         yield Entity(metric, rr.SeriesLines(names=names, widths=[SERIES_WIDTH] * len(names)))
     yield Entity(layout.QUEUE_RESIDUAL, _queue_series(max_queues(scenario)))
     for metric, values in metric_limits(scenario).items():
-        yield Entity(layout.limit_entity(metric), _limit_series(len(values)))
+        turns = list(turn_limits(scenario).values()) if metric == layout.TURN_DEG else None
+        yield Entity(layout.limit_entity(metric), _limit_series(turns or ["limit"] * len(values)))
 
 
 def _queue_series(queues: int) -> rr.SeriesLines:
@@ -104,11 +131,10 @@ def _queue_series(queues: int) -> rr.SeriesLines:
     )
 
 
-def _limit_series(lines: int) -> rr.SeriesLines:
+def _limit_series(names: list[str]) -> rr.SeriesLines:
+    lines = len(names)
     return rr.SeriesLines(
-        names=["limit"] * lines,
-        colors=np.full(lines, palette.LIMIT),
-        widths=[LIMIT_WIDTH] * lines,
+        names=names, colors=np.full(lines, palette.LIMIT), widths=[LIMIT_WIDTH] * lines
     )
 
 

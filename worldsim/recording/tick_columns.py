@@ -17,17 +17,29 @@ from worldsim.recording.agent_colours import AgentColours
 from worldsim.recording.columns import ChangeDetector, ColumnBlock, number_column
 from worldsim.recording.link_columns import LinkColumns
 from worldsim.recording.situation import Situation
+from worldsim.truth.vehicle import Floats
+
+ARROW_RADII = 2.6
+"""Length of the arrow that shows a vehicle's heading [radii of the vehicle]."""
+SPARSE_TICKS = 4
+"""Arrows of a large fleet are recorded at one tick of so many."""
 
 
 class TickColumns:
     """Makes the columns of one block of ticks after the other.
 
-    tick_hz: ticks in a second. limits: the reference lines of each metric, in its unit.
+    tick_hz: ticks in a second. limits: the reference lines of each metric, in its unit. radius_m
+    (N,): of each vehicle.
     """
 
     def __init__(
-        self, colours: AgentColours, tick_hz: float, limits: Mapping[str, list[float]]
+        self,
+        colours: AgentColours,
+        tick_hz: float,
+        limits: Mapping[str, list[float]],
+        radius_m: Floats,
     ) -> None:
+        self._arrow_m = ARROW_RADII * radius_m
         self._colours = colours
         self._limits = limits
         self._links = LinkColumns(tick_hz)
@@ -45,6 +57,7 @@ class TickColumns:
     ) -> Iterator[ColumnBlock]:
         """Yield the columns of a block; blocks come in order."""
         yield from _poses(ticks)
+        yield from self._headings(ticks)
         yield from _metrics(ticks, figures)
         yield _state(ticks)
         yield from self._missions(ticks)
@@ -52,6 +65,21 @@ class TickColumns:
         yield from self._links.blocks(ticks, situations)
         yield from self._packets(ticks)
         yield from self._reference_lines(len(ticks) - 1)
+
+    def _headings(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
+        """Yield an arrow ahead of each vehicle; of a large fleet, at some ticks only."""
+        agents = len(ticks[0].alive)
+        step = 1 if agents <= layout.NAMED_MAX else SPARSE_TICKS
+        rows = [row for row, tick in enumerate(ticks) if tick.index % step == 0]
+        if rows:
+            yaw, pitch, _ = np.concatenate([ticks[row].attitude for row in rows]).T
+            level = np.cos(pitch)
+            ahead = np.stack((level * np.cos(yaw), level * np.sin(yaw), np.sin(pitch)), axis=1)
+            columns = rr.Arrows3D.columns(
+                origins=np.concatenate([ticks[row].position for row in rows]),
+                vectors=ahead * np.tile(self._arrow_m, len(rows))[:, None],
+            )
+            yield ColumnBlock.of_batches(layout.HEADINGS, rows, columns, agents)
 
     def _coloured_entities(
         self, ticks: Sequence[Tick], dead: Sequence[NDArray[np.bool_]]
