@@ -1,6 +1,7 @@
 """Makes a picture of a recording without a display: ``python docs/picture.py RUN.rrd 3.0 OUT.png``.
 
-Needs a software Vulkan driver (Debian: mesa-vulkan-drivers), whose file VK_ICD_FILENAMES may name.
+A fourth argument opens another tab of the layout: network, structure or faults. Needs a software
+Vulkan driver (Debian: mesa-vulkan-drivers), whose file VK_ICD_FILENAMES may name.
 """
 
 import os
@@ -33,7 +34,24 @@ def main() -> None:
     with viewer() as client:
         client.open(str(recording.resolve()))
         client.set_time("sim_time", duration=at_s, play_state="paused")
+        for tab in sys.argv[4:]:
+            open_tab(client, tab)
         save(settled(client), out)
+
+
+def open_tab(client: ViewerClient, name: str) -> None:
+    """Open a tab of the layout by its name."""
+    blueprint = client.get_blueprint().blueprint
+    containers = {
+        path: parts["ContainerBlueprint"]
+        for path, parts in blueprint.items()
+        if "ContainerBlueprint" in parts
+    }
+    for path, container in containers.items():
+        names = {containers.get(at, {}).get("display_name"): at for at in container["contents"]}
+        if name.capitalize() in names:
+            blueprint[path]["ContainerBlueprint"]["active_tab"] = names[name.capitalize()]
+    client.set_blueprint(blueprint, "recording")
 
 
 @contextmanager

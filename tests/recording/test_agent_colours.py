@@ -1,20 +1,16 @@
 """Colours keep their meaning: of a queue in a formation, of an agent where there is none."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import msgspec
 import numpy as np
-import pytest
-from rerun.chunk import Chunk, RrdReader
 
 from agent.messages import DISTRESS, MEMBER
 from agent.qstructure.formation import Formation
-from tests.recording.flights import record, straight_flight, wedge
+from tests.recording.flights import straight_flight, wedge
 from worldsim.judge.tick import HierarchyRows, Tick
 from worldsim.recording import palette
 from worldsim.recording.agent_colours import AgentColours
-from worldsim.recording.recorder import RunRecorder
 
 AGENTS = 9
 SCENARIO = wedge(AGENTS, duration_s=2.0)
@@ -75,16 +71,3 @@ def test_agents_have_the_colours_of_their_own_mission() -> None:
     before, after = coloured(colours, [tick, replace(tick, mission=np.full(AGENTS, 1024))])
     assert before[apex] == palette.SHARED_VERTEX
     assert after[apex] == palette.QUEUES[0]
-
-
-@pytest.mark.parametrize(("controller", "head"), [("flocking", "No f"), ("q_structure", "Forma")])
-def test_a_legend_says_what_the_colours_mean(tmp_path: Path, controller: str, head: str) -> None:
-    control = msgspec.structs.replace(SCENARIO.control, controller=controller)
-    scenario = msgspec.structs.replace(SCENARIO, control=control)
-    recorder = RunRecorder(tmp_path / "run.rrd", scenario, "legend", mode="virtual")
-    record(recorder, scenario, ticks(placed=controller == "q_structure"))
-    chunks: list[Chunk] = list(RrdReader(tmp_path / "run.rrd").stream())
-    legends = [chunk.to_record_batch() for chunk in chunks if chunk.entity_path == "/run/legend"]
-    (text,) = legends[0].column("TextDocument:text").to_pylist()[0]
-    assert text.startswith(f"**{head}")
-    assert ("| orange | queue Q1 |" in text) == (controller == "q_structure")

@@ -21,7 +21,9 @@ def flight(position_of: Callable[[float], np.ndarray], dead: tuple[int, ...] = (
     rows = []
     for tick in straight_flight(wedge(AGENTS, duration_s=6.0)):
         running = ~np.isin(np.arange(AGENTS), dead if tick.time_s >= 1.0 else ())
-        rows.append(replace(tick, position=position_of(tick.time_s), alive=running))
+        position = position_of(tick.time_s)
+        target = position.astype(np.float32)
+        rows.append(replace(tick, position=position, target=target, alive=running))
     return rows
 
 
@@ -92,6 +94,16 @@ def test_every_running_agent_is_in_view(
 def test_the_view_does_not_zoom_out_to_a_vehicle_left_behind() -> None:
     scales = numbers(blocks_of(flight(leaving_one, (0,))), layout.TEAM, "Transform3D:scale")
     assert scales[-1, 0] < 9.0, "agent 0 is 27 m away at the end"
+
+
+def test_targets_are_in_view() -> None:
+    ticks = [replace(tick, target=tick.target + 3.0) for tick in flight(moving)]
+    ticks[9].target[0] = np.nan
+    blocks = blocks_of(ticks)
+    centres = numbers(blocks, layout.TEAM, "Transform3D:translation")
+    scales = numbers(blocks, layout.TEAM, "Transform3D:scale")
+    shown = [(tick.target - c) / s for tick, c, s in zip(ticks, centres, scales, strict=True)]
+    assert np.nanmax(np.linalg.norm(shown, axis=2)) <= 1.0
 
 
 def test_a_single_agent_is_not_a_point_in_the_view() -> None:

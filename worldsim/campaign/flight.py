@@ -17,6 +17,7 @@ from agent.checked_controller import described
 from agent.controller import FaultyControllerError
 from netem.wire.shutdown import StopRequest
 from worldsim.campaign.pulse import ClosedFilesError, Guard, Pulse, blame
+from worldsim.engine.step import SlotLoop
 from worldsim.engine.virtual import Flight, fly
 from worldsim.fleet.fork import adopt_orphans, end_orphans
 from worldsim.results.run_folder import RunDirectory, RunWriteError
@@ -84,15 +85,21 @@ def _fly(scenario: Scenario, directory: RunDirectory, recording: bool, pulse: Pu
     except BaseException:
         _close(sinks)
         raise
-    _close(sinks)
+    _close(sinks, flight.loop)
     flight.loop.note_writes()
     directory.write_summary(summarise(scenario, finished(flight, scenario)))
 
 
-def _close(sinks: Sinks) -> None:
-    """Finish the recording; first end what controllers started, which would hold its file open."""
+def _close(sinks: Sinks, loop: SlotLoop | None = None) -> None:
+    """Finish the recording; first end what controllers started, which would hold its file open.
+
+    loop: of a run that ended; None: it broke off.
+    """
     end_orphans(())
-    sinks.close()
+    if loop is None:
+        sinks.close()
+    else:
+        sinks.close(loop.judge, loop.world.time_s)
 
 
 def _report(error: BaseException, scenario: Scenario, pulse: Pulse) -> None:

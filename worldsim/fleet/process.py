@@ -97,7 +97,8 @@ def conduct(
         complete = present and fleet.fly(should_stop)
     finally:
         fleet.land()
-        sinks.close()
+        judge = fleet.loop.judge if complete else None
+        sinks.close(judge, fleet.loop.world.time_s)
         fleet.loop.note_writes()
         launcher.wait(0.0)  # reads the reason that the launcher sends before its SIGTERM
         ended_by = None if complete else launcher.stop_reason or fleet.ended_by or "interrupted"

@@ -1,59 +1,133 @@
-"""The viewer's default layout of a recording: the flight, its figures and its events."""
+"""The viewer's default layout of a recording: a tab for each question, each with its own view.
+
+All 3D views are drawn in the team's frame, so they follow the team; each shows the layers that
+answer its question and hides the others.
+"""
+
+from collections.abc import Sequence
 
 import numpy as np
 import rerun.blueprint as rrb
+from rerun.encodings import EntityPath
 
 from worldsim.recording import layout
+from worldsim.recording.panels import FAULTS, MOTION, NETWORK, QUESTIONS, STRUCTURE
+from worldsim.scenario.tables import Scenario
 
+Override = rrb.VisibleTimeRanges | rrb.EntityBehavior
 TRAIL_S = 4.0
 BACKGROUND = (13, 17, 24)
 EYE_DIRECTION = np.array([-0.8, -1.0, 0.5])  # from the centre of view [world axes]
 EYE_DISTANCE = 2.2  # [radii of the team]; a ball of this radius fills the height of the view
 
+PANEL_SHARE, STATES_SHARE = 1.5, 1.8
+"""Heights of the panel of words and of timelines of states [heights of a plot]."""
 
-def blueprint_of(obstacles: bool = False) -> rrb.Blueprint:
-    """Return the viewer's default layout; obstacles: whether there are any."""
-    main = rrb.Vertical(_flight_view(), _event_view(), row_shares=[4, 1])
-    tabs = rrb.Tabs(_motion_tab(obstacles), _hierarchy_tab())
+LINK_LAYERS = (layout.LINKS, layout.LINKS_LOST, layout.LINKS_CUT)
+FAULT_LAYERS = (layout.SIDES, layout.LINKS_CUT)
+FORMATION_LAYERS = tuple(
+    f"{formation}/{part}"
+    for formation in (layout.FORMATION, layout.FORMATION_BEFORE)
+    for part in (layout.SLOTS_PART, layout.SPHERES_PART, layout.QUEUES_PART)
+)
+GUIDANCE_LAYERS = (layout.TARGETS, layout.HIERARCHY)
+LAYERS = (
+    *LINK_LAYERS,
+    layout.LINKS_OUT_OF_RANGE,
+    layout.SIDES,
+    *FORMATION_LAYERS,
+    *GUIDANCE_LAYERS,
+)
+"""What some views hide; all views show vehicles, obstacles, jams, and what stops vehicles."""
+SHOWN = {
+    MOTION: FORMATION_LAYERS,
+    NETWORK: (*LINK_LAYERS, layout.SIDES),
+    STRUCTURE: (*FORMATION_LAYERS, *GUIDANCE_LAYERS),
+    FAULTS: (*FAULT_LAYERS, *FORMATION_LAYERS),
+}
+"""The layers that each tab's view shows."""
+
+
+def blueprint_of(scenario: Scenario) -> rrb.Blueprint:
+    """Return the viewer's default layout of a scenario's run."""
+    tabs = {
+        MOTION: _motion(obstacles=bool(scenario.obstacle)),
+        NETWORK: _network(records=scenario.control.allocation == "assignment"),
+        STRUCTURE: _structure(),
+        FAULTS: _faults(),
+    }
+    pages = [_page(question, plots) for question, plots in tabs.items()]
     return rrb.Blueprint(
-        rrb.Horizontal(main, tabs, column_shares=[2, 1]),
+        rrb.Tabs(*pages, active_tab=0),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=layout.SIM_TIME, playback_speed=1.0),
     )
 
 
-def _motion_tab(obstacles: bool) -> rrb.Vertical:
+def _page(question: str, plots: Sequence[rrb.View]) -> rrb.Horizontal:
+    """Return a tab: its view over the events, and its panel of words over its plots."""
+    panels = rrb.Tabs(
+        rrb.TextDocumentView(origin=layout.panel_entity(question), name="What you see"),
+        rrb.TextDocumentView(origin=layout.VERDICT, name="Verdict"),
+        rrb.TextDocumentView(origin=layout.SCENARIO, name="Scenario"),
+    )
+    main = rrb.Vertical(_flight_view(question), _event_view(), row_shares=[7, 2])
+    shares = [STATES_SHARE if isinstance(plot, rrb.StateTimelineView) else 1 for plot in plots]
+    side = rrb.Vertical(panels, *plots, row_shares=[PANEL_SHARE, *shares])
+    return rrb.Horizontal(main, side, column_shares=[9, 5], name=question.capitalize())
+
+
+def _motion(obstacles: bool) -> list[rrb.View]:
     distance = [_series("Distance to nearest obstacle [m]", layout.OBSTACLE_DISTANCE)]
-    return rrb.Vertical(
+    return [
         _series("Distance to nearest vehicle [m]", layout.SEPARATION),
         *(distance if obstacles else ()),
-        _series("Distance to own slot [m]", layout.SLOT_ERROR),
         _series("Control force |u|", layout.FORCE),
-        _series("Desired turn [deg]", layout.TURN_DEG),
-        name="Motion",
-    )
+        _series("Distance to own slot [m]", layout.SLOT_ERROR),
+        _series("Wanted turn [deg], left positive", layout.TURN_DEG),
+    ]
 
 
-def _hierarchy_tab() -> rrb.Vertical:
-    return rrb.Vertical(
-        _series("Largest slot distance in each queue [m]", layout.QUEUE_RESIDUAL),
+def _network(records: bool) -> list[rrb.View]:
+    """Return plots of the network; records: whether agents keep records of their team."""
+    ages = [_series("Age of oldest team record [s]", layout.RECORD_AGE)]
+    return [
+        _series("Pairs of agents by link", layout.LINK_COUNTS, named=True),
+        _series("Connectivity lambda_2 (0: the team is parted)", layout.LAMBDA2),
+        _series("Neighbours heard", layout.NEIGHBOURS),
+        *(ages if records else ()),
+        _series("Frames of the radio, from the start", layout.PACKETS, named=True),
+    ]
+
+
+def _structure() -> list[rrb.View]:
+    return [
+        rrb.StateTimelineView(
+            origin="/",
+            contents=[f"{layout.PHASE}/**", f"{layout.ROLES}/**"],
+            name="Phase and roles",
+        ),
+        _series("Largest slot distance in each queue [m]", layout.QUEUE_RESIDUAL, named=True),
         _series("Tier (-1: in distress)", layout.TIER),
-        _series("Age of oldest team record [s]", layout.RECORD_AGE),
-        _series("Number of direct neighbours", layout.NEIGHBOURS),
-        rrb.StateTimelineView(origin=layout.ROLES, name="Role"),
-        row_shares=[1, 1, 1, 1, 2],
-        name="Hierarchy",
-    )
+    ]
 
 
-def _flight_view() -> rrb.Spatial3DView:
-    """Return the 3D view, drawn in the team's frame: it follows the team and keeps it in view."""
+def _faults() -> list[rrb.View]:
+    return [
+        rrb.StateTimelineView(origin=layout.CONDITIONS, name="What is in force"),
+        _series("Distance to own slot [m]", layout.SLOT_ERROR),
+        _series("Distance to nearest vehicle [m]", layout.SEPARATION),
+    ]
+
+
+def _flight_view(question: str) -> rrb.Spatial3DView:
+    """Return a 3D view in the team's frame: it follows the team and keeps it in view."""
     direction = EYE_DIRECTION / np.linalg.norm(EYE_DIRECTION)
     return rrb.Spatial3DView(
         origin=layout.TEAM,
         contents=f"{layout.WORLD}/**",
-        name="Flight",
+        name=QUESTIONS[question],
         background=BACKGROUND,
         line_grid=False,
         eye_controls=rrb.EyeControls3D(
@@ -62,8 +136,16 @@ def _flight_view() -> rrb.Spatial3DView:
             look_target=(0, 0, 0),
             eye_up=(0, 0, 1),
         ),
-        overrides={layout.AGENTS: _trail()},
+        overrides=_overrides(question),
     )
+
+
+def _overrides(question: str) -> dict[EntityPath | str, Override]:
+    """Return what a tab's view changes: trails behind vehicles, and the layers that it hides."""
+    changed: dict[EntityPath | str, Override] = {layout.AGENTS: _trail()}
+    for layer in LAYERS:
+        changed[layer] = rrb.EntityBehavior(visible=layer in SHOWN[question])
+    return changed
 
 
 def _trail() -> rrb.VisibleTimeRanges:
@@ -88,5 +170,6 @@ def _event_view() -> rrb.TextLogView:
     return rrb.TextLogView(origin=layout.EVENTS, name="Events", columns=columns, rows=listed)
 
 
-def _series(name: str, origin: str) -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(origin=origin, name=name, plot_legend=rrb.PlotLegend(visible=False))
+def _series(name: str, origin: str, named: bool = False) -> rrb.TimeSeriesView:
+    """Return curves; named: with a legend of their names."""
+    return rrb.TimeSeriesView(origin=origin, name=name, plot_legend=rrb.PlotLegend(visible=named))

@@ -49,11 +49,18 @@ RECORD_AGE = f"{METRICS}/record_age"
 NEIGHBOURS = f"{METRICS}/neighbours"
 QUEUE_RESIDUAL = f"{METRICS}/queue_residual"
 PACKETS = f"{METRICS}/packets"
+LAMBDA2 = f"{METRICS}/lambda2"
+LINK_COUNTS = f"{METRICS}/links"
 
 EVENTS = "/log/events"
 ROLES = "/roles"
+PHASE = "/phase"
+TEAM_PHASE = f"{PHASE}/team"
+CONDITIONS = "/conditions"
+RADIO_CONDITION = f"{CONDITIONS}/radio"
 SCENARIO = "/run/scenario"
-LEGEND = "/run/legend"
+VERDICT = "/run/verdict"
+PANELS = "/run/about"
 RUN_PROPERTIES = "/__properties/run"
 
 AGENT_STATE = "/state/agents"
@@ -98,6 +105,16 @@ def agent_metrics(obstacles: bool) -> tuple[str, ...]:
 def role_entity(agent: int) -> str:
     """Return the entity that holds an agent's role over time."""
     return f"{ROLES}/{agent_name(agent)}"
+
+
+def condition_entity(agent: int) -> str:
+    """Return the entity that holds what is wrong with an agent over time."""
+    return f"{CONDITIONS}/{agent_name(agent)}"
+
+
+def panel_entity(question: str) -> str:
+    """Return the entity that holds the panel of words of a tab of the layout."""
+    return f"{PANELS}/{question}"
 
 
 def limit_entity(metric: str) -> str:

@@ -25,6 +25,8 @@ LINES_MAX = 400
 LINES_PER_S = 2000
 """More lines at once, or in a second, would cost more than everything else in the recording."""
 
+Missing = dict[str, Floats]
+"""Lines (K, 2, 3) [m; world frame] by entity."""
 PairCodes = NDArray[np.int64]
 """Pairs (hearer, heard) of N agents, each coded as hearer * N + heard."""
 
@@ -78,6 +80,7 @@ class LinkColumns:
         if len(ticks[0].alive) > layout.NAMED_MAX:
             rows = rows[:1]
         missing = [missing_links(ticks[row], situations[row]) for row in rows]
+        yield from self._counts(ticks, rows, missing)
         for entity in (layout.LINKS_LOST, layout.LINKS_CUT, layout.LINKS_OUT_OF_RANGE):
             drawn = [each[entity] for each in missing]
             # While there are none, nothing is repeated.
@@ -87,8 +90,20 @@ class LinkColumns:
             if some:
                 yield _strips(entity, [rows[at] for at in some], [drawn[at] for at in some])
 
+    def _counts(
+        self, ticks: Sequence[Tick], rows: Sequence[int], missing: Sequence[Missing]
+    ) -> Iterator[ColumnBlock]:
+        """Yield how many pairs have a link, and how many are missing, by the reason."""
+        if rows:
+            counts = [
+                [len(link_lines(ticks[row])), *(len(lines) for lines in each.values())]
+                for row, each in zip(rows, missing, strict=True)
+            ]
+            columns = rr.Scalars.columns(scalars=np.array(counts, dtype=np.float64).ravel())
+            yield ColumnBlock.of_batches(layout.LINK_COUNTS, rows, columns, len(counts[0]))
 
-def missing_links(tick: Tick, situation: Situation) -> dict[str, Floats]:
+
+def missing_links(tick: Tick, situation: Situation) -> Missing:
     """Return a line (K, 2, 3) [m; world frame] for each pair that does not hear each other.
 
     By entity. A pair of running agents is cut where a fault cuts a direction in which it is not

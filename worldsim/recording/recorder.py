@@ -35,9 +35,17 @@ from worldsim.recording.columns import ColumnBlock, Entity
 from worldsim.recording.fault_columns import FaultColumns
 from worldsim.recording.formation_entities import FormationEntities
 from worldsim.recording.hierarchy_columns import HierarchyColumns, ShownRoles
-from worldsim.recording.legend import agent_legend, queue_legend
 from worldsim.recording.obstacle_shapes import ObstacleEntities
+from worldsim.recording.panels import (
+    QUESTIONS,
+    UNJUDGED,
+    agent_colours,
+    panel,
+    queue_colours,
+    verdict,
+)
 from worldsim.recording.situation import Situations
+from worldsim.recording.state_columns import StateColumns
 from worldsim.recording.static_entities import (
     half_sizes,
     max_queues,
@@ -101,6 +109,7 @@ class RunRecorder:
         self._hierarchy_columns = HierarchyColumns(tick_hz, scenario.rows, max_queues(scenario))
         self._shown_roles = ShownRoles()
         self._situations = Situations(scenario.rows, scenario.netem)
+        self._state_columns = StateColumns(tick_hz, scenario.rows, scenario.formation.name)
         self._fault_columns = FaultColumns(radius_m, half_sizes(scenario))
         self._obstacles = ObstacleEntities(Obstacles(scenario.obstacle))
         self._team_view = TeamView(1.0 / tick_hz)
@@ -135,9 +144,14 @@ class RunRecorder:
         """Number of writes that failed so far; of the last ones once the recorder is closed."""
         return self._sink.failed_writes if self._sink is not None else 0
 
-    def close(self) -> None:
-        """Record what is left, and finish the file."""
+    def close(self, found: Sequence[str] = ()) -> None:
+        """Record what is left and the verdict, and finish the file.
+
+        found: what the run showed of each expectation; none where it was not judged to its end.
+        """
         self._attempt(self._send_block)
+        if found:
+            self._attempt(self._log_verdict, verdict(found))
         # Also after a failure: what was recorded before it is then a complete file.
         self._working = self._opened
         self._attempt(self._finish)
@@ -162,7 +176,7 @@ class RunRecorder:
         self._stream = rr.RecordingStream(
             APPLICATION, batcher_config=rr.ChunkBatcherConfig(flush_tick=1.0)
         )
-        blueprint = blueprint_of(obstacles=bool(self._scenario.obstacle))
+        blueprint = blueprint_of(self._scenario)
         self._stream.set_sinks(rr.FileSink(sink.path), default_blueprint=blueprint)
         sink.release()
         self._opened = True
@@ -171,7 +185,11 @@ class RunRecorder:
         self._send_properties(run_id, mode)
         for entity in (*static_entities(self._scenario), *self._obstacles.static()):
             self._stream.log(entity.path, entity.archetype, static=True)
+        self._log_verdict(UNJUDGED)
         self._flush()
+
+    def _log_verdict(self, text: str) -> None:
+        self._stream.log(layout.VERDICT, _document(text), static=True)
 
     def _send_properties(self, run_id: str, mode: str) -> None:
         scenario = self._scenario
@@ -186,6 +204,7 @@ class RunRecorder:
             self._situations.handle_event(each)
         for event in self._missions_given():
             self._colours.begin_phase(self._formation_of(event.tables), event.mission)
+            self._state_columns.begin_phase(event.formation)
         if self._ticks:
             times = _BlockTimes(self._ticks)
             # All blocks are made before any is sent, so that a failure leaves no partial second.
@@ -201,6 +220,7 @@ class RunRecorder:
         situations = [self._situations.at(tick) for tick in self._ticks]
         yield from self._tick_columns.blocks(self._ticks, self._figures, situations)
         yield from self._hierarchy_columns.blocks(self._ticks, self._figures, situations)
+        yield from self._state_columns.blocks(self._ticks, self._figures, situations)
         yield from self._fault_columns.blocks(self._ticks, situations)
         yield from self._obstacles.blocks(self._ticks)
         yield from self._team_view.blocks(self._ticks)
@@ -209,7 +229,7 @@ class RunRecorder:
         """Log the formation's changes and the frame's motion, in the order of time."""
         given = deque(self._missions_given())
         for tick in self._ticks[:1]:
-            self._log_at(tick.time_s, tick.index, self._new_legend())
+            self._log_at(tick.time_s, tick.index, self._new_panels())
         for tick in self._ticks:
             while given and given[0].t_s <= tick.time_s + EVENT_TIME_SLACK_S:
                 self._log_new_phase(given.popleft())
@@ -227,15 +247,18 @@ class RunRecorder:
         changed = self._formation.begin_phase(formation, event.path, event.mission, event.t_s)
         self._log_at(event.t_s, self._tick_at(event.t_s), changed)
         self._spec = event.tables
-        self._log_at(event.t_s, self._tick_at(event.t_s), self._new_legend())
+        self._log_at(event.t_s, self._tick_at(event.t_s), self._new_panels())
 
-    def _new_legend(self) -> Iterator[Entity]:
-        """Yield the meaning of the colours, where it has changed."""
+    def _new_panels(self) -> Iterator[Entity]:
+        """Yield the panels of words, where the meaning of the colours has changed."""
         names = [queue.name for queue in self._spec.queue]
-        text = queue_legend(self._spec.name, names) if self._colours.forms else agent_legend()
-        if text != self._legend:
-            self._legend = text
-            yield Entity(layout.LEGEND, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+        forms = self._colours.forms
+        colours = queue_colours(self._spec.name, names) if forms else agent_colours()
+        if colours != self._legend:
+            self._legend = colours
+            for question in QUESTIONS:
+                text = panel(question, self._scenario, colours)
+                yield Entity(layout.panel_entity(question), _document(text))
 
     def _log_at(self, time_s: float, tick: int, entities: Iterator[Entity]) -> None:
         self._stream.set_time(layout.SIM_TIME, duration=time_s)
@@ -284,6 +307,10 @@ def _level(event: RunEvent) -> str:
     if isinstance(event, WARNINGS):
         return "WARN"
     return "DEBUG" if isinstance(event, QueueChanged | RoleChanged) else "INFO"
+
+
+def _document(text: str) -> rr.TextDocument:
+    return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
 
 
 class _BlockTimes:

@@ -78,11 +78,19 @@ class RadioRules:
             if models.common(LOCAL, source) is None:
                 self._reach_m[source] = [models.of_link(LOCAL, source, b).reach_m for b in rows]
         self._network = network
+        changed = any(isinstance(each.fault, Conditions) for each in network.in_force.values())
+        faults = {"changed": changed, "flap": network.flapping, "outage": bool(network.outages)}
+        self._faults = tuple(word for word, in_force in faults.items() if in_force)
         self._obstructed, self._down = network.obstructed, bool(network.outages)
         self._cut = np.zeros((agents, agents), dtype=np.bool_)
         if network.partitioned:
             cut = [[network.partitions(a, b) for b in rows] for a in rows]
             self._cut = np.array(cut, dtype=np.bool_)
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """What else is wrong with the radio, in words."""
+        return self._faults
 
     def in_range(self, distance: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which links are within their range (N, N), from row to column.

@@ -117,6 +117,8 @@ def _series_styles(scenario: Scenario) -> Iterator[Entity]:
     names = layout.agent_names(scenario.rows)
     for metric in layout.agent_metrics(obstacles=bool(scenario.obstacle)):
         yield Entity(metric, rr.SeriesLines(names=names, widths=[SERIES_WIDTH] * len(names)))
+    yield Entity(layout.LINK_COUNTS, _link_count_series())
+    yield Entity(layout.LAMBDA2, rr.SeriesLines(names=["lambda_2"], widths=[SERIES_WIDTH]))
     yield Entity(layout.QUEUE_RESIDUAL, _queue_series(max_queues(scenario)))
     for metric, values in metric_limits(scenario).items():
         turns = list(turn_limits(scenario).values()) if metric == layout.TURN_DEG else None
@@ -128,6 +130,15 @@ def _queue_series(queues: int) -> rr.SeriesLines:
         names=[f"queue {queue + 1}" for queue in range(queues)],
         colors=palette.queue_colours(np.arange(queues)),
         widths=[SERIES_WIDTH] * queues,
+    )
+
+
+def _link_count_series() -> rr.SeriesLines:
+    colours = [0x8FA3BFFF, palette.LINK_CUT, palette.LINK_LOST, palette.LINK_OUT_OF_RANGE]
+    return rr.SeriesLines(
+        names=["heard", "cut", "lost", "out of range"],
+        colors=np.array(colours, dtype=np.uint32),
+        widths=[SERIES_WIDTH] * len(colours),
     )
 
 

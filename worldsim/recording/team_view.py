@@ -1,9 +1,9 @@
 """The camera's own frame: it follows the team and zooms so that every running agent is in view.
 
 The 3D view is drawn in the coordinates of this frame. Its origin lies amid the running agents, and
-its unit of length is the distance of the farthest one: a camera at rest in it shows the team at
-every time. The unit grows at once and shrinks slowly, so that the picture is calm. The ground is a
-grid that rests in the world: it moves by whole cells, to stay below the team.
+its unit of length is the distance of the farthest of them and of their targets: a camera at rest in
+it shows the team at every time. The unit grows at once and shrinks slowly, so that the picture is
+calm. The ground is a grid that rests in the world: it moves by whole cells, to stay below the team.
 """
 
 from collections.abc import Iterator, Sequence
@@ -64,7 +64,9 @@ class TeamView:
             middle = 0.5 * (team.min(axis=0) + team.max(axis=0))
             before = middle if self._centre is None else self._centre
             self._centre = before + self._follow * (middle - before)
-            reach_m = float(np.linalg.norm(team - self._centre, axis=1).max())
+            aims = tick.target[tick.alive & np.isfinite(tick.target).all(axis=1)]
+            seen = np.concatenate((team, aims.astype(np.float64))) - self._centre
+            reach_m = float(np.linalg.norm(seen, axis=1).max())
             shrunk_m = self._radius_m * self._shrink
             self._radius_m = max(MARGIN * reach_m, shrunk_m, LEAST_RADIUS_M)
         if self._centre is None:

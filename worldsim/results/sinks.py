@@ -1,11 +1,13 @@
 """The sinks of a run's ticks and events: the recording and events.jsonl."""
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from worldsim.engine.step import Recorder
 from worldsim.judge.run_events import RunEvent, as_row
 from worldsim.judge.tick import Tick
-from worldsim.judge.verdict import Figures
+from worldsim.judge.verdict import Figures, Judge
+from worldsim.results.expectation_text import Circumstances, RecoveryRow, expectation_texts
 from worldsim.results.run_folder import RunDirectory
 from worldsim.scenario.tables import Scenario
 
@@ -13,8 +15,8 @@ from worldsim.scenario.tables import Scenario
 class ClosingRecorder(Recorder, Protocol):
     """A recorder that writes its last ticks when it is closed."""
 
-    def close(self) -> None:
-        """Write the rest of the recording."""
+    def close(self, found: Sequence[str] = ()) -> None:
+        """Write the rest of the recording, and what the run showed of each expectation."""
 
 
 class Sinks:
@@ -48,10 +50,30 @@ class Sinks:
         if self._recorder is not None:
             self._recorder.event(event)
 
-    def close(self) -> None:
-        """Finish the recording."""
+    def close(self, judge: Judge | None = None, ended_s: float = 0.0) -> None:
+        """Finish the recording; judge: of a run that ended at a time [s]; None: it broke off."""
         if self._recorder is not None:
-            self._recorder.close()
+            self._recorder.close(_found(judge, ended_s) if judge is not None else ())
+
+
+def _found(judge: Judge, ended_s: float) -> list[str]:
+    """Return what a run that ended at a time [s] showed of each expectation, one text for each."""
+    spans_s = [(phase.from_s, phase.timed_from_s) for phase in judge.phases]
+    recoveries: list[RecoveryRow] = [
+        {
+            "t_s": row.t_s,
+            "kind": row.kind,
+            "agents": row.agents,
+            "reformed_s": row.reformed_s,
+            "timed_from_s": row.timed_from_s,
+            "asked_s": row.asked_s,
+        }
+        for row in judge.recoveries
+    ]
+    rows = [expectation.row for expectation in judge.expectations()]
+    texts = expectation_texts(rows, Circumstances(ended_s, spans_s, recoveries))
+    words = {True: "met", False: "NOT MET", None: "open"}
+    return [f"{words[row['held']]}: {text}" for row, text in zip(rows, texts, strict=True)]
 
 
 def open_sinks(
