@@ -45,7 +45,18 @@ class AgentColours:
 
         dead: for each tick, whose processes have ended (N,).
         """
-        colours = np.stack([self._vehicles(tick) for tick in ticks])
+        place = np.stack([tick.place for tick in ticks])
+        alive = np.stack([tick.alive for tick in ticks])
+        placed = place[..., 0] >= 0
+        forms = np.logical_or.accumulate(placed.any(axis=1)) | self._forms
+        self._forms = bool(forms[-1])
+        colours = self._place_colours(ticks, place)
+        self._note_series(placed, colours)
+        for row, tick in enumerate(ticks):
+            if tick.hierarchy is not None:
+                colours[row, tick.hierarchy.role == DISTRESS] = palette.IN_DISTRESS
+        colours = np.where(forms[:, None], colours, self._own)
+        colours[~alive] = palette.NOT_RUNNING
         colours[np.stack(dead)] = palette.DEAD
         return colours.astype(np.uint32)
 
@@ -53,26 +64,22 @@ class AgentColours:
         """Return the colours of agents' curves (N,), as of the last tick."""
         return self._series.copy()
 
-    def _vehicles(self, tick: Tick) -> palette.Colours:
-        placed = tick.place[:, 0] >= 0
-        self._forms = self._forms or bool(placed.any())
-        if not self._forms:
-            return np.where(tick.alive, self._own, palette.NOT_RUNNING)
-        colours = self._place_colours(tick)
-        self._series = np.where(placed, colours, self._series)
-        if tick.hierarchy is not None:
-            colours = np.where(tick.hierarchy.role == DISTRESS, palette.IN_DISTRESS, colours)
-        return np.where(tick.alive, colours, palette.NOT_RUNNING)
+    def _note_series(self, placed: NDArray[np.bool_], colours: palette.Colours) -> None:
+        """Note the colour of the last place that each agent claims in a block."""
+        last = len(placed) - 1 - np.argmax(placed[::-1], axis=0)
+        latest = colours[last, np.arange(placed.shape[1])]
+        self._series = np.where(placed.any(axis=0), latest, self._series)
 
-    def _place_colours(self, tick: Tick) -> palette.Colours:
-        """Return the colours of the places that agents claim (N,), each by its own mission."""
+    def _place_colours(self, ticks: Sequence[Tick], place: NDArray[np.int16]) -> palette.Colours:
+        """Return the colours of the places that agents claim (T, N), each by its own mission."""
+        flat, shape = place.reshape(-1, 2), place.shape[:2]
         missions = sorted(self._shared)
-        colours = palette.place_colours(tick.place, self._shared[missions[0]])
+        colours = palette.place_colours(flat, self._shared[missions[0]]).reshape(shape)
+        flown = np.stack([tick.mission for tick in ticks]) if missions[1:] else None
         for mission in missions[1:]:
-            flown = tick.mission >= mission
-            if flown.any():
-                newer = palette.place_colours(tick.place, self._shared[mission])
-                colours = np.where(flown, newer, colours)
+            if flown is not None and (flown >= mission).any():
+                newer = palette.place_colours(flat, self._shared[mission]).reshape(shape)
+                colours = np.where(flown >= mission, newer, colours)
         return colours
 
 

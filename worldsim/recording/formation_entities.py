@@ -15,7 +15,7 @@ from agent.messages import FramePath, Place, Vector
 from agent.qstructure.formation import Formation, Slot
 from agent.qstructure.frame_path import Track
 from agent.qstructure.target_frame import Frame
-from worldsim.judge.tick import Tick
+from worldsim.judge.tick import Tick, same_claims
 from worldsim.recording import layout, palette
 from worldsim.recording.columns import Entity
 from worldsim.scenario.tables import CONVERGED_M
@@ -42,12 +42,15 @@ class FormationEntities:
         self._newest = _Drawing(layout.FORMATION, formation, Track(path), mission=0)
         self._before: _Drawing | None = None
         self._team = 0
+        self._last: Tick | None = None
+        """The last tick that was seen in the present phase."""
 
     def begin_phase(
         self, formation: Formation, path: FramePath, mission: int, time_s: float
     ) -> Iterator[Entity]:
         """Replace the formation by that of a new mission, given at a time [s]; mission: its key."""
         last, drawn = self._newest, self._newest.drawn
+        self._last = None
         if self._before is not None:
             yield from self._before.clear()
         self._before = last.moved_to(layout.FORMATION_BEFORE) if drawn else None
@@ -59,8 +62,12 @@ class FormationEntities:
 
     def see(self, tick: Tick) -> Iterator[Entity]:
         """Yield what has moved or changed at a tick; ticks come in order."""
-        newest = self._newest
+        newest, last, self._last = self._newest, self._last, tick
         yield from newest.place(tick.time_s)
+        if self._before is not None and self._before.drawn:
+            yield from self._before.place(tick.time_s)
+        if last is not None and same_claims(last, tick):
+            return
         claims = _claims(tick, newest.mission)
         self._team = int(np.count_nonzero(tick.alive)) or self._team
         if newest.drawn or claims:
@@ -73,7 +80,8 @@ class FormationEntities:
         flown = (tick.mission >= before.mission) & (tick.mission < self._newest.mission)
         claims = _claims(replace(tick, place=tick.place[flown], mission=tick.mission[flown]), 0)
         if claims:
-            yield from before.place(tick.time_s)
+            if not before.drawn:
+                yield from before.place(tick.time_s)
             slots = ((place, before.formation.slot(place, self._team)) for place in sorted(claims))
             yield from before.draw({place: slot for place, slot in slots if slot}, self._team)
         else:

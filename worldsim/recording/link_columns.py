@@ -3,7 +3,7 @@
 The matrix has a row where it changed. Lines are drawn at as many ticks as their rate limit allows.
 """
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 
 import numpy as np
 import rerun as rr
@@ -25,6 +25,9 @@ LINES_MAX = 400
 LINES_PER_S = 2000
 """More lines at once, or in a second, would cost more than everything else in the recording."""
 
+MISSING_EVERY_S = 5.0
+"""Missing links of a large fleet are looked for at least so often."""
+
 Missing = dict[str, Floats]
 """Lines (K, 2, 3) [m; world frame] by entity."""
 PairCodes = NDArray[np.int64]
@@ -38,6 +41,10 @@ class LinkColumns:
         self._matrix_changes = ChangeDetector()
         self._missed: dict[str, int] = {}
         """How many lines each entity of missing links shows."""
+        self._ticks_between = round(tick_hz * MISSING_EVERY_S)
+        self._sought_in: Situation | None = None
+        self._sought_at = 0
+        """Where missing links of a large fleet were last looked for."""
         self._line_rate = LineRateLimiter(tick_hz, LINES_PER_S)
 
     def blocks(
@@ -45,8 +52,8 @@ class LinkColumns:
     ) -> Iterator[ColumnBlock]:
         """Yield the columns of a block; blocks come in order."""
         yield from self._matrix(ticks)
-        rows = yield from self._lines(ticks)
-        yield from self._verdicts(ticks, situations, rows)
+        heard = yield from self._lines(ticks)
+        yield from self._verdicts(ticks, situations, heard)
 
     def _matrix(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         hears = np.zeros((len(ticks), len(ticks[0].alive) ** 2), dtype=np.bool_)
@@ -58,8 +65,8 @@ class LinkColumns:
         if rows:
             yield ColumnBlock(layout.LINK_STATE, rows, [number_column(layout.HEARS, bits[rows])])
 
-    def _lines(self, ticks: Sequence[Tick]) -> Generator[ColumnBlock, None, list[int]]:
-        """Yield the lines of links; return the rows in which they are drawn."""
+    def _lines(self, ticks: Sequence[Tick]) -> Generator[ColumnBlock, None, dict[int, int]]:
+        """Yield the lines of links; return how many are drawn in which rows."""
         rows, drawn = [], []
         for row, tick in enumerate(ticks):
             if self._line_rate.allows(tick.index):
@@ -68,19 +75,22 @@ class LinkColumns:
                 self._line_rate.count(tick.index, len(drawn[-1]))
         if rows:
             yield _strips(layout.LINKS, rows, drawn)
-        return rows
+        return dict(zip(rows, map(len, drawn), strict=True))
 
     def _verdicts(
-        self, ticks: Sequence[Tick], situations: Sequence[Situation], rows: Sequence[int]
+        self,
+        ticks: Sequence[Tick],
+        situations: Sequence[Situation],
+        heard: Mapping[int, int],
     ) -> Iterator[ColumnBlock]:
-        """Yield the pairs that do not hear each other, by the reason, where they have changed.
+        """Yield the pairs that do not hear each other, by the reason, where there are any.
 
-        Of a large fleet only at the first row of a block, since there are very many pairs.
+        Of a large fleet they are very many, so they are looked for where the situation changes, and
+        else rarely. heard: how many pairs do, in which rows.
         """
-        if len(ticks[0].alive) > layout.NAMED_MAX:
-            rows = rows[:1]
+        rows = [row for row in heard if self._is_due(ticks[row], situations[row])]
         missing = [missing_links(ticks[row], situations[row]) for row in rows]
-        yield from self._counts(ticks, rows, missing)
+        yield from self._counts(rows, [heard[row] for row in rows], missing)
         for entity in (layout.LINKS_LOST, layout.LINKS_CUT, layout.LINKS_OUT_OF_RANGE):
             drawn = [each[entity] for each in missing]
             # While there are none, nothing is repeated.
@@ -90,14 +100,22 @@ class LinkColumns:
             if some:
                 yield _strips(entity, [rows[at] for at in some], [drawn[at] for at in some])
 
+    def _is_due(self, tick: Tick, situation: Situation) -> bool:
+        """Return whether missing links are to be found at a tick."""
+        if len(tick.alive) > layout.NAMED_MAX:
+            if situation is self._sought_in and tick.index < self._sought_at + self._ticks_between:
+                return False
+            self._sought_in, self._sought_at = situation, tick.index
+        return True
+
     def _counts(
-        self, ticks: Sequence[Tick], rows: Sequence[int], missing: Sequence[Missing]
+        self, rows: Sequence[int], heard: Sequence[int], missing: Sequence[Missing]
     ) -> Iterator[ColumnBlock]:
         """Yield how many pairs have a link, and how many are missing, by the reason."""
         if rows:
             counts = [
-                [len(link_lines(ticks[row])), *(len(lines) for lines in each.values())]
-                for row, each in zip(rows, missing, strict=True)
+                [linked, *(len(lines) for lines in each.values())]
+                for linked, each in zip(heard, missing, strict=True)
             ]
             columns = rr.Scalars.columns(scalars=np.array(counts, dtype=np.float64).ravel())
             yield ColumnBlock.of_batches(layout.LINK_COUNTS, rows, columns, len(counts[0]))

@@ -18,8 +18,8 @@ from worldsim.recording.situation import Situation
 NO_FORMATION = "no formation"
 CLEAR, JAMMED, PARTED = "clear", "jam", "partition"
 RUNNING = "running"
-LAMBDA2_HZ, LARGE_LAMBDA2_HZ = 4.0, 0.5
-"""The connectivity of more than NAMED_MAX agents takes milliseconds, so it is computed rarely."""
+LAMBDA2_HZ = 4.0
+"""Of more than NAMED_MAX agents it would take more time than all else that is recorded."""
 
 
 class StateColumns:
@@ -28,8 +28,8 @@ class StateColumns:
     def __init__(self, tick_hz: float, agents: int, formation: str) -> None:
         self._formation = formation
         self._named = min(agents, layout.NAMED_MAX)
-        hertz = LAMBDA2_HZ if agents <= layout.NAMED_MAX else LARGE_LAMBDA2_HZ
-        self._ticks_per_sample = max(1, round(tick_hz / hertz))
+        self._small = agents <= layout.NAMED_MAX
+        self._ticks_per_sample = max(1, round(tick_hz / LAMBDA2_HZ))
         self._shown: dict[str, str] = {}
         self._links = b""
         self._lambda2: float | None = None
@@ -51,7 +51,8 @@ class StateColumns:
         yield from self._states(layout.RADIO_CONDITION, [_radio(each) for each in situations])
         for agent in range(self._named):
             yield from self._conditions(agent, situations)
-        yield from self._connectivity(ticks)
+        if self._small:
+            yield from self._connectivity(ticks)
 
     def _phase(self, tick: Tick, figures: Figures) -> str:
         if not (tick.place >= 0).any():

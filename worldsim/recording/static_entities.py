@@ -12,6 +12,7 @@ from worldsim.scenario.tables import CONVERGED_M, Scenario
 from worldsim.truth.vehicle import Floats
 
 TRAIL_RADIUS_M = 0.018
+POINT_RADIUS = 1.4  # [UI points]
 TARGET_RADIUS_M = 0.035
 LINK_RADIUS_M = 0.004
 LINK_STYLES = (
@@ -79,7 +80,10 @@ def max_queues(scenario: Scenario) -> int:
 
 
 def _world_styles(scenario: Scenario) -> Iterator[Entity]:
-    yield Entity(layout.AGENTS, rr.Points3D.from_fields(radii=[TRAIL_RADIUS_M]))
+    # The vehicles of a large fleet are small in the picture: points of it are not.
+    large = scenario.rows > layout.NAMED_MAX
+    radius = -POINT_RADIUS if large else TRAIL_RADIUS_M  # negative: in UI points
+    yield Entity(layout.AGENTS, rr.Points3D.from_fields(radii=[radius]))
     yield Entity(layout.TARGETS, rr.Points3D.from_fields(radii=[TARGET_RADIUS_M]))
     for entity, colour, width in LINK_STYLES:
         style = rr.LineStrips3D.from_fields(colors=np.array([colour]), radii=[width])

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from worldsim.judge.tick import Tick
 from worldsim.recording import layout, palette
 from worldsim.recording.columns import ColumnBlock
+from worldsim.truth.vehicle import Floats
 
 LEAST_RADIUS_M = 1.5
 MARGIN = 1.08
@@ -46,32 +47,44 @@ class TeamView:
 
     def blocks(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         """Yield the view's transforms and the ground of a block of ticks; blocks come in order."""
-        seen = [(row, *self._see(tick)) for row, tick in enumerate(ticks)]
-        rows = [row for row, _, _ in seen]
-        centres = np.array([centre for _, centre, _ in seen])
-        scales = np.array([[radius_m] * 3 for _, _, radius_m in seen])
-        columns = rr.Transform3D.columns(translation=centres, scale=scales)
-        yield ColumnBlock(layout.TEAM, rows, columns)
-        for row, centre, radius_m in seen:
+        team = _team(ticks)
+        centres = self._centres(team)
+        radii_m = self._radii_m(ticks, team, centres)
+        columns = rr.Transform3D.columns(
+            translation=centres, scale=np.repeat(radii_m[:, None], 3, axis=1)
+        )
+        yield ColumnBlock(layout.TEAM, range(len(ticks)), columns)
+        for row, (centre, radius_m) in enumerate(zip(centres, radii_m.tolist(), strict=True)):
             yield from self._ground(row, centre, radius_m)
 
-    def _see(self, tick: Tick) -> tuple[NDArray[np.float64], float]:
-        """Return the view's centre [m; world frame] and radius [m] at a tick."""
-        in_world = np.isfinite(tick.position).all(axis=1)
-        running = in_world & tick.alive
-        team = tick.position[running if running.any() else in_world]
-        if len(team):
-            middle = 0.5 * (team.min(axis=0) + team.max(axis=0))
-            before = middle if self._centre is None else self._centre
-            self._centre = before + self._follow * (middle - before)
-            aims = tick.target[tick.alive & np.isfinite(tick.target).all(axis=1)]
-            seen = np.concatenate((team, aims.astype(np.float64))) - self._centre
-            reach_m = float(np.linalg.norm(seen, axis=1).max())
+    def _centres(self, team: Floats) -> Floats:
+        """Return the view's centre at each tick (T, 3) [m; world frame]."""
+        absent = np.isnan(team)
+        low = np.where(absent, np.inf, team).min(axis=1)
+        high = np.where(absent, -np.inf, team).max(axis=1)
+        centres = np.zeros((len(team), 3))
+        for row, (least, most) in enumerate(zip(low, high, strict=True)):
+            if np.isfinite(least).all():
+                middle = 0.5 * (least + most)
+                before = middle if self._centre is None else self._centre
+                self._centre = before + self._follow * (middle - before)
+            centres[row] = 0.0 if self._centre is None else self._centre
+        return centres
+
+    def _radii_m(self, ticks: Sequence[Tick], team: Floats, centres: Floats) -> Floats:
+        """Return the view's radius at each tick (T,) [m]."""
+        targets = np.stack([tick.target for tick in ticks])
+        alive = np.stack([tick.alive for tick in ticks])
+        aims: Floats = np.where(alive[..., None], targets, np.nan).astype(np.float64)
+        seen = np.concatenate((team, aims), axis=1) - centres[:, None, :]
+        square = np.einsum("ijk,ijk->ij", seen, seen)
+        reach_m = np.sqrt(np.where(np.isnan(square), 0.0, square).max(axis=1))
+        radii_m = np.zeros(len(ticks))
+        for row, reached_m in enumerate(reach_m.tolist()):
             shrunk_m = self._radius_m * self._shrink
-            self._radius_m = max(MARGIN * reach_m, shrunk_m, LEAST_RADIUS_M)
-        if self._centre is None:
-            return np.zeros(3), self._radius_m
-        return self._centre, self._radius_m
+            self._radius_m = max(MARGIN * reached_m, shrunk_m, LEAST_RADIUS_M)
+            radii_m[row] = self._radius_m
+        return radii_m
 
     def _ground(
         self, row: int, centre: NDArray[np.float64], radius_m: float
@@ -95,6 +108,19 @@ class TeamView:
         self._cell_m, self._corner = cell_m, corner
         columns = rr.Transform3D.columns(translation=[corner * cell_m])
         yield ColumnBlock(layout.GROUND, [row], columns)
+
+
+def _team(ticks: Sequence[Tick]) -> Floats:
+    """Return the positions of running agents (T, N, 3) [m; world frame], NaN for the others.
+
+    Where none is running, those of all vehicles.
+    """
+    position = np.stack([tick.position for tick in ticks])
+    running = np.stack([tick.alive for tick in ticks])
+    seen = running & np.isfinite(position).all(axis=2)
+    running[~np.any(seen, axis=1)] = True
+    team: Floats = np.where(running[..., None], position, np.nan)
+    return team
 
 
 def _round_length(least_m: float) -> float:

@@ -22,7 +22,7 @@ from worldsim.truth.vehicle import Floats
 ARROW_RADII = 2.6
 """Length of the arrow that shows a vehicle's heading [radii of the vehicle]."""
 SPARSE_TICKS = 4
-"""Arrows of a large fleet are recorded at one tick of so many."""
+"""What only viewers need of a large fleet is recorded at one tick of so many."""
 
 
 class TickColumns:
@@ -68,9 +68,7 @@ class TickColumns:
 
     def _headings(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         """Yield an arrow ahead of each vehicle; of a large fleet, at some ticks only."""
-        agents = len(ticks[0].alive)
-        step = 1 if agents <= layout.NAMED_MAX else SPARSE_TICKS
-        rows = [row for row, tick in enumerate(ticks) if tick.index % step == 0]
+        agents, rows = len(ticks[0].alive), _sparse_rows(ticks)
         if rows:
             yaw, pitch, _ = np.concatenate([ticks[row].attitude for row in rows]).T
             level = np.cos(pitch)
@@ -86,7 +84,7 @@ class TickColumns:
     ) -> Iterator[ColumnBlock]:
         colours = self._colours.vehicles(ticks, dead)
         agents = colours.shape[1]
-        yield _trails(ticks, colours.ravel())
+        yield from _trails(ticks, colours)
         rows = self._colour_changes.changed_rows(colours)
         changed = colours[rows].ravel()
         if rows:
@@ -127,13 +125,19 @@ class TickColumns:
             yield ColumnBlock.of_batches(entity, rows, columns, len(values))
 
 
-def _trails(ticks: Sequence[Tick], colours: palette.Colours) -> ColumnBlock:
-    """Return positions, each with its colour: a trail shows the colour of each past position."""
-    position = np.concatenate([tick.position for tick in ticks])
-    columns = rr.Points3D.columns(positions=position, colors=colours)
-    return ColumnBlock.of_batches(
-        layout.AGENTS, range(len(ticks)), columns, batch=len(ticks[0].alive)
-    )
+def _sparse_rows(ticks: Sequence[Tick]) -> list[int]:
+    """Return the rows of a block at which what only viewers need is recorded."""
+    step = 1 if len(ticks[0].alive) <= layout.NAMED_MAX else SPARSE_TICKS
+    return [row for row, tick in enumerate(ticks) if tick.index % step == 0]
+
+
+def _trails(ticks: Sequence[Tick], colours: palette.Colours) -> Iterator[ColumnBlock]:
+    """Yield positions, each with its colour: a trail shows the colour of each past position."""
+    rows = _sparse_rows(ticks)
+    if rows:
+        position = np.concatenate([ticks[row].position for row in rows])
+        columns = rr.Points3D.columns(positions=position, colors=colours[rows].ravel())
+        yield ColumnBlock.of_batches(layout.AGENTS, rows, columns, batch=len(ticks[0].alive))
 
 
 def _poses(ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
@@ -166,17 +170,24 @@ def _quaternions(attitude: Float32s) -> Float32s:
 
 
 def _metrics(ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
-    slot_error = np.concatenate([each.slot_error for each in figures])
-    distance = [each.obstacle_distance for each in figures if each.obstacle_distance is not None]
-    for entity, values in (
-        (layout.FORCE, np.concatenate([tick.force for tick in ticks])),
-        (layout.TURN_DEG, np.concatenate([tick.turn_deg for tick in ticks])),
-        (layout.SEPARATION, np.concatenate([each.separation for each in figures])),
-        (layout.SLOT_ERROR, np.where(np.isfinite(slot_error), slot_error, np.nan)),
-        *([(layout.OBSTACLE_DISTANCE, np.concatenate(distance))] if distance else ()),
+    """Yield agents' metrics; those that a reader cannot compute from the rest at every tick."""
+    every, sparse, agents = list(range(len(ticks))), _sparse_rows(ticks), len(ticks[0].alive)
+    distance = [(row, figures[row].obstacle_distance) for row in sparse]
+    near = {row: each for row, each in distance if each is not None}
+    for entity, rows, values in (
+        (layout.FORCE, every, [tick.force for tick in ticks]),
+        (layout.TURN_DEG, every, [tick.turn_deg for tick in ticks]),
+        (layout.SEPARATION, sparse, [figures[row].separation for row in sparse]),
+        (layout.SLOT_ERROR, sparse, [_finite(figures[row].slot_error) for row in sparse]),
+        (layout.OBSTACLE_DISTANCE, list(near), list(near.values())),
     ):
-        columns = rr.Scalars.columns(scalars=values)
-        yield ColumnBlock.of_batches(entity, range(len(ticks)), columns, len(ticks[0].alive))
+        if rows:
+            columns = rr.Scalars.columns(scalars=np.concatenate(values))
+            yield ColumnBlock.of_batches(entity, rows, columns, agents)
+
+
+def _finite(values: Floats) -> Floats:
+    return np.where(np.isfinite(values), values, np.nan)
 
 
 def _state(ticks: Sequence[Tick]) -> ColumnBlock:
