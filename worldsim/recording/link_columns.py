@@ -25,8 +25,8 @@ LINES_MAX = 400
 LINES_PER_S = 2000
 """More lines at once, or in a second, would cost more than everything else in the recording."""
 
-MISSING_EVERY_S = 5.0
-"""Missing links of a large fleet are looked for at least so often."""
+MISSING_EVERY_S = (0.2, 5.0)
+"""Missing links are looked for at least so often, also in a large fleet, where they are many."""
 
 Missing = dict[str, Floats]
 """Lines (K, 2, 3) [m; world frame] by entity."""
@@ -41,10 +41,10 @@ class LinkColumns:
         self._matrix_changes = ChangeDetector()
         self._missed: dict[str, int] = {}
         """How many lines each entity of missing links shows."""
-        self._ticks_between = round(tick_hz * MISSING_EVERY_S)
+        self._tick_hz = tick_hz
         self._sought_in: Situation | None = None
         self._sought_at = 0
-        """Where missing links of a large fleet were last looked for."""
+        """Where missing links were last looked for."""
         self._line_rate = LineRateLimiter(tick_hz, LINES_PER_S)
 
     def blocks(
@@ -85,8 +85,8 @@ class LinkColumns:
     ) -> Iterator[ColumnBlock]:
         """Yield the pairs that do not hear each other, by the reason, where there are any.
 
-        Of a large fleet they are very many, so they are looked for where the situation changes, and
-        else rarely. heard: how many pairs do, in which rows.
+        They are looked for where the situation changes, and else rarely. heard: how many pairs hear
+        each other, in which rows.
         """
         rows = [row for row in heard if self._is_due(ticks[row], situations[row])]
         missing = [missing_links(ticks[row], situations[row]) for row in rows]
@@ -102,10 +102,11 @@ class LinkColumns:
 
     def _is_due(self, tick: Tick, situation: Situation) -> bool:
         """Return whether missing links are to be found at a tick."""
-        if len(tick.alive) > layout.NAMED_MAX:
-            if situation is self._sought_in and tick.index < self._sought_at + self._ticks_between:
-                return False
-            self._sought_in, self._sought_at = situation, tick.index
+        every_s = MISSING_EVERY_S[len(tick.alive) > layout.NAMED_MAX]
+        next_at = self._sought_at + round(self._tick_hz * every_s)
+        if situation is self._sought_in and tick.index < next_at:
+            return False
+        self._sought_in, self._sought_at = situation, tick.index
         return True
 
     def _counts(
