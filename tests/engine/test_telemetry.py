@@ -56,3 +56,17 @@ def test_reasons_are_told_where_ticks_are_recorded() -> None:
     assert np.isnan(tick(telemetry, BOTH).force).all()
     assert tick(telemetry, FIRST, recorded=True).force.tolist()[1:] != [2.0]
     assert tick(telemetry, BOTH, recorded=True).force.tolist()[1:] == [2.0]
+
+
+def test_what_the_safety_filter_does_is_told_where_ticks_are_recorded() -> None:
+    telemetry = FleetTelemetry(2)
+    said = msgspec.structs.replace(NO_TELEMETRY, wanted=(0.5, 0.0, 0.0))
+    telemetry.update(1, said, heading=0.0, flown=(0.2, 0.4, 0.0))
+    assert tick(telemetry, BOTH).filtered_mps is None
+    filtered = tick(telemetry, BOTH, recorded=True).filtered_mps
+    assert filtered is not None
+    np.testing.assert_allclose(filtered, [np.nan, 0.5], atol=1e-6)
+    telemetry.forget(1)
+    gone = tick(telemetry, BOTH, recorded=True).filtered_mps
+    assert gone is not None
+    assert np.isnan(gone).all()

@@ -32,7 +32,11 @@ def ticks() -> list[Tick]:
     """Two seconds; after the first, the agent in distress is a member."""
     found = (*ROLE[:-1], MEMBER)
     return [
-        replace(tick, hierarchy=hierarchy(ROLE if tick.time_s < 1.0 else found))
+        replace(
+            tick,
+            hierarchy=hierarchy(ROLE if tick.time_s < 1.0 else found),
+            filtered_mps=np.full(AGENTS, 0.25, dtype=np.float32),
+        )
         for tick in straight_flight(wedge(AGENTS, duration_s=2.0))
     ]
 
@@ -60,6 +64,7 @@ def test_figures_have_a_row_four_times_a_second(chunks: list[Chunk]) -> None:
         ("/metrics/tier", [0.0, 1.0, 2.0, 2.0, -1.0]),
         ("/metrics/record_age", pytest.approx([0.3] * AGENTS)),
         ("/metrics/neighbours", [4.0] * AGENTS),
+        ("/metrics/safety_filter", [0.25] * AGENTS),
     ):
         found = rows(chunks, entity, "Scalars:scalars")
         assert len(found) == 2 * 4 + 1

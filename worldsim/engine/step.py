@@ -207,7 +207,8 @@ class SlotLoop:
             self.trace.command(agent, encoded)
         if accepted or self._slow.is_late(agent, self.world.slot):
             telemetry = command.telemetry
-            self._telemetry.update(agent, telemetry, self._headings[agent])
+            heading = self._headings[agent]
+            self._telemetry.update(agent, telemetry, heading, command.velocity)
             needed = self._queue_neighbours.count(agent, telemetry)
             self.radio_use.count_step(agent, len(telemetry.heard), needed)
             self.effects.missions.report(agent, telemetry.mission, self.world.time_s)

@@ -1,7 +1,7 @@
 """The newest telemetry of each agent, and the tick that truth and telemetry make together."""
 
 from array import array
-from math import atan2, degrees, hypot, nan, pi
+from math import atan2, degrees, dist, hypot, nan, pi
 from typing import Final, TypeVar, final
 
 import numpy as np
@@ -57,23 +57,31 @@ class FleetTelemetry:
     def __init__(self, rows: int) -> None:
         self._newest = [NO_TELEMETRY] * rows
         self._turn_deg = [nan] * rows
+        self._filtered_mps = [nan] * rows
         self._claims: _Claims | None = None
         """None once an agent claims another place or mission."""
         self._no_reasons = np.full((rows, 4), nan, dtype=np.float32)
 
-    def update(self, agent: int, telemetry: Telemetry, heading: float) -> None:
-        """Keep an agent's telemetry; heading: the yaw that it observed [rad; world frame]."""
+    def update(
+        self, agent: int, telemetry: Telemetry, heading: float, flown: Vector | None = None
+    ) -> None:
+        """Keep an agent's telemetry.
+
+        heading: the yaw that it observed [rad; world frame]. flown: the velocity that it commands
+        [m/s; world frame].
+        """
         last = self._newest[agent]
         if telemetry.place != last.place or telemetry.mission != last.mission:
             self._claims = None
         self._newest[agent] = telemetry
         self._turn_deg[agent] = _turn_deg(telemetry.wanted, heading)
+        self._filtered_mps[agent] = nan if flown is None else dist(flown, telemetry.wanted)
 
     def forget(self, agent: int) -> None:
         """Drop the telemetry of an agent's earlier incarnation."""
         self._claims = None
         self._newest[agent] = NO_TELEMETRY
-        self._turn_deg[agent] = nan
+        self._turn_deg[agent] = self._filtered_mps[agent] = nan
 
     def tick(
         self, world: World, running: NDArray[np.bool_], recorded: bool, packets: Packets
@@ -100,7 +108,12 @@ class FleetTelemetry:
             links=_links(rows) if recorded else NO_LINKS,
             packets=packets,
             hierarchy=_hierarchy_rows(rows) if recorded else None,
+            filtered_mps=self._filtered(claims) if recorded else None,
         )
+
+    def _filtered(self, claims: _Claims) -> NDArray[np.float32]:
+        """Return by how much each agent's safety filter changes its velocity (N,) [m/s]."""
+        return np.array(claims.among(self._filtered_mps, nan), dtype=np.float32)
 
     def _claims_of(self, running: NDArray[np.bool_]) -> _Claims:
         claims = self._claims

@@ -59,6 +59,9 @@ class Tick:
     """The newest counters; empty before the first come."""
     hierarchy: HierarchyRows | None = None
     """None where ticks are not recorded."""
+    filtered_mps: Float32s | None = None
+    """(N,), the difference between each agent's wanted and commanded velocity [m/s]: what its
+    safety filter does. Not judged; None where ticks are not recorded."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Tick, _values(self)

@@ -117,7 +117,7 @@ def _faults() -> list[rrb.View]:
     return [
         rrb.StateTimelineView(origin=layout.CONDITIONS, name="What is in force"),
         _series("Distance to own slot [m]", layout.SLOT_ERROR),
-        _series("Distance to nearest vehicle [m]", layout.SEPARATION),
+        _series("Velocity changed by the safety filter [m/s]", layout.SAFETY_FILTER),
     ]
 
 

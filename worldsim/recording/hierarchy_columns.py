@@ -153,6 +153,7 @@ class HierarchyColumns:
             (layout.TIER, [_tiers(hierarchies[row]) for row in rows]),
             (layout.RECORD_AGE, [hierarchies[row].record_age_s for row in rows]),
             (layout.NEIGHBOURS, [_neighbour_counts(ticks[row]) for row in rows]),
+            (layout.SAFETY_FILTER, [_filtered(ticks[row]) for row in rows]),
         ):
             values = np.concatenate(series).astype(np.float64)
             columns = rr.Scalars.columns(scalars=values)
@@ -205,6 +206,12 @@ def parent_lines(position: Floats, hierarchy: HierarchyRows) -> tuple[Floats, ND
 def _tiers(hierarchy: HierarchyRows) -> NDArray[np.float64]:
     """Return the tiers (N,); NaN where there is no queue that could have tiers."""
     return np.where(hierarchy.role == UNPLACED, np.nan, hierarchy.tier)
+
+
+def _filtered(tick: Tick) -> NDArray[np.float64]:
+    """Return what each agent's safety filter does (N,) [m/s]; NaN where it is not known."""
+    unknown = np.full(len(tick.alive), np.nan)
+    return unknown if tick.filtered_mps is None else tick.filtered_mps.astype(np.float64)
 
 
 def _neighbour_counts(tick: Tick) -> NDArray[np.float64]:

@@ -47,6 +47,7 @@ OBSTACLE_DISTANCE = f"{METRICS}/obstacle_distance"
 TIER = f"{METRICS}/tier"
 RECORD_AGE = f"{METRICS}/record_age"
 NEIGHBOURS = f"{METRICS}/neighbours"
+SAFETY_FILTER = f"{METRICS}/safety_filter"
 QUEUE_RESIDUAL = f"{METRICS}/queue_residual"
 PACKETS = f"{METRICS}/packets"
 LAMBDA2 = f"{METRICS}/lambda2"
@@ -98,7 +99,7 @@ def agent_metrics(obstacles: bool) -> tuple[str, ...]:
     """Return the metrics with one series for each agent; obstacles: whether there are any."""
     measured = (FORCE, SEPARATION, TURN_DEG, SLOT_ERROR)
     distance = (OBSTACLE_DISTANCE,) if obstacles else ()
-    reported = (TIER, RECORD_AGE, NEIGHBOURS)
+    reported = (TIER, RECORD_AGE, NEIGHBOURS, SAFETY_FILTER)
     return (*measured, *distance, *reported)
 
 
