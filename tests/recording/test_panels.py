@@ -14,7 +14,7 @@ from worldsim.judge.radio_events import Jammed
 from worldsim.judge.run_events import Paused, Resumed
 from worldsim.judge.verdict import Judge
 from worldsim.recording import layout, panels
-from worldsim.recording.blueprint import LAYERS, SHOWN, blueprint_of
+from worldsim.recording.blueprint import ASKED_FOR, LAYERS, SHOWN, blueprint_of
 from worldsim.recording.panels import QUESTIONS, SYMBOLS
 from worldsim.recording.recorder import RunRecorder
 from worldsim.scenario.target_frame import FrameTable
@@ -92,5 +92,5 @@ def test_the_network_has_its_figures(chunks: list[Chunk]) -> None:
 def test_every_layer_is_shown_by_some_tab_or_hidden_on_purpose() -> None:
     shown = {layer for layers in SHOWN.values() for layer in layers}
     assert shown <= set(LAYERS)
-    assert set(LAYERS) - shown == {layout.LINKS_OUT_OF_RANGE}
+    assert set(LAYERS) - shown == set(ASKED_FOR)
     assert blueprint_of(SCENARIO) is not None

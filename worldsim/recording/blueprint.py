@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 from rerun.encodings import EntityPath
 
 from worldsim.recording import layout
-from worldsim.recording.panels import FAULTS, MOTION, NETWORK, QUESTIONS, STRUCTURE
+from worldsim.recording.panels import FAULTS, FORMING, MOTION, NETWORK, QUESTIONS, STRUCTURE
 from worldsim.scenario.tables import Scenario
 
 Override = rrb.VisibleTimeRanges | rrb.EntityBehavior
@@ -31,9 +31,11 @@ FORMATION_LAYERS = tuple(
     for part in (layout.SLOTS_PART, layout.SPHERES_PART, layout.QUEUES_PART)
 )
 GUIDANCE_LAYERS = (layout.TARGETS, layout.HIERARCHY)
+ASKED_FOR = (layout.LINKS_OUT_OF_RANGE, layout.CAST_ZONES, layout.BOBBERS, layout.WAYS)
+"""Detail that every view hides."""
 LAYERS = (
     *LINK_LAYERS,
-    layout.LINKS_OUT_OF_RANGE,
+    *ASKED_FOR,
     layout.SIDES,
     *FORMATION_LAYERS,
     *GUIDANCE_LAYERS,
@@ -51,7 +53,7 @@ SHOWN = {
 def blueprint_of(scenario: Scenario) -> rrb.Blueprint:
     """Return the viewer's default layout of a scenario's run."""
     tabs = {
-        MOTION: _motion(obstacles=bool(scenario.obstacle)),
+        MOTION: _motion(bool(scenario.obstacle), scenario.control.controller == FORMING),
         NETWORK: _network(records=scenario.control.allocation == "assignment"),
         STRUCTURE: _structure(),
         FAULTS: _faults(),
@@ -78,13 +80,15 @@ def _page(question: str, plots: Sequence[rrb.View]) -> rrb.Horizontal:
     return rrb.Horizontal(main, side, column_shares=[9, 5], name=question.capitalize())
 
 
-def _motion(obstacles: bool) -> list[rrb.View]:
+def _motion(obstacles: bool, forms: bool) -> list[rrb.View]:
+    """Return plots of the motion; obstacles: whether there are any; forms: whether slots are."""
+    slots = [_series("Distance to own slot [m]", layout.SLOT_ERROR)]
     distance = [_series("Distance to nearest obstacle [m]", layout.OBSTACLE_DISTANCE)]
     return [
         _series("Distance to nearest vehicle [m]", layout.SEPARATION),
         *(distance if obstacles else ()),
         _series("Control force |u|", layout.FORCE),
-        _series("Distance to own slot [m]", layout.SLOT_ERROR),
+        *(slots if forms else ()),
         _series("Wanted turn [deg], left positive", layout.TURN_DEG),
     ]
 

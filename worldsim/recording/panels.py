@@ -22,9 +22,10 @@ QUESTIONS = {
     FAULTS: "What goes wrong, and for how long?",
 }
 """The question that each tab answers, by its name."""
+FORMING = "q_structure"
+"""The controller that is known to take up formations."""
 SYMBOLS = {
-    MOTION: "Box with an arrow: a vehicle and its nose. Trail: its last 4 s. Wire sphere: a slot;"
-    " an agent in it is in place. Faint line: a queue. Brown: an obstacle.",
+    MOTION: "Box with an arrow: a vehicle and its nose. Trail: its last 4 s. Brown: an obstacle.",
     NETWORK: "Grey line: one hears the other. Amber: within range, but not heard. Red: cut by a"
     " fault. Disc: the side of a partition. Red sphere: a jam. Pairs out of range are hidden.",
     STRUCTURE: "Thick line: from an agent to the one that it follows, gold in tier 1, then green"
@@ -33,16 +34,18 @@ SYMBOLS = {
     " jam. A label says what is wrong with its agent.",
 }
 """What a tab's 3D view draws."""
+FORMATION_SYMBOLS = "Wire sphere: a slot; an agent in it is in place. Faint line: a queue."
 UNJUDGED = "The verdict comes when the run has ended: this recording has not, or was cut off."
 
 
 def panel(question: str, scenario: Scenario, colours: str) -> str:
     """Return the panel of a tab as Markdown; colours: what they mean at present."""
+    forms = question == MOTION and scenario.control.controller == FORMING
     return "\n\n".join(
         [
             f"**{QUESTIONS[question]}**",
             f"{flown(scenario)} {radio(scenario)}",
-            SYMBOLS[question],
+            f"{SYMBOLS[question]} {FORMATION_SYMBOLS if forms else ''}".strip(),
             colours,
         ]
     )
@@ -52,9 +55,11 @@ def flown(scenario: Scenario) -> str:
     """Return what a scenario flies, as a sentence."""
     fleet, control = scenario.fleet, scenario.control
     moves = ", in a frame that moves" if len(path_of(scenario.frame).waypoints) > 1 else ""
+    known = control.controller == FORMING
+    formation = f", with the formation {scenario.formation.name}" if known else ""
     return (
         f"Scenario {scenario.name}: {fleet.agents} agents fly {scenario.duration_s:g} s under"
-        f" {control.controller}, with the formation {scenario.formation.name}{moves}."
+        f" {control.controller}{formation}{moves}."
     )
 
 

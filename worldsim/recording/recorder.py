@@ -34,9 +34,11 @@ from worldsim.recording.blueprint import blueprint_of
 from worldsim.recording.columns import ColumnBlock, Entity
 from worldsim.recording.fault_columns import FaultColumns
 from worldsim.recording.formation_entities import FormationEntities
+from worldsim.recording.guidance_columns import GuidanceColumns
 from worldsim.recording.hierarchy_columns import HierarchyColumns, ShownRoles
 from worldsim.recording.obstacle_shapes import ObstacleEntities
 from worldsim.recording.panels import (
+    FORMING,
     QUESTIONS,
     UNJUDGED,
     agent_colours,
@@ -62,8 +64,6 @@ from worldsim.truth.obstacles import Obstacles
 APPLICATION = "qswarm"
 BLOCK_S = 1.0
 FLUSH_TIMEOUT_S = 5.0
-FORMING_CONTROLLER = "q_structure"
-"""The controller that is known to take up formations."""
 EVENT_TIME_SLACK_S = 1e-6
 """Event times are rounded to the microsecond."""
 
@@ -101,7 +101,7 @@ class RunRecorder:
         self._scenario = scenario
         tick_hz = scenario.fleet.tick_hz
         formation = self._formation_of(scenario.formation)
-        forms = scenario.control.controller == FORMING_CONTROLLER
+        forms = scenario.control.controller == FORMING
         self._colours = AgentColours(scenario.rows, formation, forms)
         radius_m = np.array([vehicle.radius_m for vehicle in scenario.vehicles])
         limits = metric_limits(scenario)
@@ -112,6 +112,7 @@ class RunRecorder:
         self._state_columns = StateColumns(tick_hz, scenario.rows, scenario.formation.name)
         self._fault_columns = FaultColumns(radius_m, half_sizes(scenario))
         self._obstacles = ObstacleEntities(Obstacles(scenario.obstacle))
+        self._guidance = GuidanceColumns(scenario) if forms else None
         self._team_view = TeamView(1.0 / tick_hz)
         self._ticks_per_block = max(1, round(tick_hz * BLOCK_S))
         self._ticks: list[Tick] = []
@@ -224,6 +225,8 @@ class RunRecorder:
         yield from self._fault_columns.blocks(self._ticks, situations)
         yield from self._obstacles.blocks(self._ticks)
         yield from self._team_view.blocks(self._ticks)
+        if self._guidance is not None:
+            yield from self._guidance.blocks(self._ticks)
 
     def _log_formation(self) -> None:
         """Log the formation's changes and the frame's motion, in the order of time."""

@@ -95,6 +95,7 @@ def _world_styles(scenario: Scenario) -> Iterator[Entity]:
     yield Entity(layout.VEHICLES, boxes)
     heading = rr.Arrows3D.from_fields(colors=np.array([palette.HEADING]), radii=[HEADING_RADIUS_M])
     yield Entity(layout.HEADINGS, heading)
+    yield from _guidance_styles()
     yield from _fault_styles()
 
 
@@ -103,6 +104,14 @@ def half_sizes(scenario: Scenario) -> Floats:
     radius_m = np.array([vehicle.radius_m for vehicle in scenario.vehicles])
     sizes: Floats = radius_m[:, None] * np.array([1.0, 0.62, 0.3])
     return sizes
+
+
+def _guidance_styles() -> Iterator[Entity]:
+    colours, radii = np.array([palette.GUIDANCE]), [LINK_RADIUS_M]
+    yield Entity(layout.CAST_ZONES, rr.LineStrips3D.from_fields(colors=colours, radii=radii))
+    yield Entity(layout.WAYS, rr.LineStrips3D.from_fields(colors=colours, radii=radii))
+    bobbers = rr.Points3D.from_fields(colors=np.array([palette.BOBBER]), radii=[TARGET_RADIUS_M])
+    yield Entity(layout.BOBBERS, bobbers)
 
 
 def _fault_styles() -> Iterator[Entity]:

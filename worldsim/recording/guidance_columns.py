@@ -1,0 +1,91 @@
+"""What Fig. 5 of the paper draws: cast-zones, bobber points, and the way to the target-on-queue.
+
+They are computed here from the truth, as each agent would from its pose: of the Q-structure's
+guidance, telemetry holds the target-on-queue only. Of a moving frame the lead of the aim point is
+left out. Hidden by the layout until asked for, and recorded at a lower rate.
+"""
+
+from collections.abc import Iterator, Sequence
+from math import cos, radians, sin
+
+import numpy as np
+import rerun as rr
+
+from agent.guidance.bobber import CastZone, bobber, cast_reach, cast_zone
+from agent.guidance.cone import cone_of
+from netem.conditions import LinkModels
+from netem.wire.channels import LOCAL
+from worldsim.judge.tick import Tick
+from worldsim.recording import layout
+from worldsim.recording.columns import ColumnBlock
+from worldsim.scenario.tables import Scenario
+from worldsim.truth.vehicle import Floats
+
+SAMPLES_HZ = 5.0
+ARC_POINTS = 9
+RESTING_M = 1e-3
+"""A vehicle so near to its target has no way to it."""
+
+
+class GuidanceColumns:
+    """Makes the columns of one block of ticks after the other; none for a large fleet."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        range_m = LinkModels(scenario.netem).of_channel(LOCAL).reach_m
+        reach_m = cast_reach(scenario.control, range_m)
+        self._zones = [
+            cast_zone(
+                cone_of(vehicle),
+                reach_m,
+                vehicle.max_speed_mps,
+                radians(vehicle.max_yaw_rate_dps),
+            )
+            for vehicle in (scenario.vehicles if scenario.rows <= layout.NAMED_MAX else ())
+        ]
+        self._ticks_per_sample = max(1, round(scenario.fleet.tick_hz / SAMPLES_HZ))
+
+    def blocks(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
+        """Yield the columns of a block; blocks come in order."""
+        rows = [row for row, tick in enumerate(ticks) if tick.index % self._ticks_per_sample == 0]
+        if not rows or not self._zones:
+            return
+        drawn = [self._ways(ticks[row]) for row in rows]
+        lengths = [len(each) for each in drawn]
+        ways = np.array([way for each in drawn for way in each]).reshape(-1, 3, 3)
+        points = rr.Points3D.columns(positions=ways[:, 1])
+        yield ColumnBlock(layout.BOBBERS, rows, points.partition(lengths))
+        lines = rr.LineStrips3D.columns(strips=list(ways))
+        yield ColumnBlock(layout.WAYS, rows, lines.partition(lengths))
+        zones = [self._outlines(ticks[row]) for row in rows]
+        strips = [strip for each in zones for strip in each]
+        outlines = rr.LineStrips3D.columns(strips=strips)
+        yield ColumnBlock(
+            layout.CAST_ZONES, rows, outlines.partition([len(each) for each in zones])
+        )
+
+    def _ways(self, tick: Tick) -> list[Floats]:
+        """Return a line of each agent with a target: vehicle, bobber, target (3, 3) [m]."""
+        ways = []
+        yaws = tick.attitude[:, 0].tolist()
+        aims, places = tick.target.astype(np.float64), tick.position
+        for agent in np.flatnonzero(tick.alive & np.isfinite(aims).all(axis=1)).tolist():
+            (x, y, z), (u, v, w) = places[agent].tolist(), aims[agent].tolist()
+            if np.linalg.norm(aims[agent] - places[agent]) > RESTING_M:
+                point = bobber((x, y, z), yaws[agent], (u, v, w), self._zones[agent])
+                ways.append(np.array([(x, y, z), point, (u, v, w)]))
+        return ways
+
+    def _outlines(self, tick: Tick) -> list[Floats]:
+        """Return the outlines of the running agents' cast-zones (P, 3) [m; world frame]."""
+        running = tick.alive & np.isfinite(tick.position).all(axis=1)
+        return [
+            tick.position[agent] + _outline(self._zones[agent], float(tick.attitude[agent, 0]))
+            for agent in np.flatnonzero(running).tolist()
+        ]
+
+
+def _outline(zone: CastZone, yaw: float) -> Floats:
+    """Return the outline of a cast-zone about its vehicle (P, 3) [m; world axes]."""
+    angles = np.linspace(yaw - zone.cone.right, yaw + zone.cone.left, ARC_POINTS).tolist()
+    arc = [(zone.reach * cos(angle), zone.reach * sin(angle), 0.0) for angle in angles]
+    return np.array([(0.0, 0.0, 0.0), *arc, (0.0, 0.0, 0.0)])
