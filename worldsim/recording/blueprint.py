@@ -20,7 +20,7 @@ BACKGROUND = (13, 17, 24)
 EYE_DIRECTION = np.array([-0.8, -1.0, 0.5])  # from the centre of view [world axes]
 EYE_DISTANCE = 2.2  # [radii of the team]; a ball of this radius fills the height of the view
 
-PANEL_SHARE, STATES_SHARE = 1.5, 1.8
+PANEL_SHARE, STATES_SHARE = 1.8, 1.8
 """Heights of the panel of words and of timelines of states [heights of a plot]."""
 
 LINK_LAYERS = (layout.LINKS, layout.LINKS_LOST, layout.LINKS_CUT)
