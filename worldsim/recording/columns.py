@@ -85,11 +85,11 @@ def number_column(component: str, rows: NDArray[Any]) -> rr.ComponentColumn:
 
 
 def line_strips(lines: NDArray[np.float64]) -> Array:
-    """Return lines (K, 2, 3) [m; world frame] as rerun stores strips.
+    """Return lines of P points each (K, P, 3) [m; world frame] as rerun stores strips.
 
     The strips are given as an Arrow array, because rerun converts other types one by one.
     """
     points = rr.components.Position3DBatch(lines.reshape(-1, 3)).as_arrow_array()
-    starts = arrow_array(np.arange(0, len(points) + 1, 2, dtype=np.int32))
+    starts = arrow_array(np.arange(0, len(points) + 1, lines.shape[1], dtype=np.int32))
     strip = list_(field("item", points.type, nullable=False))
     return ListArray.from_arrays(starts, points, type=strip)

@@ -13,11 +13,12 @@ import rerun as rr
 
 from agent.guidance.bobber import CastZone, bobber, cast_reach, cast_zone
 from agent.guidance.cone import cone_of
+from agent.messages import Vector
 from netem.conditions import LinkModels
 from netem.wire.channels import LOCAL
 from worldsim.judge.tick import Tick
 from worldsim.recording import layout
-from worldsim.recording.columns import ColumnBlock
+from worldsim.recording.columns import ColumnBlock, line_strips
 from worldsim.scenario.tables import Scenario
 from worldsim.truth.vehicle import Floats
 
@@ -42,6 +43,7 @@ class GuidanceColumns:
             )
             for vehicle in (scenario.vehicles if scenario.rows <= layout.NAMED_MAX else ())
         ]
+        self._outline = np.array([_outline(zone) for zone in self._zones])
         self._ticks_per_sample = max(1, round(scenario.fleet.tick_hz / SAMPLES_HZ))
 
     def blocks(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
@@ -54,38 +56,38 @@ class GuidanceColumns:
         ways = np.array([way for each in drawn for way in each]).reshape(-1, 3, 3)
         points = rr.Points3D.columns(positions=ways[:, 1])
         yield ColumnBlock(layout.BOBBERS, rows, points.partition(lengths))
-        lines = rr.LineStrips3D.columns(strips=list(ways))
+        lines = rr.LineStrips3D.columns(strips=line_strips(ways))
         yield ColumnBlock(layout.WAYS, rows, lines.partition(lengths))
         zones = [self._outlines(ticks[row]) for row in rows]
-        strips = [strip for each in zones for strip in each]
-        outlines = rr.LineStrips3D.columns(strips=strips)
-        yield ColumnBlock(
-            layout.CAST_ZONES, rows, outlines.partition([len(each) for each in zones])
-        )
+        outlines = rr.LineStrips3D.columns(strips=line_strips(np.concatenate(zones)))
+        lengths = [len(each) for each in zones]
+        yield ColumnBlock(layout.CAST_ZONES, rows, outlines.partition(lengths))
 
-    def _ways(self, tick: Tick) -> list[Floats]:
+    def _ways(self, tick: Tick) -> list[list[Vector]]:
         """Return a line of each agent with a target: vehicle, bobber, target (3, 3) [m]."""
         ways = []
         yaws = tick.attitude[:, 0].tolist()
         aims, places = tick.target.astype(np.float64), tick.position
-        for agent in np.flatnonzero(tick.alive & np.isfinite(aims).all(axis=1)).tolist():
+        away = np.linalg.norm(aims - places, axis=1)  # NaN without a target
+        for agent in np.flatnonzero(tick.alive & (away > RESTING_M)).tolist():
             (x, y, z), (u, v, w) = places[agent].tolist(), aims[agent].tolist()
-            if np.linalg.norm(aims[agent] - places[agent]) > RESTING_M:
-                point = bobber((x, y, z), yaws[agent], (u, v, w), self._zones[agent])
-                ways.append(np.array([(x, y, z), point, (u, v, w)]))
+            point = bobber((x, y, z), yaws[agent], (u, v, w), self._zones[agent])
+            ways.append([(x, y, z), point, (u, v, w)])
         return ways
 
-    def _outlines(self, tick: Tick) -> list[Floats]:
-        """Return the outlines of the running agents' cast-zones (P, 3) [m; world frame]."""
+    def _outlines(self, tick: Tick) -> Floats:
+        """Return the outlines of the running agents' cast-zones (K, P, 3) [m; world frame]."""
         running = tick.alive & np.isfinite(tick.position).all(axis=1)
-        return [
-            tick.position[agent] + _outline(self._zones[agent], float(tick.attitude[agent, 0]))
-            for agent in np.flatnonzero(running).tolist()
-        ]
+        yaw = tick.attitude[running, 0].astype(np.float64)[:, None, None]
+        x, y = self._outline[running, :, :1], self._outline[running, :, 1:]
+        turned = (x * np.cos(yaw) - y * np.sin(yaw), x * np.sin(yaw) + y * np.cos(yaw))
+        level = np.concatenate((*turned, np.zeros_like(x)), axis=2)
+        outlines: Floats = tick.position[running, None, :] + level
+        return outlines
 
 
-def _outline(zone: CastZone, yaw: float) -> Floats:
-    """Return the outline of a cast-zone about its vehicle (P, 3) [m; world axes]."""
-    angles = np.linspace(yaw - zone.cone.right, yaw + zone.cone.left, ARC_POINTS).tolist()
-    arc = [(zone.reach * cos(angle), zone.reach * sin(angle), 0.0) for angle in angles]
-    return np.array([(0.0, 0.0, 0.0), *arc, (0.0, 0.0, 0.0)])
+def _outline(zone: CastZone) -> list[tuple[float, float]]:
+    """Return the outline of a cast-zone about its vehicle (P, 2) [m; ahead and to the left]."""
+    angles = np.linspace(-zone.cone.right, zone.cone.left, ARC_POINTS).tolist()
+    arc = [(zone.reach * cos(angle), zone.reach * sin(angle)) for angle in angles]
+    return [(0.0, 0.0), *arc, (0.0, 0.0)]
