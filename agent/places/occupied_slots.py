@@ -25,6 +25,8 @@ IDENTIFIED_M: Final = 0.1
 """A member nearer than this to a place is the vehicle that somebody saw there."""
 FREED_S: Final = 1.0
 """How long a place that a vehicle has left stays unavailable."""
+STALE_S: Final = 1.0
+"""How long others may report a place as taken after a member was found to stand in it."""
 GROWN_S: Final = 1.0
 """How long blocked places are not remembered after the team has grown."""
 
@@ -44,6 +46,8 @@ class OccupiedSlots:
         self._points = points
         self._senses_vehicles = senses_vehicles
         self._recent: dict[Place, float] = {}
+        self._identified: dict[Place, float] = {}
+        """When a member stood in a place that was taken for blocked [s]."""
         self._agents, self._grown_s = 0, 0.0
         self._mission: Flown | None = None  # of the recent places, with its frame at that time
 
@@ -74,20 +78,17 @@ class OccupiedSlots:
         if not (seen or reported or self._recent):
             self.seen = ()
             return NO_PLACES
-        identified = self._with_member(mission, holders, reported.union(self._recent))
-        for place in identified:
-            self._recent.pop(place, None)
-        occupied = self._occupied(senses, mission, holders, reported - identified, seen)
+        reported -= self._identify(senses.now_s, mission, holders, reported.union(self._recent))
+        occupied = self._occupied(senses, mission, holders, reported, seen)
         return self._with_recent(senses.now_s, occupied)
 
     def _carry_over(self, mission: Flown, agents: int) -> None:
         """Find the places of a new mission or frame at those that were taken, as long ago."""
         last = self._mission
-        if (
-            last is None
-            or (last.key, last.frame_key) == (mission.key, mission.frame_key)
-            or not self._recent
-        ):
+        if last is None or (last.key, last.frame_key) == (mission.key, mission.frame_key):
+            return
+        self._identified = {}
+        if not self._recent:
             return
         there = [
             (at_s, point)
@@ -131,21 +132,22 @@ class OccupiedSlots:
                     held.add(place)
         return held
 
-    def _with_member(
-        self, mission: Flown, holders: Sequence[Holder], places: frozenset[Place]
+    def _identify(
+        self, now_s: float, mission: Flown, holders: Sequence[Holder], places: frozenset[Place]
     ) -> frozenset[Place]:
-        """Return which of some places a member stands in, whatever it claims.
+        """Return which places a member stands in, or stood until just now, whatever it claims.
 
-        After a heal all that were unidentified are heard again. What others reported of them, and
-        what the agent remembers, would part the team's knowledge for seconds.
+        After a heal all that were unidentified are heard again. What others still report of them,
+        and what the agent remembers, would part the team's knowledge for seconds.
         """
-        points = [(place, self._points.point(mission, self._agents, place)) for place in places]
-        return frozenset(
-            place
-            for place, point in points
-            if point is not None
-            and any(apart(point, position) < IDENTIFIED_M for _, position in holders)
-        )
+        before = self._identified.items()
+        self._identified = {place: at_s for place, at_s in before if now_s - at_s < STALE_S}
+        for place in places:
+            point = self._points.point(mission, self._agents, place)
+            if point is not None and any(apart(point, at) < IDENTIFIED_M for _, at in holders):
+                self._identified[place] = now_s
+                self._recent.pop(place, None)
+        return frozenset(self._identified)
 
     def _with_recent(self, now_s: float, blocked: frozenset[Place]) -> frozenset[Place]:
         """Return the places that are blocked now or were until just now.

@@ -4,7 +4,7 @@ import pytest
 
 from agent.controller import Flown, Senses
 from agent.messages import MAX_PLACES, Place
-from agent.places.occupied_slots import FREED_S, GROWN_S, OccupiedSlots
+from agent.places.occupied_slots import FREED_S, GROWN_S, STALE_S, OccupiedSlots
 from agent.places.place_points import PlacePoints
 from agent.qstructure.formation import Formation, FormationSpec, QueueSpec
 from agent.qstructure.shape import Ray
@@ -133,6 +133,9 @@ def test_a_known_member_that_is_heard_again_blocks_nothing(occupied, reported):
     near = senses(START_S + 0.2, vehicles=[there])
     assert update(occupied, near, (ME, (THIRD, there)), reported) == frozenset()
     assert occupied.seen == ()
+    assert update(occupied, senses(START_S + 0.5), (ME, FAR), reported) == frozenset(), "left"
+    later = senses(START_S + 0.3 + STALE_S, at=(9.0, 0.0, 0.0))
+    assert update(occupied, later, (ME, FAR), reported) == reported, "another one is there"
 
 
 def test_a_reported_vehicle_is_believed_unless_the_agent_sees_the_place_empty(occupied):
