@@ -1,4 +1,4 @@
-"""The parts of the documents that are made from the code: the layout, the topics, process life.
+"""The parts of the documents made from the code: layout, topics, process life, tables of a run.
 
     python -m tests.house.generated_docs        # writes them anew
 
@@ -14,6 +14,7 @@ from pathlib import Path
 
 from netem.wire.keys import TOPICS
 from worldsim.engine.process_life import diagram
+from worldsim.results.run_tables import LAYOUTS
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("netem", "agent", "worldsim")
@@ -61,11 +62,27 @@ def process_life() -> str:
     return f"```mermaid\n{diagram()}\n```\n"
 
 
+def run_tables() -> str:
+    """Return the tables of a run with their columns: unit, frame, meaning."""
+    blocks = []
+    for name, layout in LAYOUTS.items():
+        rows = [
+            f"| `{column.name}` | {column.kind} | {column.unit or '-'} | {column.frame or '-'}"
+            f" | {column.says} |"
+            for column in layout.columns
+        ]
+        head = ["| column | kind | unit | frame | holds |", "|" + "---|" * 5]
+        blocks += [f"### {name}", "", f"{layout.says[0].upper()}{layout.says[1:]}.", ""]
+        blocks += [*head, *rows, ""]
+    return "\n".join(blocks)
+
+
 PARTS = {
     "layout": layout,
     "modules": modules,
     "topics": topics,
     "process_life": process_life,
+    "run_tables": run_tables,
 }
 
 

@@ -15,19 +15,15 @@ from typing import Any
 
 import msgspec
 
-from worldsim.judge.event import PlannedEvent
 from worldsim.judge.fault_spans import FaultSpans
 from worldsim.judge.finding import Expectation, InvariantTally
 from worldsim.judge.recovery import Recovery
-from worldsim.judge.run_events import RunEvent
-from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge
 from worldsim.recording.isolated_reader import read_run_apart
 from worldsim.recording.layout import RECORDING_FILE, SUMMARY_FILE
 from worldsim.recording.readback import DamagedError, Readback, RecordingError
+from worldsim.recording.rejudged import in_order, rejudge
 
-EVENT_TIME_SLACK_S = 1e-6
-"""Event times are rounded to the microsecond."""
 Figure = float | None
 HELD, NOT_HELD, UNREADABLE, INCONCLUSIVE = 0, 1, 2, 3
 TIME_SLACK_S = 1e-9
@@ -163,8 +159,12 @@ def verify(run: Path) -> Verification:
 def judged_again(run: Path, recording: Path) -> Verification:
     """Judge a recording again. Raises RecordingError."""
     readback = read_run_apart(recording)
-    judge, scenario = _judge_of(readback), readback.scenario
-    found = judge.shortcomings()
+    return verification_of(run, readback, rejudge(readback).judge)
+
+
+def verification_of(run: Path, readback: Readback, judge: Judge) -> Verification:
+    """Return what a recording shows by the judge that saw it."""
+    scenario, found = readback.scenario, judge.shortcomings()
     return Verification(
         run=run,
         finished=readback.finished,
@@ -214,7 +214,7 @@ def _figures(readback: Readback, judge: Judge) -> dict[str, Any]:
         },
     }
     operated = readback.mode != "virtual"
-    faults = FaultSpans(scenario, operated=operated).rows(_in_order(readback.events))
+    faults = FaultSpans(scenario, operated=operated).rows(in_order(readback.events))
     if faults is not None:
         figures["faults"] = faults
     return {key: _finite(value) for key, value in figures.items()}
@@ -231,32 +231,6 @@ def _phases(judge: Judge) -> Iterator[PhaseFigures]:
             residual_m=phase.residual_m,
             queues_converge_s=dict(zip(queues.names, queues.converge_s, strict=True)),
         )
-
-
-def _judge_of(readback: Readback) -> Judge:
-    """Return a judge that took the recorded ticks and events, in the run's order."""
-    judge, noted = Judge(readback.scenario), 0
-    events = _in_order(readback.events)
-    for tick in readback.ticks:
-        while noted < len(events) and _comes_before(events[noted], tick):
-            judge.handle_event(events[noted])
-            noted += 1
-        judge.see(tick)
-    return judge
-
-
-def _in_order(events: list[RunEvent]) -> list[RunEvent]:
-    return sorted(events, key=lambda event: event.t_s)
-
-
-def _comes_before(event: RunEvent, tick: Tick) -> bool:
-    """Return whether the run's judge took an event before a tick.
-
-    At equal times a planned event comes before the tick, and an unplanned exit is noticed after it.
-    """
-    unplanned = isinstance(event, PlannedEvent) and not event.planned
-    slack_s = -EVENT_TIME_SLACK_S if unplanned else EVENT_TIME_SLACK_S
-    return event.t_s <= tick.time_s + slack_s
 
 
 def compared(judged: Verification, file: Path) -> Verification:

@@ -1,1 +1,17 @@
-"""The run folder: summary.json, events.jsonl, logs, and the verdict in words."""
+"""The run folder: summary.json, events.jsonl, logs, the verdict in words, and a run's tables."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from worldsim.results.run import Run, open
+
+__all__ = ["Run", "open"]
+
+
+def __getattr__(name: str) -> Any:
+    """Return ``open`` or ``Run``, which take half a second to import: they read with rerun."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from worldsim.results import run  # noqa: PLC0415 - few that import this package read runs
+
+    return getattr(run, name)
