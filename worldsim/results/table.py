@@ -5,8 +5,8 @@ from importlib import import_module
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
-from pyarrow import lib as pa
 
 Kind = Literal["number", "integer", "flag", "text"]
 DTYPES: dict[Kind, Any] = {

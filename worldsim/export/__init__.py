@@ -1,0 +1,1 @@
+"""A run's tables as files for other tools: Parquet, CSV, and MCAP for Foxglove."""
