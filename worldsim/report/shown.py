@@ -1,0 +1,99 @@
+"""What the figures of a run show, as arrays: rows of ticks, columns of agents."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agent.guidance.cone import cone_of
+from worldsim.judge.event_text import WARNINGS
+from worldsim.judge.phase import Phase
+from worldsim.recording.layout import agent_name
+from worldsim.results.run import Run
+from worldsim.truth.obstacles import Obstacles
+from worldsim.truth.vehicle import Floats
+
+SHORTEST_S = 0.25
+"""A fault of less time is drawn as long as this [s]."""
+
+
+class Fault(NamedTuple):
+    """A fault and when it was in force."""
+
+    kind: str
+    from_s: float
+    to_s: float
+
+
+class Shown:
+    """A run as its figures need it."""
+
+    def __init__(self, run: Run) -> None:
+        self.run = run
+        self.scenario = run.scenario
+        self.judge = run.rejudged.judge
+        self.agents = run.scenario.rows
+        self.names = [agent_name(agent) for agent in range(self.agents)]
+        self.obstacles = Obstacles(run.scenario.obstacle)
+        self.times_s = np.array([tick.time_s for tick in run.ticks])
+        """(T,) [s]"""
+        self.position = self._rows([tick.position for tick in run.ticks], 3)
+        """(T, N, 3) [m; world frame]"""
+        self.force = self._rows([tick.force for tick in run.ticks])
+        """(T, N)"""
+        self.turn_deg = self._rows([tick.turn_deg for tick in run.ticks])
+        """(T, N) [deg]"""
+        figures = run.rejudged.figures
+        self.separation = self._rows([each.separation for each in figures])
+        """(T, N) [m]"""
+        self.slot_error = self._rows([each.slot_error for each in figures])
+        """(T, N) [m]"""
+        near = [each.obstacle_distance for each in figures if each.obstacle_distance is not None]
+        self.obstacle_distance = self._rows(near) if near else None
+        """(T, N) [m]; None without obstacles"""
+        cones = np.degrees([cone_of(vehicle) for vehicle in run.scenario.vehicles])
+        self.turn_left_deg, self.turn_right_deg = cones.T
+        """(N,): the limits of each vehicle [deg]"""
+        self.faults = list(self._faults())
+
+    @property
+    def until_s(self) -> float:
+        """Time of the last tick [s]."""
+        return self.run.ended_s
+
+    @property
+    def phases(self) -> list[Phase]:
+        """The formations asked for, in order."""
+        return self.judge.phases
+
+    @property
+    def forms(self) -> bool:
+        """Whether any agent claimed a place; a controller may form nothing."""
+        return any((tick.place >= 0).any() for tick in self.run.ticks)
+
+    def phase_at(self, time_s: float) -> Phase:
+        """Return the formation that is asked for at a time [s]."""
+        begun = [phase for phase in self.phases if phase.from_s <= time_s + 1e-9]
+        return begun[-1] if begun else self.phases[0]
+
+    def tick_at(self, time_s: float) -> int:
+        """Return the index of the tick nearest to a time [s]."""
+        return int(np.argmin(np.abs(self.times_s - time_s)))
+
+    def _rows(self, each: Sequence[NDArray[Any]], width: int = 0) -> Floats:
+        shape = (len(each), self.agents, *([width] if width else []))
+        rows = np.array(each, dtype=np.float64) if each else np.zeros(shape)
+        return rows.reshape(shape)
+
+    def _faults(self) -> Iterator[Fault]:
+        """Yield the faults with their spans; without a summary, only when they struck."""
+        end_s = self.run.ended_s
+        if self.run.summary is not None:
+            for row in self.run.summary.get("faults", []):
+                to_s = end_s if row["to_s"] is None else row["to_s"]
+                yield Fault(row["kind"], row["from_s"], max(to_s, row["from_s"] + SHORTEST_S))
+            return
+        for event in self.run.run_events:
+            if isinstance(event, WARNINGS):
+                yield Fault(event.kind, event.t_s, event.t_s + SHORTEST_S)
