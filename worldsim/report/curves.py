@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.ticker import ScalarFormatter
 
 from worldsim.report.shown import Shown
 from worldsim.report.style import (
@@ -77,9 +78,18 @@ def draw_distances(shown: Shown) -> Figure:
     least = _least(shown.separation)
     axes.plot(shown.times_s, least, color=ACCENT, linewidth=1.6)
     _mark_least(axes, shown.times_s, least)
-    limit_lines(axes, [shown.scenario.separation_bound_m], "required separation")
+    bound_m = shown.scenario.separation_bound_m
+    limit_lines(axes, [bound_m], "required separation")
     time_axis(axes, shown.until_s)
-    axes.set_ylim(bottom=0.0)
+    if shown.agents > MAX_PANELS:
+        # Most pairs of a large team are far apart: the near ones are what matters.
+        axes.set_yscale("log")
+        axes.set_ylim(
+            bottom=0.6 * max(0.05, min(bound_m, float(np.nanmin(least, initial=bound_m))))
+        )
+        axes.yaxis.set_major_formatter(ScalarFormatter())
+    else:
+        axes.set_ylim(bottom=0.0)
     axes.set_ylabel("distance [m]")
     _key(axes, [("each pair", FAINT), ("nearest pair", ACCENT)])
     return figure
@@ -139,7 +149,7 @@ def draw_slot_errors(shown: Shown) -> Figure:
     limit_lines(axes, [CONVERGED_M], "in place")
     time_axis(axes, shown.until_s)
     axes.set_yscale("log")
-    axes.set_ylim(bottom=FLOOR_M)
+    axes.set_ylim(FLOOR_M, 5.0 * max(1.0, float(np.nanmax(largest, initial=1.0))))
     axes.set_ylabel("distance to the own slot [m]")
     _key(axes, [("each agent", FAINT), ("farthest agent", ACCENT)])
     return figure
@@ -189,7 +199,7 @@ def _grey(axes: Axes, times_s: Floats, values: Floats) -> None:
     lines = [np.column_stack((times, column)) for column in thinned.T]
     many = len(lines) > MAX_VECTOR_LINES
     drawn = LineCollection(lines, colors=FAINT, linewidths=0.5 if many else 0.7)
-    drawn.set_alpha(0.35 if many else 0.8)
+    drawn.set_alpha(max(0.05, min(0.8, 40.0 / len(lines))) if lines else None)
     drawn.set_rasterized(many)
     axes.add_collection(drawn)
     axes.autoscale_view()
@@ -233,8 +243,9 @@ def _mark_least(axes: Axes, times_s: Floats, least: Floats) -> None:
     axes.annotate(
         f"least: {least[at]:.3f} m at {times_s[at]:.1f} s",
         (times_s[at], least[at]),
-        xytext=(-7 if late else 7, -10),
+        xytext=(-8 if late else 8, -11),
         textcoords="offset points",
+        bbox={"facecolor": "white", "alpha": 0.85, "linewidth": 0.0, "pad": 1.5},
         ha="right" if late else "left",
         color=INK,
         fontsize=8.0,

@@ -25,6 +25,8 @@ LEAST_SIZE_M = 2.0
 MAX_NAMED = 20
 """With more agents, vehicles have no names."""
 MAX_TRAIL_POINTS = 160
+MAX_VECTOR_LINES = 150
+"""More links are drawn as an image inside the SVG."""
 Space = Any
 """Axes in 3D, of which matplotlib declares no types."""
 OUTLINE: Any = {"facecolor": SOLID, "alpha": 0.55, "edgecolor": "none"}
@@ -101,7 +103,9 @@ def draw_flat(axes: Axes, shown: Shown, row: int, trail_s: float, plane: Plane) 
     for colour, curve in _queue_curves(shown, tick):
         axes.plot(*curve[:, keep].T, color=colour, linewidth=1.2, alpha=0.5)
     flat = [line[:, keep] for line in _link_lines(tick)]
-    axes.add_collection(LineCollection(flat, colors=FAINT, linewidths=0.5, alpha=0.5))
+    links = LineCollection(flat, colors=FAINT, linewidths=0.5, alpha=0.5)
+    links.set_rasterized(len(flat) > MAX_VECTOR_LINES)
+    axes.add_collection(links)
     colours = _colours(tick)
     for agent, colour in enumerate(colours):
         trail = _trail(shown, agent, row, trail_s)[:, keep]
@@ -193,7 +197,9 @@ def _trail(shown: Shown, agent: int, row: int, trail_s: float) -> Floats:
 def _draw_lines(axes: Space, lines: list[Floats], colour: str, width: float) -> None:
     if lines:
         collection: Any = Line3DCollection
-        axes.add_collection3d(collection(lines, colors=colour, linewidths=width, alpha=0.5))
+        drawn = collection(lines, colors=colour, linewidths=width, alpha=0.5)
+        drawn.set_rasterized(len(lines) > MAX_VECTOR_LINES)
+        axes.add_collection3d(drawn)
 
 
 def _name(axes: Space, shown: Shown, tick: Tick) -> None:
