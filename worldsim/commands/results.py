@@ -1,4 +1,4 @@
-"""The commands that make something of finished runs: ``report`` a page, ``export`` tables."""
+"""The commands that make something of finished runs: a page, pictures, a film, tables."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,7 +9,11 @@ from worldsim.commands.options import complain, examples
 from worldsim.results.exit_status import BAD_INPUT, PASS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from worldsim.export.export import Format
+    from worldsim.report.shown import Shown
+    from worldsim.results.progress_line import ProgressLine
 
 commands = typer.Typer()
 RecordedRun = Annotated[
@@ -50,7 +54,7 @@ def export(
 
     chosen: dict[Format, bool] = {"parquet": parquet, "csv": csv, "mcap": mcap}
     formats: list[Format] = [name for name, wanted in chosen.items() if wanted] or ["parquet"]
-    folder = (run if run.is_dir() else run.parent) / "export"
+    folder = _beside(run) / "export"
     try:
         opened = open_run(run)
         files = write(opened, formats, out or folder)
@@ -108,8 +112,7 @@ def report(
         for run in found:
             progress.update(f"reading {run}")
             opened.append(open_run(run))
-        folder = found[0] if found[0].is_dir() else found[0].parent
-        page = out or folder / "report" / PAGE
+        page = out or _beside(found[0]) / "report" / PAGE
         figures = write(opened, page, progress.update)
     except (RecordingError, ReportError) as error:
         progress.clear()
@@ -121,6 +124,127 @@ def report(
             complain(f"{each.path}: {note}")
     print(f"{page}\n{figures}/")
     return PASS
+
+
+@commands.command(
+    epilog=examples(
+        "qswarm picture runs/mine",
+        "qswarm picture runs/mine --at 3,10,20 --out stills",
+    )
+)
+def picture(
+    run: RecordedRun,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            metavar="T,T,...",
+            help="Simulated times [s].",
+            show_default="start, convergence, changes, faults, end",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Output directory.", show_default="RUN/pictures"),
+    ] = None,
+) -> int:
+    """Draw stills of a run (PNG): in 3D, from above and from the side. No display is needed.
+
+    Vehicles with names and trails in the colours of their queues, slots, links and obstacles.
+    """
+    from worldsim.report.stills import write_stills
+
+    def write(shown: "Shown", progress: "ProgressLine") -> list[Path]:
+        times_s = _times_of(at, shown.until_s) if at is not None else []
+        return write_stills(shown, times_s, folder, progress.update)
+
+    folder = out or _beside(run) / "pictures"
+    return _draw(run, folder, write)
+
+
+@commands.command(
+    epilog=examples(
+        "qswarm video runs/mine",
+        "qswarm video runs/mine --speed 4 --out mine.gif",
+    )
+)
+def video(
+    run: RecordedRun,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X",
+            min=0.1,
+            max=1000.0,
+            help="Simulated seconds in a second of the film.",
+            show_default="1, or what fits into 20 s",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="The film, .mp4 (needs ffmpeg) or .gif.",
+            show_default="RUN/video.mp4; .gif without ffmpeg",
+        ),
+    ] = None,
+) -> int:
+    """Draw a film of a run: its stills, ten in a second. No display is needed."""
+    from worldsim.report.film import default_speed, film_suffix, write_film
+
+    def write(shown: "Shown", progress: "ProgressLine") -> list[Path]:
+        write_film(shown, file, speed or default_speed(shown), progress.update)
+        return [file]
+
+    file = out or _beside(run) / f"video{film_suffix()}"
+    return _draw(run, file, write)
+
+
+def _draw(run: Path, out: Path, write: "Callable[[Shown, ProgressLine], list[Path]]") -> int:
+    """Draw something of a run into a file or folder that must not exist, and print the files."""
+    from worldsim.recording.readback import RecordingError
+    from worldsim.report.film import FilmError
+    from worldsim.report.shown import Shown
+    from worldsim.results.progress_line import ProgressLine
+    from worldsim.results.run import open as open_run
+
+    progress = ProgressLine()
+    try:
+        if out.exists():
+            raise FilmError(f"{out}: exists; nothing is overwritten")
+        progress.update(f"reading {run}")
+        opened = open_run(run)
+        if not opened.ticks:
+            raise FilmError(f"{run}: the recording holds no tick")
+        files = write(Shown(opened), progress)
+    except (RecordingError, FilmError) as error:
+        complain(" ".join(str(error).splitlines()))
+        return BAD_INPUT
+    except OSError as error:
+        complain(f"{out}: cannot be written: {error.strerror or error}")
+        return BAD_INPUT
+    finally:
+        progress.clear()
+    for note in opened.notes:
+        complain(f"{run}: {note}")
+    print("\n".join(map(str, files)))
+    return PASS
+
+
+def _times_of(text: str, until_s: float) -> list[float]:
+    """Return the times [s] of a text such as 3,10,20. Raises typer.BadParameter."""
+    try:
+        times_s = [float(part) for part in text.split(",")]
+    except ValueError:
+        times_s = []
+    if not times_s or not all(0.0 <= time_s <= until_s for time_s in times_s):
+        detail = f"{text!r}; write times from 0 to {until_s:g} s, as 3,10,20"
+        raise typer.BadParameter(detail, param_hint="--at")
+    return times_s
+
+
+def _beside(run: Path) -> Path:
+    """Return the folder of a run, which may be given by its recording."""
+    return run if run.is_dir() else run.parent
 
 
 def _folder_of(recording: Path) -> Path:

@@ -13,7 +13,6 @@ from worldsim.report.style import drawing, new_figure, png_of, svg_of
 
 MOMENTS = 6
 COLUMNS = 3
-TRAIL_S = 6.0
 AFTER_S = 1.0
 """So long after a new formation or a fault's end, its effect is shown [s]."""
 MAX_WIDE = 1.8
@@ -81,11 +80,11 @@ def draw_moments(shown: Shown) -> Figure:
     lines, forms = -(-len(times_s) // COLUMNS), shown.forms
     figure = new_figure(3.05 * lines)
     rows = [shown.tick_at(time_s) for time_s in times_s]
-    regions = [views.moment_region(shown, row, TRAIL_S) for row in rows]
+    regions = [views.moment_region(shown, row) for row in rows]
     size = np.max([region.size for region in regions], axis=0)
     for index, (row, region) in enumerate(zip(rows, regions, strict=True)):
         axes: views.Space = figure.add_subplot(lines, COLUMNS, index + 1, projection="3d")
-        views.draw_moment(axes, shown, row, TRAIL_S, views.Region(region.centre, size))
+        views.draw_moment(axes, shown, row, views.Region(region.centre, size))
         formation = f", {shown.phase_at(shown.times_s[row]).formation.name}" if forms else ""
         axes.set_title(f"{shown.times_s[row]:.1f} s{formation}", pad=0.0)
     return figure
@@ -94,7 +93,8 @@ def draw_moments(shown: Shown) -> Figure:
 def draw_flight(shown: Shown) -> Figure:
     """Draw the whole flight from above and from the side."""
     last = len(shown.times_s) - 1
-    wide, *others = views.moment_region(shown, last, shown.until_s).size.tolist()
+    whole = views.moment_region(shown, last, shown.until_s)
+    wide, *others = whole.size.tolist()
     if wide > MAX_WIDE * max(others):
         figure = new_figure(float(np.clip(9.2 * sum(others) / wide + 1.0, 3.0, 9.0)))
         panels = figure.subplots(2, 1, height_ratios=others)
@@ -107,7 +107,7 @@ def draw_flight(shown: Shown) -> Figure:
         ("from above", "from the side"),
         strict=True,
     ):
-        views.draw_flat(axes, shown, last, shown.until_s, plane)
+        views.draw_flat(axes, shown, last, plane, whole, shown.until_s)
         axes.set_title(title)
     return figure
 

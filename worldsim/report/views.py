@@ -24,6 +24,8 @@ ELEVATION_DEG, AZIMUTH_DEG = 24.0, -58.0
 LEAST_SIZE_M = 2.0
 MAX_NAMED = 20
 """With more agents, vehicles have no names."""
+TRAIL_S = 6.0
+"""A trail shows so much of the past [s]."""
 MAX_TRAIL_POINTS = 160
 MAX_VECTOR_LINES = 150
 """More links are drawn as an image inside the SVG."""
@@ -65,7 +67,7 @@ def region_of(points: Floats, margin_m: float = 0.5) -> Region:
     return Region(0.5 * (low + high), np.maximum(high - low, LEAST_SIZE_M))
 
 
-def moment_region(shown: Shown, row: int, trail_s: float) -> Region:
+def moment_region(shown: Shown, row: int, trail_s: float = TRAIL_S) -> Region:
     """Return the region of a tick: vehicles, their trails and their slots."""
     first = _first_of_trail(shown, row, trail_s)
     slots = [point for point, _ in _slots(shown, shown.run.ticks[row]).values()]
@@ -73,12 +75,12 @@ def moment_region(shown: Shown, row: int, trail_s: float) -> Region:
     return region_of(np.concatenate(points))
 
 
-def draw_moment(
-    axes: Space, shown: Shown, row: int, trail_s: float, region: Region | None = None
-) -> None:
-    """Draw the team at a tick in 3D. region: what to show; None: the team and its trails."""
-    tick = shown.run.ticks[row]
-    seen = region if region is not None else moment_region(shown, row, trail_s)
+def draw_moment(axes: Space, shown: Shown, row: int, seen: Region, scale: float = 1.0) -> None:
+    """Draw the team at a tick in 3D, with the trails of the last seconds.
+
+    seen: what to show. scale: of marks and names.
+    """
+    tick, trail_s = shown.run.ticks[row], TRAIL_S
     _draw_solids(axes, shown, tick.time_s, seen)
     for colour, curve in _queue_curves(shown, tick):
         axes.plot(*curve.T, color=colour, linewidth=1.0, alpha=0.55)
@@ -87,17 +89,20 @@ def draw_moment(
     for agent, colour in enumerate(colours):
         axes.plot(*_trail(shown, agent, row, trail_s).T, color=colour, linewidth=0.8, alpha=0.6)
     for point, colour in _slots(shown, tick).values():
-        axes.scatter(*point, s=26, facecolors="none", edgecolors=colour, linewidths=0.8)
-    axes.scatter(*tick.position.T, s=20, c=colours, depthshade=False, edgecolors="white", lw=0.5)
-    _name(axes, shown, tick)
+        axes.scatter(*point, s=26 * scale**2, facecolors="none", edgecolors=colour, linewidths=0.8)
+    axes.scatter(
+        *tick.position.T, s=20 * scale**2, c=colours, depthshade=False, edgecolors="white", lw=0.5
+    )
+    _name(axes, shown, tick, 6.5 * scale)
     _frame(axes, seen)
 
 
-def draw_flat(axes: Axes, shown: Shown, row: int, trail_s: float, plane: Plane) -> None:
-    """Draw the team at a tick in a plane: from above, or from the side."""
+def draw_flat(
+    axes: Axes, shown: Shown, row: int, plane: Plane, seen: Region, trail_s: float = TRAIL_S
+) -> None:
+    """Draw the team at a tick in a plane: from above, or from the side. seen: what to show."""
     tick, (across, up) = shown.run.ticks[row], plane
     keep = [across, up]
-    seen = moment_region(shown, row, trail_s)
     if plane == FROM_ABOVE:
         _draw_outlines(axes, shown, tick.time_s)
     for colour, curve in _queue_curves(shown, tick):
@@ -138,13 +143,14 @@ def _name_flat(axes: Axes, shown: Shown, place: Floats) -> None:
 
 def _colours(tick: Tick) -> list[str]:
     """Return the colour of each vehicle: its queue's; others without a place, or stopped."""
-    found = [_queue_colour(queue) for queue in tick.place[:, 0].tolist()]
+    found = [queue_colour(queue) for queue in tick.place[:, 0].tolist()]
     return [
         colour if runs else STOPPED for colour, runs in zip(found, tick.alive.tolist(), strict=True)
     ]
 
 
-def _queue_colour(queue: int) -> str:
+def queue_colour(queue: int) -> str:
+    """Return the colour of a queue by its index; that of an agent without a place below 0."""
     return QUEUES[queue % len(QUEUES)] if queue >= 0 else UNPLACED
 
 
@@ -154,7 +160,7 @@ def _slots(shown: Shown, tick: Tick) -> dict[int, tuple[Floats, str]]:
     frame = phase.frame(tick.time_s)
     queue = tick.place[:, 0].tolist()
     return {
-        agent: (np.array(frame.to_world(slot.point)), _queue_colour(queue[agent]))
+        agent: (np.array(frame.to_world(slot.point)), queue_colour(queue[agent]))
         for agent, slot in phase.own_slots(tick).items()
     }
 
@@ -172,7 +178,7 @@ def _queue_curves(shown: Shown, tick: Tick) -> list[tuple[str, Floats]]:
         end_m = max([*queue.stations, *(slot.arc_length for slot in claimed)])
         steps = [queue.point(end_m * k / CURVE_STEPS) for k in range(CURVE_STEPS + 1)]
         curve = np.array([frame.to_world(point) for point in steps])
-        found.append((_queue_colour(index), curve))
+        found.append((queue_colour(index), curve))
     return found
 
 
@@ -202,12 +208,12 @@ def _draw_lines(axes: Space, lines: list[Floats], colour: str, width: float) -> 
         axes.add_collection3d(drawn)
 
 
-def _name(axes: Space, shown: Shown, tick: Tick) -> None:
+def _name(axes: Space, shown: Shown, tick: Tick, size_pt: float) -> None:
     if shown.agents > MAX_NAMED:
         return
     for name, (x, y, z) in zip(shown.names, tick.position.tolist(), strict=True):
         if not np.isnan(x):
-            axes.text(x, y, z, f"\u00a0{name}", fontsize=6.5, color=INK)
+            axes.text(x, y, z, f"\u00a0{name}", fontsize=size_pt, color=INK)
 
 
 def _frame(axes: Space, region: Region) -> None:
