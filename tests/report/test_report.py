@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
@@ -14,11 +15,13 @@ import numpy as np
 import pytest
 
 import worldsim.results
+from tests.cut_recordings import cut
 from tests.small_scenario import SMALL
 from worldsim.commands.app import command
 from worldsim.report.curves import draw_distances, draw_forces, draw_turns
 from worldsim.report.figures import moments_s
 from worldsim.report.network import draw_packets, strength
+from worldsim.report.report import report
 from worldsim.report.shown import Shown
 from worldsim.results.run import Run
 
@@ -39,6 +42,8 @@ idle_faults = true
 """
 )
 VOID = {"meta", "br"}
+EMPTY = ("poses", "targets", "places", "links", "metrics", "packets")
+"""Tables that have no row without a tick."""
 
 
 class Page(HTMLParser):
@@ -270,9 +275,18 @@ def test_nothing_is_overwritten(folder: Path, capsys: pytest.CaptureFixture[str]
 
 
 def test_a_cut_off_recording_is_reported_with_what_is_missing(folder: Path, tmp_path: Path) -> None:
-    content = (folder / "run.rrd").read_bytes()
-    (tmp_path / "run.rrd").write_bytes(content[: len(content) // 3])
+    (tmp_path / "run.rrd").write_bytes(cut(folder / "run.rrd", 0.7))
     assert command(["report", str(tmp_path)]) == 0
     page = Page((tmp_path / "report" / "report.html").read_text())
     assert "The recording is cut off: its end was never written." in page.text
     assert "inconclusive" in page.text
+    assert sum(tag == "figure" for tag, _ in page.tags) == 9
+
+
+def test_a_run_without_a_tick_is_reported_without_figures(run: Run, tmp_path: Path) -> None:
+    empty = Run(tmp_path, replace(run._readback, ticks=[], finished=False), None)
+    assert all(table.rows == 0 for name, table in empty.tables.items() if name in EMPTY)
+    report([empty], tmp_path / "empty.html", lambda _: None)
+    page = Page((tmp_path / "empty.html").read_text())
+    assert "It ends at 0 s of 5 s." in page.text
+    assert "figure" not in {tag for tag, _ in page.tags}

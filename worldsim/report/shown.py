@@ -87,12 +87,12 @@ class Shown:
         return rows.reshape(shape)
 
     def _faults(self) -> Iterator[Fault]:
-        """Yield the faults with their spans; without a summary, only when they struck."""
-        end_s = self.run.ended_s
-        if self.run.summary is not None:
-            for row in self.run.summary.get("faults", []):
-                to_s = end_s if row["to_s"] is None else row["to_s"]
-                yield Fault(row["kind"], row["from_s"], max(to_s, row["from_s"] + SHORTEST_S))
+        """Yield the faults with their spans; in an older recording, only when they struck."""
+        known = self.run.figures.get("faults")
+        if known is not None:
+            for row in known.values():
+                to_s, least_s = row.get("to_s"), row["from_s"] + SHORTEST_S
+                yield Fault(row["kind"], row["from_s"], max(to_s or self.run.ended_s, least_s))
             return
         for event in self.run.run_events:
             if isinstance(event, WARNINGS):
