@@ -257,11 +257,20 @@ def test_several_runs_stand_side_by_side(folder: Path, tmp_path: Path) -> None:
         for name in re.findall(r"<th class=\"number\"><a [^>]*>(.*?)</a>", file.read_text())
     ]
     assert head == [folder.name, folder.name]
+    assert both.text.count(folder.name) >= 4  # as the heads of columns and of sections
     assert "0 of 3" not in both.text
     assert sorted(each.name for each in (tmp_path / "both-figures").iterdir()) == [
         "0-small",
         "1-small",
     ]
+
+
+def test_of_many_runs_there_is_a_table(run: Run, tmp_path: Path) -> None:
+    report([run] * 7, tmp_path / "seven.html", lambda _: None)
+    seven = Page((tmp_path / "seven.html").read_text())
+    assert sum(tag == "tr" for tag, _ in seven.tags) == 8
+    assert "figure" not in {tag for tag, _ in seven.tags}
+    assert not list((tmp_path / "seven-figures").iterdir())
 
 
 def test_nothing_is_overwritten(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,6 +17,8 @@ from worldsim.results.run import Run
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 """What a browser may load for the page: images that the page itself holds."""
+MAX_DRAWN = 6
+"""Of more runs, no figures are drawn."""
 _ID = re.compile(r'(\bid="|url\(#|href="#)')
 _EXPECTATION_HEAD = ("expectation", "required", "got", "margin", "")
 
@@ -25,10 +27,10 @@ def page(reports: Sequence[tuple[Run, Sequence[DrawnFigure]]]) -> str:
     """Return the page of one run, or of several side by side."""
     runs = [run for run, _ in reports]
     several = len(runs) > 1
-    title = "Comparison of runs" if several else runs[0].scenario.name
-    parts = [_comparison(runs)] if several else []
-    for number, (run, figures) in enumerate(reports):
-        body = _run(run, figures, number)
+    title = f"{len(runs)} runs" if several else runs[0].scenario.name
+    parts = [_comparison(runs, title)] if several else []
+    for number, (run, figures) in enumerate(reports if len(runs) <= MAX_DRAWN else ()):
+        body = _run(run, figures, number, several)
         parts.append(
             f'<section class="run" id="run-{number}">{body}</section>' if several else body
         )
@@ -41,27 +43,41 @@ def page(reports: Sequence[tuple[Run, Sequence[DrawnFigure]]]) -> str:
     )
 
 
-def _comparison(runs: list[Run]) -> str:
-    head = "".join(
-        f'<th class="number"><a href="#run-{number}">{escape(run.path.name)}</a></th>'
-        for number, run in enumerate(runs)
-    )
+def _comparison(runs: list[Run], title: str) -> str:
+    """Return the figures of runs side by side; of many runs, one below the other."""
+    names, compared = [rows.name_of(run) for run in runs], rows.comparison_rows(runs)
+    drawn = len(runs) <= MAX_DRAWN
+    if drawn:
+        links = [f'<a href="#run-{number}">{escape(name)}</a>' for number, name in enumerate(names)]
+        head, lines = links, [(name, cells) for name, cells in compared]
+    else:
+        columns = zip(*(cells for _, cells in compared), strict=True)
+        head = [escape(name) for name, _ in compared]
+        lines = [(name, list(cells)) for name, cells in zip(names, columns, strict=True)]
+    top = "".join(f'<th class="number">{name}</th>' for name in head)
     body = "".join(
-        f'<tr><td class="key">{escape(name)}</td>'
-        f"{''.join(f'<td class=number>{escape(cell.text)}</td>' for cell in cells)}</tr>"
-        for name, cells in rows.comparison_rows(runs)
+        f'<tr><td class="key">{escape(name)}</td>{"".join(map(_compared, cells))}</tr>'
+        for name, cells in lines
     )
+    left_out = f"Figures are drawn of up to {MAX_DRAWN} runs."
     return (
-        '<p class="kind">qswarm report</p><h1>Comparison of runs</h1>'
-        f'<div class="scroll"><table><tr><th></th>{head}</tr>{body}</table></div>'
+        f'<p class="kind">qswarm report</p><h1>{escape(title)}</h1>'
+        f'<p class="lead">{"Side by side." if drawn else left_out}</p>'
+        f'<div class="scroll"><table><tr><th></th>{top}</tr>{body}</table></div>'
     )
 
 
-def _run(run: Run, figures: Sequence[DrawnFigure], number: int) -> str:
+def _compared(figure: Figure) -> str:
+    kind = {"fail": " missed", "inconclusive": " open"}.get(figure.text, "")
+    return f'<td class="number{kind}">{escape(figure.text)}</td>'
+
+
+def _run(run: Run, figures: Sequence[DrawnFigure], number: int, several: bool) -> str:
     verdict = rows.verdict_of(run)
     reason = escape(verdict.reason) or "every expectation met, no invariant violated"
     parts = [
-        f'<p class="kind">qswarm report</p><h1>{escape(run.scenario.name)}</h1>',
+        f'<p class="kind">{escape(rows.name_of(run)) if several else "qswarm report"}</p>',
+        f"<h1>{escape(run.scenario.name)}</h1>",
         f'<p class="lead">{escape(rows.heading(run))}</p>',
         f'<div class="verdict {escape(verdict.outcome)}"><b>{escape(verdict.outcome)}</b>'
         f"<span>{reason}</span></div>",

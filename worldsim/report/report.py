@@ -5,7 +5,7 @@ from pathlib import Path
 from shutil import rmtree
 
 from worldsim.report.figures import DrawnFigure, drawn_figures
-from worldsim.report.page import page
+from worldsim.report.page import MAX_DRAWN, page
 from worldsim.report.shown import Shown
 from worldsim.results.run import Run
 
@@ -21,18 +21,19 @@ class ReportError(Exception):
 def report(runs: Sequence[Run], file: Path, progress: Progress) -> Path:
     """Write the page ``file`` of some runs and their figures, and return the figures' folder.
 
-    The figures of several runs are in a folder each. progress: gets what is being drawn. Raises
-    ReportError where the page or the folder exists, or cannot be written.
+    The figures of several runs are in a folder each; of many runs none are drawn. progress: gets
+    what is being drawn. Raises ReportError where the page or the folder exists, or cannot be written.
     """
     folder = file.with_name(FIGURES if file.name == PAGE else f"{file.stem}-{FIGURES}")
     for path in (file, folder):
         if path.exists():
             raise ReportError(f"{path}: exists; nothing is overwritten")
-    drawn = [(run, _drawn(run, progress)) for run in runs]
+    few = len(runs) <= MAX_DRAWN
+    drawn = [(run, _drawn(run, progress) if few else []) for run in runs]
     try:
         folder.mkdir(parents=True)
         try:
-            for number, (run, figures) in enumerate(drawn):
+            for number, (run, figures) in enumerate(drawn if few else ()):
                 own = folder if len(drawn) == 1 else folder / f"{number}-{run.scenario.name}"
                 _write(figures, own)
             file.write_text(page(drawn), encoding="utf-8")

@@ -196,6 +196,12 @@ def fault_lines(run: Run) -> list[str]:
     return fault_texts(run.summary.get("faults", []))
 
 
+def name_of(run: Run) -> str:
+    """Return the name of a run's folder."""
+    path = run.path.resolve()
+    return path.name if path.is_dir() else path.parent.name
+
+
 def heading(run: Run) -> str:
     """Return what was flown, in a line."""
     figures = run.figures
