@@ -22,7 +22,8 @@ def report(runs: Sequence[Run], file: Path, progress: Progress) -> Path:
     """Write the page ``file`` of some runs and their figures, and return the figures' folder.
 
     The figures of several runs are in a folder each; of many runs none are drawn. progress: gets
-    what is being drawn. Raises ReportError where the page or the folder exists, or cannot be written.
+    what is being drawn. Raises ReportError where the page or the folder exists, or cannot be
+    written.
     """
     folder = file.with_name(FIGURES if file.name == PAGE else f"{file.stem}-{FIGURES}")
     for path in (file, folder):
