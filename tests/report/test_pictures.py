@@ -5,11 +5,13 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
+import typer
 from PIL import Image
 
 import worldsim.results
 from tests.small_scenario import SMALL
 from worldsim.commands.app import command
+from worldsim.commands.results import _times_of
 from worldsim.report import film
 from worldsim.report.film import FilmError, default_speed, write_film
 from worldsim.report.shown import Shown
@@ -61,16 +63,18 @@ def test_a_still_is_drawn_for_each_time(
     assert capsys.readouterr().err == f"{out}: exists; nothing is overwritten\n"
 
 
-@pytest.mark.parametrize("at", ["9", "-1", "one", "", "nan"])
-def test_a_time_outside_the_run_is_named(
-    folder: Path, capsys: pytest.CaptureFixture[str], at: str
-) -> None:
-    assert command(["picture", str(folder), f"--at={at}", "--out", "never"]) == 2
-    said = (
-        f"qswarm: --at: {at!r}; write times from 0 to 5 s, as 3,10,20 (see qswarm picture --help)\n"
-    )
-    assert capsys.readouterr().err == said
+def test_a_time_outside_the_run_is_named(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command(["picture", str(folder), "--at=3,9", "--out", "never"]) == 2
+    said = "'3,9'; write times from 0 to 5 s, as 3,10,20"
+    assert capsys.readouterr().err == f"qswarm: --at: {said} (see qswarm picture --help)\n"
     assert not Path("never").exists()
+
+
+@pytest.mark.parametrize("text", ["5.1", "-1", "one", "", "nan", "1,,2"])
+def test_a_text_that_is_no_time_of_the_run_is_refused(text: str) -> None:
+    assert _times_of("0,2.5,5", 5.0) == [0.0, 2.5, 5.0]
+    with pytest.raises(typer.BadParameter):
+        _times_of(text, 5.0)
 
 
 def test_a_still_says_what_goes_on(shown: Shown) -> None:
