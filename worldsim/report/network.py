@@ -30,7 +30,7 @@ FATES = {
     "dropped_loss": ("lost", "#7fb2c9"),
     "dropped_partition": ("cut by a fault", "#d9822b"),
     "dropped_queue": ("queue full", "#a05195"),
-    "dropped_medium": ("radio down", "#3a3f47"),
+    "dropped_medium": ("receiver gone", "#3a3f47"),
 }
 """What becomes of a frame: its words and colour."""
 BINS = 120
