@@ -10,10 +10,12 @@ FLYING = (
     "closed_loop",
     "commands",
     "engine",
+    "export",
     "judge",
     "link_check",
     "random_flights",
     "recording",
+    "report",
 )
 """Folders of tests that mostly fly: CI runs them compiled where it can, in half of the time."""
 
