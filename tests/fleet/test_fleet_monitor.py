@@ -275,3 +275,13 @@ def test_missing_processes_are_printed_until_all_are_present(
     assert not launched.monitor.all_present
     launched.from_world(ProcessesMissing(()))
     assert launched.monitor.all_present
+
+
+def test_a_quiet_terminal_shows_errors_alone() -> None:
+    output = io.StringIO()
+    terminal = Terminal(Console(file=output), quiet=True)
+    terminal.print("starting")
+    terminal.show(PROGRESS)
+    terminal.print_error("netem was killed")
+    terminal.close()
+    assert output.getvalue() == "netem was killed\n"

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from netem.wire.shutdown import StopRequest, stop_requests
 from worldsim.campaign.pool import Job, simulate, sweep
-from worldsim.results.exit_status import EXIT_STATUS, INTERRUPTED
+from worldsim.results.closing import Output
+from worldsim.results.exit_status import INTERRUPTED
 from worldsim.results.overall import Made, over_all
 from worldsim.results.progress_line import ProgressLine
 from worldsim.results.run_folder import (
@@ -15,7 +16,6 @@ from worldsim.results.run_folder import (
     room_reserved,
     write_json,
 )
-from worldsim.results.verdict_text import table, verdict
 from worldsim.scenario.tables import Scenario
 
 ROW_B = 2048
@@ -24,27 +24,27 @@ HEAD_B = 16 * 1024
 """Room for the rest of it [bytes]."""
 
 
-def simulate_one(scenario: Scenario, out: Path | None, recording: bool) -> int:
-    """Make one run and print its verdict; return the exit status. Raises RunDirectoryError.
+def simulate_one(scenario: Scenario, out: Path | None, recording: bool, output: Output) -> int:
+    """Make one run and tell its outcome; return the exit status. Raises RunDirectoryError.
 
     Ctrl-C ends it early; the verdict on what was simulated is printed and kept all the same.
     """
-    line = ProgressLine()
+    line = ProgressLine(hidden=output.quiet)
     with stop_requests() as stop:
-        folder, summary = simulate(
+        result = simulate(
             Job(scenario, out, recording),
             stop,
             lambda time_s: line.update(f"{time_s:.1f} of {scenario.duration_s:g} s simulated"),
         )
     line.clear()
-    print(verdict(summary, folder, recording))
-    return INTERRUPTED if stop.requested else EXIT_STATUS[summary["outcome"]]
+    status = output.conclude(result, recording)
+    return INTERRUPTED if stop.requested else status
 
 
 def simulate_many(
-    scenarios: list[Scenario], out: Path | None, recording: bool, workers: int
+    scenarios: list[Scenario], out: Path | None, recording: bool, workers: int, output: Output
 ) -> int:
-    """Make many runs, each in its own folder within ``out``, and print a table over all.
+    """Make many runs, each in its own folder within ``out``, and tell the outcome over all.
 
     A disk that fills up between two runs ends them; the table tells of those that were made.
     Returns the exit status. Raises RunDirectoryError, also for two runs of one name and seed.
@@ -59,17 +59,18 @@ def simulate_many(
         for scenario, name in zip(scenarios, names, strict=True)
     ]
     with stop_requests() as stop, room_reserved(folder, HEAD_B + ROW_B * len(jobs)):
-        results, lost = _results(jobs, workers, stop)
+        results, lost = _results(jobs, workers, stop, ProgressLine(hidden=output.quiet))
     cut_off_by = "interrupted" if stop.requested else lost
     overall = over_all(results, cut_off_by, len(jobs))
     write_json(folder / "summary.json", overall)
-    print(table(overall, folder))
-    return INTERRUPTED if stop.requested else EXIT_STATUS[overall["outcome"]]
+    status = output.conclude_many(results, overall, folder)
+    return INTERRUPTED if stop.requested else status
 
 
-def _results(jobs: list[Job], workers: int, stop: StopRequest) -> tuple[list[Made], str | None]:
+def _results(
+    jobs: list[Job], workers: int, stop: StopRequest, line: ProgressLine
+) -> tuple[list[Made], str | None]:
     """Return the results in the order of the jobs, and why no further run could begin."""
-    line = ProgressLine()
     results: list[Made] = []
     lost: str | None = None
     try:

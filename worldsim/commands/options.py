@@ -118,6 +118,17 @@ NoRecording = Annotated[
     bool, typer.Option("--no-recording", help="Do not write the recording, run.rrd.")
 ]
 
+Quiet = Annotated[
+    bool, typer.Option("--quiet", help="Print the outcome and errors only, no progress.")
+]
+Json = Annotated[
+    bool,
+    typer.Option(
+        "--json",
+        help="Print the summary on stdout as one JSON document; everything else goes to stderr.",
+    ),
+]
+
 
 def load_scenario(given: str, overrides: Mapping[str, str], command_ticks: int) -> "Scenario":
     """Return a scenario, given by path or name, that may run where a command lives so long [ticks].

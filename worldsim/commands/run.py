@@ -9,11 +9,13 @@ import typer
 from worldsim.commands.options import (
     Agents,
     Duration,
+    Json,
     List,
     Lockstep,
     NoRecording,
     OnOverload,
     Out,
+    Quiet,
     ScenarioFile,
     ScenarioFiles,
     Seed,
@@ -37,6 +39,7 @@ commands = typer.Typer()
         "qswarm run my.toml --agents 20 --duration 40 --speed 2",
         "qswarm run wedge-9 --agents 80 --on-overload slow",
         "qswarm run wedge-9 --lockstep",
+        "qswarm run wedge-9 --json | jq .outcome",
         "qswarm run --list",
     )
 )
@@ -55,6 +58,8 @@ def run(
     settings: Settings = None,
     out: Out = None,
     no_recording: NoRecording = False,
+    quiet: Quiet = False,
+    json: Json = False,
     listing: List = False,
 ) -> int:
     """Run a scenario with real processes that talk over Zenoh.
@@ -64,6 +69,7 @@ def run(
     from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
     from worldsim.fleet.launcher import run as run_processes
     from worldsim.fleet.process import RunOptions
+    from worldsim.results.closing import Output
     from worldsim.results.run_folder import RunDirectory
 
     if not isfinite(speed):
@@ -77,7 +83,7 @@ def run(
     terms = RunOptions(
         loaded.name, speed, not no_recording, lockstep, shards, on_overload=on_overload
     )
-    return run_processes(loaded, directory, terms)
+    return run_processes(loaded, directory, terms, Output(quiet, json))
 
 
 @commands.command(
@@ -85,6 +91,7 @@ def run(
         "qswarm sim wedge-9",
         "qswarm sim wedge-9 --seeds 0:20 --jobs 2 --out runs/twenty",
         "qswarm sim my.toml --set netem.delay_ms=200 --no-recording",
+        "qswarm sim wedge-9 --json | jq .min_separation_m",
     )
 )
 def sim(
@@ -103,6 +110,8 @@ def sim(
     settings: Settings = None,
     out: Out = None,
     no_recording: NoRecording = False,
+    quiet: Quiet = False,
+    json: Json = False,
     listing: List = False,
 ) -> int:
     """Run scenarios in virtual time, as fast as the host allows.
@@ -111,6 +120,7 @@ def sim(
     """
     from worldsim.campaign.virtual_runs import simulate_many, simulate_one
     from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
+    from worldsim.results.closing import Output
 
     if seed is not None and seeds is not None:
         raise typer.BadParameter("cannot be combined with --seed", param_hint="--seeds")
@@ -120,6 +130,8 @@ def sim(
             overrides = overrides_of(settings, agents, each, duration)
             loaded.append(load_scenario(given, overrides, VIRTUAL_COMMAND_TICKS))
         warn(given, loaded[-1])
+    output = Output(quiet, json)
     if seeds is None and len(scenarios) == 1:
-        return simulate_one(loaded[0], out, not no_recording)
-    return simulate_many(loaded, out, not no_recording, jobs or len(os.sched_getaffinity(0)))
+        return simulate_one(loaded[0], out, not no_recording, output)
+    workers = jobs or len(os.sched_getaffinity(0))
+    return simulate_many(loaded, out, not no_recording, workers, output)

@@ -161,7 +161,7 @@ class FleetMonitor:
         if self.run_over or self.failed:
             return
         self.failed = True
-        self._terminal.print(f"{reason} at about {self._time_s:.1f} s; the run ends")
+        self._terminal.print_error(f"{reason} at about {self._time_s:.1f} s; the run ends")
         self._world.send(RunFailed(reason))
 
     def _handle_zygote(self, message: FromZygote) -> None:
@@ -176,7 +176,7 @@ class FleetMonitor:
                 self._table.add(f"intruder-{number}", pid)
             case IntruderExited(number=number, exit=process_exit):
                 name = f"intruder-{number}"
-                self._terminal.print(f"{name} {process_exit}; {self.log_tail(name)}")
+                self._terminal.print_error(f"{name} {process_exit}; {self.log_tail(name)}")
             case _:
                 assert_never(message)
 
@@ -225,12 +225,14 @@ class FleetMonitor:
         if not self.all_present:
             raise self._start_error(name, process_exit)
         self._world.send(message)
-        self._terminal.print(
+        expected = message.process in self._expected_exits
+        show = self._terminal.print if expected else self._terminal.print_error
+        show(
             f"{name} (pid {message.pid}) {process_exit} at about {self._time_s:.1f} s"
             f" {self._consequence(message.process)}"
         )
         if process_exit.status is not None:
-            self._terminal.print(self.log_tail(name))
+            self._terminal.print_error(self.log_tail(name))
 
     def _consequence(self, process: AgentProcess) -> str:
         if process in self._expected_exits:

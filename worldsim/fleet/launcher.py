@@ -31,13 +31,13 @@ from worldsim.fleet.planned_stops import PlannedStops
 from worldsim.fleet.process import RunOptions
 from worldsim.fleet.process_table import ProcessRow, ProcessTable, processes, sweep_passwords
 from worldsim.fleet.supervisor import Supervisor
-from worldsim.fleet.terminal import Terminal
+from worldsim.fleet.terminal import Terminal, console_on
 from worldsim.fleet.zygote import AgentProcessConfig, Zygote
+from worldsim.results.closing import Output
 from worldsim.results.environment import descriptors_problem
-from worldsim.results.exit_status import EXIT_STATUS
+from worldsim.results.overall import Result
 from worldsim.results.run_folder import RunDirectory, RunDirectoryError, unwritable
 from worldsim.results.summary import Summary
-from worldsim.results.verdict_text import verdict
 from worldsim.scenario.tables import Scenario
 
 __all__ = ["ProcessRow", "processes", "run"]
@@ -50,8 +50,8 @@ RUN_END_WITHIN_S = 15.0
 END_WITHIN_S = 3.0
 
 
-def run(scenario: Scenario, directory: RunDirectory, options: RunOptions) -> int:
-    """Run a scenario with real processes and print the verdict; return the exit status.
+def run(scenario: Scenario, directory: RunDirectory, options: RunOptions, output: Output) -> int:
+    """Run a scenario with real processes and tell the outcome; return the exit status.
 
     No process is left behind, also after Ctrl-C, SIGTERM and SIGHUP. Raises RunDirectoryError where
     the host allows too few files.
@@ -64,13 +64,13 @@ def run(scenario: Scenario, directory: RunDirectory, options: RunOptions) -> int
     interrupt_on_signals()
     adopt_orphans()
     launcher = Launcher(
-        scenario, directory, options._replace(users=directory.users, launched_s=launched_s)
+        scenario, directory, options._replace(users=directory.users, launched_s=launched_s), output
     )
     try:
         launcher.fly()
         status = launcher.conclude()
     except StartError as error:
-        launcher.terminal.print(str(error))
+        launcher.terminal.print_error(str(error))
         launcher.end()
         directory.remove_results()
         status = NOT_STARTED
@@ -87,8 +87,11 @@ def run(scenario: Scenario, directory: RunDirectory, options: RunOptions) -> int
 class Launcher:
     """One launched fleet, from its first process to its last."""
 
-    def __init__(self, scenario: Scenario, directory: RunDirectory, options: RunOptions) -> None:
-        self.terminal = Terminal()
+    def __init__(
+        self, scenario: Scenario, directory: RunDirectory, options: RunOptions, output: Output
+    ) -> None:
+        self.terminal = Terminal(console_on(output.stream), quiet=output.quiet)
+        self._output = output
         self._scenario = scenario
         self._directory = directory
         self._options = options
@@ -139,17 +142,16 @@ class Launcher:
             self.terminal.print(f"interrupted before take-off; logs in {self._directory.logs}")
 
     def conclude(self) -> int:
-        """Print the verdict from the run's summary; return the exit status."""
+        """Tell the outcome from the run's summary; return the exit status."""
         self.terminal.close()
         try:
             summary: Summary = json.loads(self._directory.summary.read_text("utf-8"))
         except FileNotFoundError:
             self._directory.free_room()
-            self.terminal.print(self._without_summary())
+            self.terminal.print_error(self._without_summary())
             return UNKNOWN
         recorded = self._directory.recording.exists()
-        self.terminal.print(verdict(summary, self._directory.path, recorded))
-        return EXIT_STATUS[summary["outcome"]]
+        return self._output.conclude(Result(self._directory.path, summary), recorded)
 
     def end(self) -> None:
         """End every process that is left, and delete the passwords."""

@@ -14,22 +14,37 @@ from worldsim.fleet.launcher_link import PRINT_EVERY_S
 from worldsim.results.output_streams import Unescaped, escaped
 
 
-class Terminal:
-    """Shows progress in place on a terminal; elsewhere prints it as a line now and then."""
+def console_on(stream: TextIO) -> Console:
+    """Return a console that draws on a stream of this process."""
+    return Console(file=cast(TextIO, Unescaped(stream)))
 
-    def __init__(self, console: Console | None = None) -> None:
-        own = console if console is not None else Console(file=cast(TextIO, Unescaped(sys.stdout)))
-        self._console = console = own
+
+class Terminal:
+    """Shows progress in place on a terminal; elsewhere prints it as a line now and then.
+
+    quiet: shows errors only.
+    """
+
+    def __init__(self, console: Console | None = None, *, quiet: bool = False) -> None:
+        self._console = console = console if console is not None else console_on(sys.stdout)
+        self._quiet = quiet
         # Without rich's refresh thread: this process forks children.
         self._live = Live(console=console, auto_refresh=False, transient=True)
         self._print_at_s = -inf
 
     def print(self, text: str) -> None:
-        """Print a lasting line."""
+        """Print a lasting line, unless quiet."""
+        if not self._quiet:
+            self.print_error(text)
+
+    def print_error(self, text: str) -> None:
+        """Print a lasting line on an error, also when quiet."""
         self._console.print(escaped(text), markup=False, highlight=False, soft_wrap=True)
 
     def show(self, progress: Progress) -> None:
         """Show the state of the running fleet."""
+        if self._quiet:
+            return
         if self._console.is_terminal:
             self._live.start()
             self._live.update(Text(str(progress), no_wrap=True, overflow="ellipsis"), refresh=True)

@@ -13,9 +13,13 @@ LOG_EVERY_S = 5.0
 
 
 class ProgressLine:
-    """A line that is updated in place on a terminal, and printed now and then elsewhere."""
+    """A line that is updated in place on a terminal, and printed now and then elsewhere.
 
-    def __init__(self, stream: TextIO | None = None) -> None:
+    hidden: nothing is shown at all.
+    """
+
+    def __init__(self, stream: TextIO | None = None, *, hidden: bool = False) -> None:
+        self._hidden = hidden
         self._stream = stream if stream is not None else sys.stderr
         self._controls = Unescaped(self._stream)
         self._next_s = monotonic() + QUIET_S
@@ -23,7 +27,7 @@ class ProgressLine:
 
     def update(self, text: str) -> None:
         """Show how far the work is, unless it was shown a moment ago."""
-        if monotonic() < self._next_s:
+        if self._hidden or monotonic() < self._next_s:
             return
         terminal = self._stream.isatty()
         self._next_s = monotonic() + (LINE_EVERY_S if terminal else LOG_EVERY_S)

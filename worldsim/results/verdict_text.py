@@ -47,10 +47,22 @@ def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
         *_sub_formations(summary["sub_formations"]),
         *_delivery(summary["delivery"]),
         *_rejected(summary["rejected_by_cause"]),
-        _outcome(summary, folder / ("run.rrd" if recorded else "summary.json")),
+        closing_line(summary, folder, recorded),
         *([f"view it: qswarm view {folder}"] if recorded else []),
     ]
     return "\n".join(lines)
+
+
+def closing_line(summary: Summary, folder: Path, recorded: bool) -> str:
+    """Return the outcome of one run with its reason, and where its files are, in one line."""
+    return _outcome(summary, folder / ("run.rrd" if recorded else "summary.json"))
+
+
+def closing_lines(overall: Overall, folder: Path) -> str:
+    """Return a line for each of many runs that did not pass, and the outcome over all."""
+    rows = [row for row in overall["rows"] if row["outcome"] != "pass"]
+    lines = [_outcome(row, folder / row["run"]) for row in rows]
+    return "\n".join([*lines, _outcome(overall, folder / "summary.json")])
 
 
 def table(overall: Overall, folder: Path) -> str:
