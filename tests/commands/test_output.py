@@ -1,15 +1,24 @@
-"""What the commands that run scenarios print: one line with --quiet, one document with --json."""
+"""What the commands that run scenarios print and write: --quiet, --json and --junit."""
 
 import json
 import os
 import subprocess
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import pytest
 
 from tests.commands.conftest import Command
 from tests.processes.harness import QSWARM
 
+BROKEN = """
+class Broken:
+    def __init__(self, setup):
+        pass
+
+    def decide(self, senses):
+        raise ValueError("lost")
+"""
 LATE = ("--set", "expect.converge_within_s=0.01")
 
 
@@ -57,6 +66,7 @@ def test_bad_input_leaves_stdout_empty(small: Path, qswarm: Command, option: str
 
 def test_json_of_processes_goes_through_a_pipe(small: Path) -> None:
     command = [*QSWARM, "run", os.fspath(small), "--lockstep", "--json", "--no-recording"]
+    command += ["--junit", "made.xml"]
     made = subprocess.run(
         [*command, "--duration", "1", "--out", "one"], capture_output=True, text=True, check=False
     )
@@ -64,3 +74,50 @@ def test_json_of_processes_goes_through_a_pipe(small: Path) -> None:
     assert made.returncode == 1  # one second is too short to converge
     assert (document["mode"], document["outcome"]) == ("lockstep", "fail")
     assert "starting netem" in made.stderr
+    assert cases("made.xml")["small.1", "outcome"] == ["failure", "system-out"]
+
+
+def cases(file: str) -> dict[tuple[str | None, str | None], list[str]]:
+    """Return what each case of a JUnit file holds."""
+    root = ET.parse(file).getroot()
+    return {
+        (case.get("classname"), case.get("name")): [each.tag for each in case]
+        for case in root.iter("testcase")
+    }
+
+
+def test_junit_has_the_cases_of_each_seed(small: Path, qswarm: Command) -> None:
+    many = ("--seeds", "0:2", "--out", "many", "--junit", "many/made.xml")
+    assert qswarm("sim", small, "--no-recording", *many, *LATE).status == 1
+    made = cases("many/made.xml")
+    for seed in (0, 1):
+        assert made[f"small.{seed}", "outcome"] == ["failure", "system-out"]
+        assert made[f"small.{seed}", "converge line"] == ["failure"]
+        assert made[f"small.{seed}", "min_separation_m"] == []
+
+
+def test_a_controller_that_fails_is_an_error_in_the_junit_file(
+    small: Path, qswarm: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(small.parent)
+    small.with_name("broken.py").write_text(BROKEN)
+    mine = ("--set", "control.controller=broken:Broken", "--junit", "made.xml")
+    printed = qswarm("sim", small, "--no-recording", "--json", *mine)
+    assert (printed.status, printed.out) == (1, "")
+    assert cases("made.xml") == {("small.1", "outcome"): ["error", "system-out"]}
+
+
+@pytest.mark.parametrize("command", ["sim", "run"])
+def test_a_junit_file_that_cannot_be_written_is_refused_before_the_flight(
+    small: Path, qswarm: Command, command: str
+) -> None:
+    printed = qswarm(command, small, "--junit", "none/made.xml", "--out", "one")
+    assert printed == (2, "", "none/made.xml: no such file or directory\n")
+    assert not Path("one").exists()
+
+
+def test_a_junit_file_that_is_lost_is_no_pass(small: Path, qswarm: Command) -> None:
+    printed = qswarm("sim", small, "--no-recording", "--quiet", "--junit", "/dev/full")
+    assert (printed.status, printed.err) == (3, "/dev/full: no space left on device\n")
+    printed = qswarm("sim", small, "--no-recording", "--quiet", "--junit", "/dev/full", *LATE)
+    assert printed.status == 1

@@ -25,10 +25,11 @@ POLL_EVERY_S = 0.2
 
 
 class FailedFlightError(FaultyControllerError):
-    """A run failed; ``details`` holds the traceback, where there is one."""
+    """A run failed; ``details`` holds the traceback, where there is one, ``run`` the run."""
 
     def __init__(self, run: FailedRun) -> None:
         super().__init__(run.error)
+        self.run = run
         self.details = run.details
 
 

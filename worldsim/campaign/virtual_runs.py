@@ -4,10 +4,10 @@ from collections import Counter
 from pathlib import Path
 
 from netem.wire.shutdown import StopRequest, stop_requests
-from worldsim.campaign.pool import Job, simulate, sweep
+from worldsim.campaign.pool import FailedFlightError, Job, simulate, sweep
 from worldsim.results.closing import Output
 from worldsim.results.exit_status import INTERRUPTED
-from worldsim.results.overall import Made, over_all
+from worldsim.results.overall import FailedRun, Made, over_all
 from worldsim.results.progress_line import ProgressLine
 from worldsim.results.run_folder import (
     RunDirectoryError,
@@ -31,14 +31,25 @@ def simulate_one(scenario: Scenario, out: Path | None, recording: bool, output: 
     """
     line = ProgressLine(hidden=output.quiet)
     with stop_requests() as stop:
-        result = simulate(
-            Job(scenario, out, recording),
-            stop,
-            lambda time_s: line.update(f"{time_s:.1f} of {scenario.duration_s:g} s simulated"),
-        )
+        try:
+            result = simulate(
+                Job(scenario, out, recording),
+                stop,
+                lambda time_s: line.update(f"{time_s:.1f} of {scenario.duration_s:g} s simulated"),
+            )
+        except (FailedFlightError, RunWriteError) as error:
+            output.fail(_failed(scenario, error))
+            raise
     line.clear()
     status = output.conclude(result, recording)
     return INTERRUPTED if stop.requested else status
+
+
+def _failed(scenario: Scenario, error: FailedFlightError | RunWriteError) -> FailedRun:
+    if isinstance(error, FailedFlightError):
+        return error.run
+    folder, reason = error.args
+    return FailedRun(folder, scenario.name, scenario.seed, reason, outcome="inconclusive")
 
 
 def simulate_many(

@@ -129,6 +129,15 @@ Json = Annotated[
     ),
 ]
 
+JUnit = Annotated[
+    Path | None,
+    typer.Option(
+        "--junit",
+        metavar="FILE",
+        help="Write a JUnit file for CI: a case for each expectation and invariant.",
+    ),
+]
+
 
 def load_scenario(given: str, overrides: Mapping[str, str], command_ticks: int) -> "Scenario":
     """Return a scenario, given by path or name, that may run where a command lives so long [ticks].

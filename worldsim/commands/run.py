@@ -10,6 +10,7 @@ from worldsim.commands.options import (
     Agents,
     Duration,
     Json,
+    JUnit,
     List,
     Lockstep,
     NoRecording,
@@ -60,6 +61,7 @@ def run(
     no_recording: NoRecording = False,
     quiet: Quiet = False,
     json: Json = False,
+    junit: JUnit = None,
     listing: List = False,
 ) -> int:
     """Run a scenario with real processes that talk over Zenoh.
@@ -79,11 +81,13 @@ def run(
     command_ticks = VIRTUAL_COMMAND_TICKS if lockstep else PROCESS_COMMAND_TICKS
     loaded = load_scenario(scenario, overrides, command_ticks)
     warn(scenario, loaded)
+    output = Output(quiet, json, junit)
+    output.check(out)
     directory = RunDirectory.create(out, loaded)
     terms = RunOptions(
         loaded.name, speed, not no_recording, lockstep, shards, on_overload=on_overload
     )
-    return run_processes(loaded, directory, terms, Output(quiet, json))
+    return run_processes(loaded, directory, terms, output)
 
 
 @commands.command(
@@ -92,6 +96,7 @@ def run(
         "qswarm sim wedge-9 --seeds 0:20 --jobs 2 --out runs/twenty",
         "qswarm sim my.toml --set netem.delay_ms=200 --no-recording",
         "qswarm sim wedge-9 --json | jq .min_separation_m",
+        "qswarm sim wedge-9 --seeds 0:20 --quiet --junit wedge-9.xml",
     )
 )
 def sim(
@@ -112,6 +117,7 @@ def sim(
     no_recording: NoRecording = False,
     quiet: Quiet = False,
     json: Json = False,
+    junit: JUnit = None,
     listing: List = False,
 ) -> int:
     """Run scenarios in virtual time, as fast as the host allows.
@@ -130,7 +136,8 @@ def sim(
             overrides = overrides_of(settings, agents, each, duration)
             loaded.append(load_scenario(given, overrides, VIRTUAL_COMMAND_TICKS))
         warn(given, loaded[-1])
-    output = Output(quiet, json)
+    output = Output(quiet, json, junit)
+    output.check(out)
     if seeds is None and len(scenarios) == 1:
         return simulate_one(loaded[0], out, not no_recording, output)
     workers = jobs or len(os.sched_getaffinity(0))

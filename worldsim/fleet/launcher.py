@@ -35,7 +35,7 @@ from worldsim.fleet.terminal import Terminal, console_on
 from worldsim.fleet.zygote import AgentProcessConfig, Zygote
 from worldsim.results.closing import Output
 from worldsim.results.environment import descriptors_problem
-from worldsim.results.overall import Result
+from worldsim.results.overall import FailedRun, Result
 from worldsim.results.run_folder import RunDirectory, RunDirectoryError, unwritable
 from worldsim.results.summary import Summary
 from worldsim.scenario.tables import Scenario
@@ -70,7 +70,7 @@ def run(scenario: Scenario, directory: RunDirectory, options: RunOptions, output
         launcher.fly()
         status = launcher.conclude()
     except StartError as error:
-        launcher.terminal.print_error(str(error))
+        launcher.report_failure(str(error))
         launcher.end()
         directory.remove_results()
         status = NOT_STARTED
@@ -148,10 +148,16 @@ class Launcher:
             summary: Summary = json.loads(self._directory.summary.read_text("utf-8"))
         except FileNotFoundError:
             self._directory.free_room()
-            self.terminal.print_error(self._without_summary())
+            self.report_failure(self._without_summary())
             return UNKNOWN
         recorded = self._directory.recording.exists()
         return self._output.conclude(Result(self._directory.path, summary), recorded)
+
+    def report_failure(self, text: str) -> None:
+        """Report why there is no summary."""
+        self.terminal.print_error(text)
+        name, seed = self._scenario.name, self._scenario.seed
+        self._output.fail(FailedRun(self._directory.path, name, seed, text, outcome="inconclusive"))
 
     def end(self) -> None:
         """End every process that is left, and delete the passwords."""

@@ -1,4 +1,4 @@
-"""How a command tells the outcome of its runs: in words or as JSON."""
+"""How a command tells the outcome of its runs: in words or as JSON, and in a JUnit file."""
 
 import json
 import sys
@@ -6,22 +6,33 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
-from worldsim.results.exit_status import EXIT_STATUS
-from worldsim.results.overall import Made, Overall, Result
+from worldsim.results.exit_status import EXIT_STATUS, INCONCLUSIVE
+from worldsim.results.junit import check_junit_file, write_junit
+from worldsim.results.overall import FailedRun, Made, Overall, Result
+from worldsim.results.run_folder import RunDirectoryError
 from worldsim.results.summary import Summary
 from worldsim.results.verdict_text import closing_line, closing_lines, table, verdict
 
 
 class Output(NamedTuple):
-    """The options --quiet and --json of the commands that run scenarios."""
+    """The options --quiet, --json and --junit of the commands that run scenarios."""
 
     quiet: bool = False
     json: bool = False
+    junit: Path | None = None
 
     @property
     def stream(self) -> TextIO:
         """Where progress and words go: with --json, stdout is left to the document."""
         return sys.stderr if self.json else sys.stdout
+
+    def check(self, out: Path | None) -> None:
+        """Raise RunDirectoryError where the JUnit file could not be written after the flight.
+
+        out: the folder that the flight will make; None: one named after scenario and time.
+        """
+        if self.junit is not None:
+            check_junit_file(self.junit, out)
 
     def conclude(self, result: Result, recorded: bool) -> int:
         """Tell the outcome of one run; return its exit status."""
@@ -30,18 +41,34 @@ class Output(NamedTuple):
             words = closing_line(summary, folder, recorded)
         else:
             words = verdict(summary, folder, recorded)
-        return self._tell(words, summary)
+        self._tell(words, summary)
+        return self._report([result], EXIT_STATUS[summary["outcome"]])
+
+    def fail(self, run: FailedRun) -> None:
+        """Note in the JUnit file that a run ended without a summary."""
+        self._report([run], EXIT_STATUS[run.outcome])
 
     def conclude_many(self, made: Sequence[Made], overall: Overall, folder: Path) -> int:
         """Tell the outcome of many runs in ``folder``; return the exit status over all."""
         words = closing_lines(overall, folder) if self.quiet else table(overall, folder)
-        return self._tell(words, overall)
+        self._tell(words, overall)
+        return self._report(made, EXIT_STATUS[overall["outcome"]], overall["reason"])
 
-    def _tell(self, words: str, document: Summary | Overall) -> int:
+    def _tell(self, words: str, document: Summary | Overall) -> None:
         if not self.json:
             print(words)
         else:
             if not self.quiet:
                 print(words, file=sys.stderr)
             print(json.dumps(document, indent=2, allow_nan=False))
-        return EXIT_STATUS[document["outcome"]]
+
+    def _report(self, made: Sequence[Made], status: int, cut_off_by: str | None = None) -> int:
+        """Write the JUnit file; return the exit status, which is no pass where that failed."""
+        if self.junit is None:
+            return status
+        try:
+            write_junit(self.junit, made, cut_off_by)
+        except RunDirectoryError as error:
+            print(error, file=sys.stderr)
+            return status or INCONCLUSIVE
+        return status

@@ -49,7 +49,7 @@ INVARIANT_WORDS = {
     "I1": "two vehicles, or a vehicle and an obstacle, were too near",
     "I2": "a vertex of the formation did not have exactly one agent",
     "I3": "a queue's number of agents was not its share",
-    "I4": "two agents claimed one place for too long",
+    "I4": "two agents kept claiming one slot",
     "I5": "an agent went back to an older mission",
     "I6": "an agent changed its role too often",
     "I7": "an agent of a settled team changed its place",

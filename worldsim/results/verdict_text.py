@@ -17,7 +17,7 @@ from worldsim.results.expectation_text import (
 )
 from worldsim.results.fault_rows import fault_texts
 from worldsim.results.overall import Overall, Row, ScenarioRow
-from worldsim.results.summary import DeliveryRow, Summary
+from worldsim.results.summary import INVARIANT_WORDS, DeliveryRow, InvariantRow, Summary
 
 if TYPE_CHECKING:
     from worldsim.recording.verify import Verification
@@ -40,7 +40,7 @@ def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
     """Return the verdict of one run: its expectations, what it showed, and where its files are."""
     lines = [
         _head(summary),
-        *_expectations(summary["expectations"], _circumstances(summary)),
+        *_expectations(summary["expectations"], circumstances(summary)),
         *_encounters(summary["encounters"]),
         *(f"  {text}" for text in fault_texts(summary["faults"])),
         f"  {_accuracy(summary)}",
@@ -63,6 +63,11 @@ def closing_lines(overall: Overall, folder: Path) -> str:
     rows = [row for row in overall["rows"] if row["outcome"] != "pass"]
     lines = [_outcome(row, folder / row["run"]) for row in rows]
     return "\n".join([*lines, _outcome(overall, folder / "summary.json")])
+
+
+def violation_text(name: str, tally: InvariantRow) -> str:
+    """Return the violation of an invariant, such as I4, in words."""
+    return f"{INVARIANT_WORDS[name]} ({name}), in {tally['violations']} of {tally['ticks']} ticks"
 
 
 def table(overall: Overall, folder: Path) -> str:
@@ -117,7 +122,8 @@ def _outcome(summary: Any, file: Path) -> str:
     return f"{summary['outcome']}{reason}  {file}"
 
 
-def _circumstances(summary: Summary) -> Circumstances:
+def circumstances(summary: Summary) -> Circumstances:
+    """Return what the words on a run's expectations depend on."""
     spans_s = [(phase["from_s"], phase["timed_from_s"]) for phase in summary["phases"]]
     return Circumstances(summary["duration_s"], spans_s, summary["recoveries"])
 
