@@ -121,3 +121,15 @@ def test_a_junit_file_that_is_lost_is_no_pass(small: Path, qswarm: Command) -> N
     assert (printed.status, printed.err) == (3, "/dev/full: no space left on device\n")
     printed = qswarm("sim", small, "--no-recording", "--quiet", "--junit", "/dev/full", *LATE)
     assert printed.status == 1
+
+
+def test_a_terminal_gets_a_table(small: Path) -> None:
+    master, terminal = os.openpty()
+    command = [*QSWARM, "sim", os.fspath(small), "--no-recording", "--out", "one"]
+    made = subprocess.run(command, stdout=terminal, stderr=subprocess.PIPE, check=False)
+    os.close(terminal)
+    shown = os.read(master, 65536).decode()
+    os.close(master)
+    assert (made.returncode, made.stderr) == (0, b"")
+    assert "required" in shown.splitlines()[2]
+    assert "pass  one/summary.json" in shown

@@ -38,10 +38,14 @@ class Output(NamedTuple):
         """Tell the outcome of one run; return its exit status."""
         folder, summary = result
         if self.quiet:
-            words = closing_line(summary, folder, recorded)
+            self._tell(closing_line(summary, folder, recorded), summary)
+        elif self.stream.isatty():
+            from worldsim.results.closing_table import show_verdict  # noqa: PLC0415 - loads rich
+
+            show_verdict(self.stream, summary, folder, recorded)
+            self._print_document(summary)
         else:
-            words = verdict(summary, folder, recorded)
-        self._tell(words, summary)
+            self._tell(verdict(summary, folder, recorded), summary)
         return self._report([result], EXIT_STATUS[summary["outcome"]])
 
     def fail(self, run: FailedRun) -> None:
@@ -55,11 +59,12 @@ class Output(NamedTuple):
         return self._report(made, EXIT_STATUS[overall["outcome"]], overall["reason"])
 
     def _tell(self, words: str, document: Summary | Overall) -> None:
-        if not self.json:
-            print(words)
-        else:
-            if not self.quiet:
-                print(words, file=sys.stderr)
+        if not (self.json and self.quiet):
+            print(words, file=self.stream)
+        self._print_document(document)
+
+    def _print_document(self, document: Summary | Overall) -> None:
+        if self.json:
             print(json.dumps(document, indent=2, allow_nan=False))
 
     def _report(self, made: Sequence[Made], status: int, cut_off_by: str | None = None) -> int:

@@ -69,6 +69,21 @@ def expectation_texts(rows: Sequence[ExpectationRow], run: Circumstances) -> lis
     ]
 
 
+class Cells(NamedTuple):
+    """An expectation as a row of a table; a cell is "" where there is nothing to say."""
+
+    what: str
+    required: str
+    got: str
+    margin: str
+
+
+def expectation_cells(rows: Sequence[ExpectationRow], run: Circumstances) -> list[Cells]:
+    """Return each expectation as the cells of a table, in their order."""
+    texts = expectation_texts(rows, run)
+    return [_cells(row, text) for row, text in zip(rows, texts, strict=True)]
+
+
 def encounter_texts(rows: Sequence[EncounterRow]) -> list[str]:
     """Return what a run showed of vehicles that could not give way, in a few lines."""
     texts = [
@@ -132,12 +147,41 @@ def _other(row: ExpectationRow, run: Circumstances) -> str:
     if wanted is None and name.startswith(STARTS):
         return f"{name}: there was no room, so no agent started"
     if name in _BOUNDS:
-        what, relation, unit, digits, scale = bound = _BOUNDS[name]
-        got = row["got"]
-        measured = _unmeasured(row) if got is None else figure(scale * got, unit, digits)
-        required = f"required {relation} {scale * wanted:g} {unit}".rstrip()
-        return f"{what}: {measured} ({required}{_margin(row, bound)})"
+        bound = _BOUNDS[name]
+        required = f"required {bound.relation} {bound.scale * wanted:g} {bound.unit}".rstrip()
+        margin = _margin(row, bound)
+        left = f"; margin {margin}" if margin else ""
+        return f"{bound.what}: {_measured(row, bound)} ({required}{left})"
     return f"{name}: {row['got']} (required {wanted})"
+
+
+def _cells(row: ExpectationRow, text: str) -> Cells:
+    """Return the cells of an expectation; text: the same in words, where it has no figure."""
+    name, wanted, got = row["name"], row["wanted"], row["got"]
+    if name in _BOUNDS:
+        bound = _BOUNDS[name]
+        required = f"{bound.relation} {bound.scale * wanted:g} {bound.unit}".rstrip()
+        return Cells(bound.what, required, _measured(row, bound), _margin(row, bound))
+    if name.startswith(CONVERGE):
+        formation = name.removeprefix(CONVERGE)
+        shown = text.removeprefix(formation).removeprefix(":").strip().removesuffix(_limit(row))
+        shown = shown.removeprefix("converged in ")
+        return Cells(f"{formation} converges", *_timed_cells(row, shown))
+    if name == "reform_within_s":
+        words = text.removesuffix(_limit(row)).removeprefix("formation after a fault: ")
+        shown = f"{got:.3g} s" if row["held"] and got is not None else words
+        return Cells("formation restored after each fault", *_timed_cells(row, shown))
+    if wanted is None:
+        return Cells(name, "", text.removeprefix(f"{name}: "), "")
+    return Cells(name, f"{wanted}", f"{got}", "")
+
+
+def _timed_cells(row: ExpectationRow, got: str) -> tuple[str, str, str]:
+    """Return the cells for what is required, was got, and is left of a time."""
+    wanted_s, margin_s = row["wanted"], row["margin"]
+    required = f"<= {wanted_s:g} s" if wanted_s is not None else "by the end"
+    margin = f"{margin_s:.3g} s" if margin_s is not None else ""
+    return required, got, margin
 
 
 class _Bound(NamedTuple):
@@ -162,7 +206,14 @@ def _margin(row: ExpectationRow, bound: _Bound) -> str:
     margin = row["margin"]
     if margin is None:
         return ""
-    return f"; margin {figure(bound.scale * margin, bound.unit, bound.digits)}"
+    return figure(bound.scale * margin, bound.unit, bound.digits)
+
+
+def _measured(row: ExpectationRow, bound: _Bound) -> str:
+    got = row["got"]
+    if got is None:
+        return _unmeasured(row)
+    return figure(bound.scale * got, bound.unit, bound.digits)
 
 
 def _unmeasured(row: ExpectationRow) -> str:

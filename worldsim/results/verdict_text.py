@@ -39,18 +39,30 @@ METRES_FROM_M = 0.1
 def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
     """Return the verdict of one run: its expectations, what it showed, and where its files are."""
     lines = [
-        _head(summary),
+        head(summary),
         *_expectations(summary["expectations"], circumstances(summary)),
+        *remarks(summary),
+        closing_line(summary, folder, recorded),
+        *hints(folder, recorded),
+    ]
+    return "\n".join(lines)
+
+
+def remarks(summary: Summary) -> list[str]:
+    """Return lines on what a run showed beside its expectations."""
+    return [
         *_encounters(summary["encounters"]),
         *(f"  {text}" for text in fault_texts(summary["faults"])),
         f"  {_accuracy(summary)}",
         *_sub_formations(summary["sub_formations"]),
         *_delivery(summary["delivery"]),
         *_rejected(summary["rejected_by_cause"]),
-        closing_line(summary, folder, recorded),
-        *([f"view it: qswarm view {folder}"] if recorded else []),
     ]
-    return "\n".join(lines)
+
+
+def hints(folder: Path, recorded: bool) -> list[str]:
+    """Return lines on what to do next."""
+    return [f"view it: qswarm view {folder}"] if recorded else []
 
 
 def closing_line(summary: Summary, folder: Path, recorded: bool) -> str:
@@ -108,7 +120,8 @@ def _verified_outcome(verification: "Verification") -> str:
     return "met" if verification.held else "NOT MET"
 
 
-def _head(summary: Summary) -> str:
+def head(summary: Summary) -> str:
+    """Return what was run, and how, in one line."""
     factor = summary["real_time_factor"]
     pace = f" at {factor:.3g} x real time" if factor is not None else ""
     return (
