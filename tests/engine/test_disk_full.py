@@ -44,7 +44,7 @@ def test_recording_and_events_are_lost_and_the_flight_is_not(tmp_path: Path, com
     verified = qswarm_on(PLAIN, "verify", str(tmp_path / "run"))
     assert verified.returncode == 3
     if command == "run":
-        assert "no space left on device" in told.lower().split("least separation")[-1] or (
+        assert "no space left on device" in told.lower().split("minimum separation")[-1] or (
             "ends here, the run continues" in told
         )
 

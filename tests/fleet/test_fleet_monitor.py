@@ -257,7 +257,7 @@ def test_a_stall_names_what_it_waits_for_and_which_processes_are_stopped(
 def test_progress_is_printed_now_and_then_where_there_is_no_terminal(launched: Launched) -> None:
     launched.from_world(ProcessesMissing(()), PROGRESS, PROGRESS)
     assert launched.lines == [
-        "   3.2 of 20 s   in place 4/9   least separation 0.50 m   late ticks 0.0%"
+        "3.2 of 20 s   in place 4/9   minimum separation 0.50 m   late ticks 0.0%"
     ]
 
 

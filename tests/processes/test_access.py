@@ -163,7 +163,7 @@ def test_the_passwords_are_deleted_at_the_end_of_the_run(
 ) -> None:
     run = tmp_path / "run"
     fleet = start(*QSWARM, "run", scenario(2.0), "--no-recording", "--out", str(run))
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     assert (run / "users").exists()
     assert fleet.status(15.0) in (0, 1, 3)
     assert not (run / "users").exists()

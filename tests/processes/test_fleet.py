@@ -133,7 +133,7 @@ def test_a_killed_agent_is_reported_at_once_and_the_run_ends_with_a_verdict(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(9.0), run, "--no-recording", "--speed", "2")
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     os.kill(pids(run)["agent-2"], signal.SIGKILL)
     fleet.wait_for_output(
         f"agent-2 (pid {pids(run)['agent-2']}) was killed by signal 9 at about", 1.0
@@ -151,7 +151,7 @@ def test_ctrl_c_ends_everything_and_leaves_summary_and_recording(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(60.0), run)
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     fleet.kill_group(signal.SIGINT)
 
     assert fleet.status(8.0) == 130, fleet.text
@@ -168,7 +168,7 @@ def test_a_repeated_ctrl_c_does_not_cut_the_end_short(
     start: Start, scenario: Write, run: Path, number: signal.Signals
 ) -> None:
     fleet = launched(start, scenario(60.0), run, "--no-recording")
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     while fleet.process.poll() is None:
         fleet.kill_group(number)
         threading.Event().wait(0.02)
@@ -231,7 +231,7 @@ def test_kill_9_of_the_launcher_leaves_no_process_and_a_summary(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(60.0), run, "--no-recording")
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     started = pids(run)
     assert len(started) == 7
     fleet.process.kill()
@@ -243,11 +243,11 @@ def test_kill_9_of_the_launcher_leaves_no_process_and_a_summary(
 @pytest.mark.real_time
 def test_a_stopped_netem_is_named_not_the_host(start: Start, scenario: Write, run: Path) -> None:
     fleet = launched(start, scenario(5.0), run, "--no-recording")
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     os.kill(pids(run)["netem"], signal.SIGSTOP)
     fleet.wait_for_output("netem was stopped by a signal at ", 5.0)
     # A stop that ends at once may leave the run sound: it lasts for two lines of progress.
-    eventually(lambda: fleet.text.count("least separation") >= 3, 10.0, lambda: fleet.text)
+    eventually(lambda: fleet.text.count("minimum separation") >= 3, 10.0, lambda: fleet.text)
     os.kill(pids(run)["netem"], signal.SIGCONT)
     assert fleet.status(20.0) in (1, 3), fleet.text
     assert "the host was too slow" not in fleet.text
@@ -260,7 +260,7 @@ def test_the_death_of_netem_ends_the_run_with_a_message(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(60.0), run)
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     os.kill(pids(run)["netem"], signal.SIGKILL)
     assert fleet.status(10.0) == 3
     assert re.search(

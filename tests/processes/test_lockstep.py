@@ -160,7 +160,7 @@ def test_an_agent_that_dies_ends_the_run_with_a_message(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = lockstep(start, scenario(3000.0), run, "--no-recording")
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     os.kill(pids(run)["agent-2"], signal.SIGKILL)
     assert fleet.status(15.0) == 1
     assert "agent-2 was killed by signal 9, " in summary_of(run)["reason"]
@@ -172,7 +172,7 @@ def test_a_medium_that_dies_ends_the_run_with_a_message(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = lockstep(start, scenario(3000.0), run, "--no-recording", "--shards", "2")
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     os.kill(pids(run)["netem-1"], signal.SIGKILL)
     assert fleet.status(15.0) == 1
     assert summary_of(run)["reason"] == "netem-1 was killed by signal 9"
@@ -185,7 +185,7 @@ def test_a_stalled_run_reports_once_what_it_waits_for(
     start: Start, scenario: Write, run: Path, stopped: str, awaited: str
 ) -> None:
     fleet = lockstep(start, scenario(3000.0), run, "--no-recording")
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     pid = pids(run)[stopped]
     os.kill(pid, signal.SIGSTOP)
     fleet.wait_for_output(f"stalled: waiting for {awaited}", within_s=10.0)
@@ -200,7 +200,7 @@ def test_a_stalled_run_reports_once_what_it_waits_for(
 
 def test_ctrl_c_ends_a_lockstep_run(start: Start, scenario: Write, run: Path) -> None:
     fleet = lockstep(start, scenario(3000.0), run, "--no-recording")
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     fleet.kill_group(signal.SIGINT)
     assert fleet.status(10.0) == 130, fleet.text
     assert summary_of(run)["outcome"] == "inconclusive"

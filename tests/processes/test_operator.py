@@ -113,7 +113,7 @@ def test_many_connections_and_sessions_do_not_lock_the_operator_out(
 ) -> None:
     run = tmp_path / "run"
     fleet = start(*QSWARM, "run", scenario(20.0), "--no-recording", "--out", str(run))
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     host, _, port = read_fleet(run).endpoint.removeprefix("tcp/").rpartition(":")
     held = [socket.create_connection((host, int(port))) for _ in range(150)]
     login = login_of(run / USERS, "agent-1")

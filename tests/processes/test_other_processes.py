@@ -57,7 +57,7 @@ def test_a_fleet_outlives_an_outage_of_netem(
     restart = "at_s = 7.5\nfor_s = 0.5\nkill = [3]"
     options = ("--no-recording", "--speed", "2")
     fleet = launched(start, with_event(11.0, jam, outage, loss, restart), run, *options)
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     before = pids(run)["netem"]
     assert fleet.status(30.0) in (0, 1), fleet.text
 
@@ -126,7 +126,7 @@ def test_a_killed_world_leaves_its_recording_to_judge(
 ) -> None:
     events = ["at_s = 3\nkill = ['world']"] if planned else []
     fleet = launched(start, with_event(60.0, *events), run)
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     started = pids(run)
     if not planned:
         eventually(lambda: time_s(fleet.text) > 2.5, 10.0)
@@ -189,7 +189,7 @@ def test_an_operator_kills_netem_and_it_comes_back(
     start: Start, scenario: Write, run: Path
 ) -> None:
     fleet = launched(start, scenario(60.0), run, "--no-recording")
-    fleet.wait_for_output("least separation")
+    fleet.wait_for_output("minimum separation")
     asked = start(*QSWARM, "fault", str(run), "kill", "netem", "--for", "0.5")
     assert asked.status(10.0) == 0, asked.text
     assert asked.text.splitlines()[0].endswith(

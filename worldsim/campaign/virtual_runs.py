@@ -2,13 +2,14 @@
 
 from collections import Counter
 from pathlib import Path
+from time import monotonic
 
 from netem.wire.shutdown import StopRequest, stop_requests
 from worldsim.campaign.pool import FailedFlightError, Job, simulate, sweep
 from worldsim.results.closing import Output
 from worldsim.results.exit_status import INTERRUPTED
 from worldsim.results.overall import FailedRun, Made, over_all
-from worldsim.results.progress_line import ProgressLine
+from worldsim.results.progress_line import ProgressLine, pace_text
 from worldsim.results.run_folder import (
     RunDirectoryError,
     RunWriteError,
@@ -29,13 +30,13 @@ def simulate_one(scenario: Scenario, out: Path | None, recording: bool, output: 
 
     Ctrl-C ends it early; the verdict on what was simulated is printed and kept all the same.
     """
-    line = ProgressLine(hidden=output.quiet)
+    line, began_s = ProgressLine(hidden=output.quiet), monotonic()
     with stop_requests() as stop:
         try:
             result = simulate(
                 Job(scenario, out, recording),
                 stop,
-                lambda time_s: line.update(f"{time_s:.1f} of {scenario.duration_s:g} s simulated"),
+                lambda time_s: line.update(_pace(time_s, scenario.duration_s, began_s)),
             )
         except (FailedFlightError, RunWriteError) as error:
             output.fail(_failed(scenario, error))
@@ -43,6 +44,10 @@ def simulate_one(scenario: Scenario, out: Path | None, recording: bool, output: 
     line.clear()
     status = output.conclude(result, recording)
     return INTERRUPTED if stop.requested else status
+
+
+def _pace(time_s: float, duration_s: float, began_s: float) -> str:
+    return pace_text(time_s, duration_s, time_s / max(monotonic() - began_s, 1e-9))
 
 
 def _failed(scenario: Scenario, error: FailedFlightError | RunWriteError) -> FailedRun:

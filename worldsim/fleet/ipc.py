@@ -12,6 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from worldsim.fleet.fork import ProcessExit
+from worldsim.results.progress_line import pace_text
 from worldsim.scenario.selectors import ProcessName
 
 MAX_MESSAGE_B = 64 * 1024
@@ -141,14 +142,20 @@ class Progress(Message, frozen=True):
     min_separation_m: float | None  # least separation so far [m]; None before the first tick
     late_fraction: float | None  # share of late ticks; None where there are none
     slowed_to: float | None = None  # speed of simulated time, while below the requested one
+    real_time_factor: float | None = None  # simulated seconds in a second of wall time so far
+    formation: str = ""  # that is asked for
+    faults: tuple[str, ...] = ()  # kinds of those in force, each once
 
     def __str__(self) -> str:
         separation = "-" if self.min_separation_m is None else f"{self.min_separation_m:.2f} m"
         late = "-" if self.late_fraction is None else f"{self.late_fraction:.1%}"
+        of = f"{self.formation}: " if self.formation else ""
         slowed = "" if self.slowed_to is None else f"   slowed to {self.slowed_to:.2f} x"
+        faults = f"   in force: {', '.join(self.faults)}" if self.faults else ""
         return (
-            f"{self.time_s:6.1f} of {self.duration_s:g} s   in place {self.in_place}/{self.agents}"
-            f"   least separation {separation}   late ticks {late}{slowed}"
+            f"{pace_text(self.time_s, self.duration_s, self.real_time_factor)}"
+            f"   {of}in place {self.in_place}/{self.agents}"
+            f"   minimum separation {separation}   late ticks {late}{slowed}{faults}"
         )
 
 

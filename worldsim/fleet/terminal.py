@@ -47,7 +47,7 @@ class Terminal:
             return
         if self._console.is_terminal:
             self._live.start()
-            self._live.update(Text(str(progress), no_wrap=True, overflow="ellipsis"), refresh=True)
+            self._live.update(Text(escaped(str(progress))), refresh=True)
         elif time.monotonic() >= self._print_at_s:
             self._print_at_s = time.monotonic() + PRINT_EVERY_S
             self.print(str(progress))

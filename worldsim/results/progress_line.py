@@ -12,6 +12,18 @@ LINE_EVERY_S = 0.2
 LOG_EVERY_S = 5.0
 
 
+def pace_text(time_s: float, duration_s: float, factor: float | None) -> str:
+    """Return how far a run is, such as "12.0 of 20 s, 2 s left, 4.01 x real time".
+
+    time_s, duration_s: so far, and in all [s; simulated time]; factor: simulated seconds in a
+    second of wall time, None where it is not known yet. What is left is wall time.
+    """
+    done = f"{time_s:.1f} of {duration_s:g} s"
+    if not factor:
+        return done
+    return f"{done}, {(duration_s - time_s) / factor:.0f} s left, {factor:.3g} x real time"
+
+
 class ProgressLine:
     """A line that is updated in place on a terminal, and printed now and then elsewhere.
 
