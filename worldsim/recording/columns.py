@@ -7,8 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
-from pyarrow.lib import Array, ListArray, field, list_
-from pyarrow.lib import array as arrow_array
 
 
 class Entity(NamedTuple):
@@ -72,24 +70,3 @@ class LineRateLimiter:
     def count(self, tick: int, lines: int) -> None:
         """Count the lines drawn at a tick; they delay the next tick that draws any."""
         self._next_tick = tick + max(1, round(lines * self._ticks_per_line))
-
-
-def number_column(component: str, rows: NDArray[Any]) -> rr.ComponentColumn:
-    """Return a component of qswarm's own as a column: numbers (T, ...), one row for each tick.
-
-    The numbers are given as an Arrow array, because rerun converts other types one by one.
-    """
-    values = arrow_array(rows.ravel())
-    lengths = [rows[0].size] * len(rows)
-    return rr.ComponentColumn(component, rr.AnyBatchValue(component, values), lengths=lengths)
-
-
-def line_strips(lines: NDArray[np.float64]) -> Array:
-    """Return lines of P points each (K, P, 3) [m; world frame] as rerun stores strips.
-
-    The strips are given as an Arrow array, because rerun converts other types one by one.
-    """
-    points = rr.components.Position3DBatch(lines.reshape(-1, 3)).as_arrow_array()
-    starts = arrow_array(np.arange(0, len(points) + 1, lines.shape[1], dtype=np.int32))
-    strip = list_(field("item", points.type, nullable=False))
-    return ListArray.from_arrays(starts, points, type=strip)

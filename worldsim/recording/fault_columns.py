@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from worldsim.judge.tick import Tick
 from worldsim.recording import layout, palette
 from worldsim.recording.columns import ColumnBlock
+from worldsim.recording.components import BOX_HALF_SIZES
 from worldsim.recording.situation import Situation
 from worldsim.truth.vehicle import Floats
 
@@ -53,8 +54,8 @@ class FaultColumns:
             sizes = [
                 np.where(situations[row].paused[:, None], 0.0, self._half_sizes) for row in rows
             ]
-            columns = rr.Boxes3D.columns(half_sizes=np.concatenate(sizes))
-            yield ColumnBlock.of_batches(layout.VEHICLES, rows, columns, len(self._half_sizes))
+            columns = [BOX_HALF_SIZES.rows(np.stack(sizes))]
+            yield ColumnBlock(layout.VEHICLES, rows, columns)
 
     def _jams(self, situations: Sequence[Situation]) -> Iterator[ColumnBlock]:
         keys = [repr(each.jams).encode() if each.jams else b"" for each in situations]

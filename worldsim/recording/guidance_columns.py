@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from math import cos, radians, sin
 
 import numpy as np
-import rerun as rr
 
 from agent.guidance.bobber import CastZone, bobber, cast_reach, cast_zone
 from agent.guidance.cone import cone_of
@@ -18,7 +17,8 @@ from netem.conditions import LinkModels
 from netem.wire.channels import LOCAL
 from worldsim.judge.tick import Tick
 from worldsim.recording import layout
-from worldsim.recording.columns import ColumnBlock, line_strips
+from worldsim.recording.columns import ColumnBlock
+from worldsim.recording.components import POINTS, STRIPS
 from worldsim.scenario.tables import Scenario
 from worldsim.truth.vehicle import Floats
 
@@ -54,14 +54,11 @@ class GuidanceColumns:
         drawn = [self._ways(ticks[row]) for row in rows]
         lengths = [len(each) for each in drawn]
         ways = np.array([way for each in drawn for way in each]).reshape(-1, 3, 3)
-        points = rr.Points3D.columns(positions=ways[:, 1])
-        yield ColumnBlock(layout.BOBBERS, rows, points.partition(lengths))
-        lines = rr.LineStrips3D.columns(strips=line_strips(ways))
-        yield ColumnBlock(layout.WAYS, rows, lines.partition(lengths))
+        yield ColumnBlock(layout.BOBBERS, rows, [POINTS.parts(ways[:, 1], lengths)])
+        yield ColumnBlock(layout.WAYS, rows, [STRIPS.parts(ways, lengths)])
         zones = [self._outlines(ticks[row]) for row in rows]
-        outlines = rr.LineStrips3D.columns(strips=line_strips(np.concatenate(zones)))
-        lengths = [len(each) for each in zones]
-        yield ColumnBlock(layout.CAST_ZONES, rows, outlines.partition(lengths))
+        outlines = STRIPS.parts(np.concatenate(zones), [len(each) for each in zones])
+        yield ColumnBlock(layout.CAST_ZONES, rows, [outlines])
 
     def _ways(self, tick: Tick) -> list[list[Vector]]:
         """Return a line of each agent with a target: vehicle, bobber, target (3, 3) [m]."""

@@ -14,12 +14,8 @@ from agent.messages import DISTRESS, MEMBER, ROLES, SUB_VERTEX, VERTEX
 from worldsim.judge.tick import NO_ROLE, HierarchyRows, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout, palette
-from worldsim.recording.columns import (
-    ChangeDetector,
-    ColumnBlock,
-    LineRateLimiter,
-    line_strips,
-)
+from worldsim.recording.columns import ChangeDetector, ColumnBlock, LineRateLimiter
+from worldsim.recording.components import SCALARS, STRIP_COLOURS, STRIPS
 from worldsim.recording.situation import DEAD, Situation
 from worldsim.truth.vehicle import Floats
 
@@ -137,11 +133,12 @@ class HierarchyColumns:
                 colours.append(palette.tier_colours(tiers))
                 self._line_rate.count(tick.index, len(ends))
         if rows:
-            columns = rr.LineStrips3D.columns(
-                strips=line_strips(np.concatenate(strips)), colors=np.concatenate(colours)
-            )
             lengths = [len(ends) for ends in strips]
-            yield ColumnBlock(layout.HIERARCHY, rows, columns.partition(lengths))
+            columns = [
+                STRIPS.parts(np.concatenate(strips), lengths),
+                STRIP_COLOURS.parts(np.concatenate(colours), lengths),
+            ]
+            yield ColumnBlock(layout.HIERARCHY, rows, columns)
 
     def _figures(
         self, ticks: Sequence[Tick], hierarchies: Sequence[HierarchyRows]
@@ -155,9 +152,7 @@ class HierarchyColumns:
             (layout.NEIGHBOURS, [_neighbour_counts(ticks[row]) for row in rows]),
             (layout.SAFETY_FILTER, [_filtered(ticks[row]) for row in rows]),
         ):
-            values = np.concatenate(series).astype(np.float64)
-            columns = rr.Scalars.columns(scalars=values)
-            yield ColumnBlock.of_batches(entity, rows, columns, len(self._names))
+            yield ColumnBlock(entity, rows, [SCALARS.rows(np.stack(series))])
 
     def _queue_residuals(
         self, ticks: Sequence[Tick], figures: Sequence[Figures]
@@ -168,8 +163,7 @@ class HierarchyColumns:
             residual = np.asarray(figures[row].queue_residual)[: self._queues]
             values[at, : len(residual)] = np.where(np.isfinite(residual), residual, np.nan)
         if rows and self._queues:
-            columns = rr.Scalars.columns(scalars=values.ravel())
-            yield ColumnBlock.of_batches(layout.QUEUE_RESIDUAL, rows, columns, self._queues)
+            yield ColumnBlock(layout.QUEUE_RESIDUAL, rows, [SCALARS.rows(values)])
 
     def _roles(self, hierarchies: Sequence[HierarchyRows]) -> Iterator[ColumnBlock]:
         """Yield each agent's role where it changed, for the first NAMED_MAX agents."""

@@ -6,18 +6,12 @@ The matrix has a row where it changed. Lines are drawn at as many ticks as their
 from collections.abc import Generator, Iterator, Mapping, Sequence
 
 import numpy as np
-import rerun as rr
 from numpy.typing import NDArray
 
 from worldsim.judge.tick import Tick
 from worldsim.recording import layout
-from worldsim.recording.columns import (
-    ChangeDetector,
-    ColumnBlock,
-    LineRateLimiter,
-    line_strips,
-    number_column,
-)
+from worldsim.recording.columns import ChangeDetector, ColumnBlock, LineRateLimiter
+from worldsim.recording.components import SCALARS, STRIPS, number_column
 from worldsim.recording.situation import Situation
 from worldsim.truth.vehicle import Floats
 
@@ -118,8 +112,7 @@ class LinkColumns:
                 [linked, *(len(lines) for lines in each.values())]
                 for linked, each in zip(heard, missing, strict=True)
             ]
-            columns = rr.Scalars.columns(scalars=np.array(counts, dtype=np.float64).ravel())
-            yield ColumnBlock.of_batches(layout.LINK_COUNTS, rows, columns, len(counts[0]))
+            yield ColumnBlock(layout.LINK_COUNTS, rows, [SCALARS.rows(np.array(counts))])
 
 
 def missing_links(tick: Tick, situation: Situation) -> Missing:
@@ -155,8 +148,8 @@ def missing_links(tick: Tick, situation: Situation) -> Missing:
 
 
 def _strips(entity: str, rows: Sequence[int], drawn: Sequence[Floats]) -> ColumnBlock:
-    columns = rr.LineStrips3D.columns(strips=line_strips(np.concatenate(drawn)))
-    return ColumnBlock(entity, rows, columns.partition([len(lines) for lines in drawn]))
+    lengths = [len(lines) for lines in drawn]
+    return ColumnBlock(entity, rows, [STRIPS.parts(np.concatenate(drawn), lengths)])
 
 
 def link_lines(tick: Tick) -> Floats:

@@ -13,6 +13,7 @@ from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout
 from worldsim.recording.columns import ColumnBlock
+from worldsim.recording.components import SCALARS
 from worldsim.recording.situation import Situation
 
 NO_FORMATION = "no formation"
@@ -81,7 +82,7 @@ class StateColumns:
         values = [self._lambda2_of(ticks[row]) for row in rows]
         if rows:
             found = np.array([np.nan if each is None else each for each in values])
-            yield ColumnBlock(layout.LAMBDA2, rows, rr.Scalars.columns(scalars=found))
+            yield ColumnBlock(layout.LAMBDA2, rows, [SCALARS.rows(found[:, None])])
 
     def _lambda2_of(self, tick: Tick) -> float | None:
         key = tick.links.tobytes() + tick.alive.tobytes()

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from worldsim.judge.tick import Tick
 from worldsim.recording import layout, palette
 from worldsim.recording.columns import ColumnBlock
+from worldsim.recording.components import SCALES, TRANSLATIONS
 from worldsim.truth.vehicle import Floats
 
 LEAST_RADIUS_M = 1.5
@@ -50,9 +51,8 @@ class TeamView:
         team = _team(ticks)
         centres = self._centres(team)
         radii_m = self._radii_m(ticks, team, centres)
-        columns = rr.Transform3D.columns(
-            translation=centres, scale=np.repeat(radii_m[:, None], 3, axis=1)
-        )
+        scales = np.repeat(radii_m[:, None, None], 3, axis=2)
+        columns = [TRANSLATIONS.rows(centres[:, None]), SCALES.rows(scales)]
         yield ColumnBlock(layout.TEAM, range(len(ticks)), columns)
         for row, (centre, radius_m) in enumerate(zip(centres, radii_m.tolist(), strict=True)):
             yield from self._ground(row, centre, radius_m)
@@ -106,7 +106,7 @@ class TeamView:
         if cell_m != self._cell_m:
             yield _grid(row, cell_m)
         self._cell_m, self._corner = cell_m, corner
-        columns = rr.Transform3D.columns(translation=[corner * cell_m])
+        columns = [TRANSLATIONS.rows((corner * cell_m)[None, None])]
         yield ColumnBlock(layout.GROUND, [row], columns)
 
 

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from worldsim.judge.tick import Float32s, Tick
 from worldsim.judge.verdict import Figures
-from worldsim.recording import layout, palette
+from worldsim.recording import components, layout, palette
 from worldsim.recording.agent_colours import AgentColours
-from worldsim.recording.columns import ChangeDetector, ColumnBlock, number_column
+from worldsim.recording.columns import ChangeDetector, ColumnBlock
+from worldsim.recording.components import number_column
 from worldsim.recording.link_columns import LinkColumns
 from worldsim.recording.situation import Situation
 from worldsim.truth.vehicle import Floats
@@ -68,16 +69,18 @@ class TickColumns:
 
     def _headings(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         """Yield an arrow ahead of each vehicle; of a large fleet, at some ticks only."""
-        agents, rows = len(ticks[0].alive), _sparse_rows(ticks)
+        rows = _sparse_rows(ticks)
         if rows:
-            yaw, pitch, _ = np.concatenate([ticks[row].attitude for row in rows]).T
+            attitude = np.stack([ticks[row].attitude for row in rows])
+            yaw, pitch = attitude[..., 0], attitude[..., 1]
             level = np.cos(pitch)
-            ahead = np.stack((level * np.cos(yaw), level * np.sin(yaw), np.sin(pitch)), axis=1)
-            columns = rr.Arrows3D.columns(
-                origins=np.concatenate([ticks[row].position for row in rows]),
-                vectors=ahead * np.tile(self._arrow_m, len(rows))[:, None],
-            )
-            yield ColumnBlock.of_batches(layout.HEADINGS, rows, columns, agents)
+            ahead = np.stack((level * np.cos(yaw), level * np.sin(yaw), np.sin(pitch)), axis=2)
+            origins = np.stack([ticks[row].position for row in rows])
+            columns = [
+                components.ARROW_ORIGINS.rows(origins),
+                components.ARROW_VECTORS.rows(ahead * self._arrow_m[:, None]),
+            ]
+            yield ColumnBlock(layout.HEADINGS, rows, columns)
 
     def _coloured_entities(
         self, ticks: Sequence[Tick], dead: Sequence[NDArray[np.bool_]]
@@ -86,11 +89,10 @@ class TickColumns:
         agents = colours.shape[1]
         yield from _trails(ticks, colours)
         rows = self._colour_changes.changed_rows(colours)
-        changed = colours[rows].ravel()
         if rows:
-            for entity, archetype in ((layout.VEHICLES, rr.Boxes3D), (layout.TARGETS, rr.Points3D)):
-                columns = archetype.columns(colors=changed)
-                yield ColumnBlock.of_batches(entity, rows, columns, agents)
+            changed = colours[rows]
+            yield ColumnBlock(layout.VEHICLES, rows, [components.BOX_COLOURS.rows(changed)])
+            yield ColumnBlock(layout.TARGETS, rows, [components.POINT_COLOURS.rows(changed)])
         series = self._colours.series()
         if self._series_changes.changed_rows(series[None]):
             latest = rr.SeriesLines.columns(colors=series).partition([agents])
@@ -113,16 +115,15 @@ class TickColumns:
             changed = detector.changed_rows(counts)
             if changed:
                 rows = [known[at] for at in changed]
-                columns = rr.Scalars.columns(scalars=counts[changed])
+                columns = [components.SCALARS.rows(counts[changed, None])]
                 yield ColumnBlock(layout.packet_entity(counter), rows, columns)
 
     def _reference_lines(self, last: int) -> Iterator[ColumnBlock]:
         """Yield the reference lines from the first to the last row of a block."""
         rows = sorted({0, last})
         for metric, values in self._limits.items():
-            columns = rr.Scalars.columns(scalars=values * len(rows))
-            entity = layout.limit_entity(metric)
-            yield ColumnBlock.of_batches(entity, rows, columns, len(values))
+            columns = [components.SCALARS.rows(np.array([values] * len(rows)))]
+            yield ColumnBlock(layout.limit_entity(metric), rows, columns)
 
 
 def _sparse_rows(ticks: Sequence[Tick]) -> list[int]:
@@ -135,28 +136,33 @@ def _trails(ticks: Sequence[Tick], colours: palette.Colours) -> Iterator[ColumnB
     """Yield positions, each with its colour: a trail shows the colour of each past position."""
     rows = _sparse_rows(ticks)
     if rows:
-        position = np.concatenate([ticks[row].position for row in rows])
-        columns = rr.Points3D.columns(positions=position, colors=colours[rows].ravel())
-        yield ColumnBlock.of_batches(layout.AGENTS, rows, columns, batch=len(ticks[0].alive))
+        position = np.stack([ticks[row].position for row in rows])
+        columns = [
+            components.POINTS.rows(position),
+            components.POINT_COLOURS.rows(colours[rows]),
+        ]
+        yield ColumnBlock(layout.AGENTS, rows, columns)
 
 
 def _poses(ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
-    rows, agents = range(len(ticks)), len(ticks[0].alive)
-    position = np.concatenate([tick.position for tick in ticks])
-    attitude = _quaternions(np.concatenate([tick.attitude for tick in ticks]))
-    target = np.concatenate([tick.target for tick in ticks])
-    boxes = rr.Boxes3D.columns(centers=position, quaternions=attitude)
-    yield ColumnBlock.of_batches(layout.VEHICLES, rows, boxes, agents)
-    targets = rr.Points3D.columns(positions=target)
-    yield ColumnBlock.of_batches(layout.TARGETS, rows, targets, agents)
+    rows = range(len(ticks))
+    attitude = _quaternions(np.stack([tick.attitude for tick in ticks]))
+    boxes = [
+        components.BOX_CENTRES.rows(np.stack([tick.position for tick in ticks])),
+        components.BOX_QUATERNIONS.rows(attitude),
+    ]
+    yield ColumnBlock(layout.VEHICLES, rows, boxes)
+    targets = [components.POINTS.rows(np.stack([tick.target for tick in ticks]))]
+    yield ColumnBlock(layout.TARGETS, rows, targets)
 
 
 def _quaternions(attitude: Float32s) -> Float32s:
-    """Return xyzw (K, 4) of yaw, pitch (nose up) and roll (right side down), in that order.
+    """Return xyzw (T, N, 4) of yaw, pitch (nose up) and roll (right side down), in that order.
 
-    attitude (K, 3) [rad].
+    attitude (T, N, 3) [rad].
     """
-    (sy, sp, sr), (cy, cp, cr) = np.sin(0.5 * attitude.T), np.cos(0.5 * attitude.T)
+    half = 0.5 * np.moveaxis(attitude, -1, 0)
+    (sy, sp, sr), (cy, cp, cr) = np.sin(half), np.cos(half)
     sp = -sp  # x is ahead, y left and z up: a negative turn about y raises the nose
     return np.stack(
         [
@@ -165,13 +171,13 @@ def _quaternions(attitude: Float32s) -> Float32s:
             sy * cp * cr - cy * sp * sr,
             cy * cp * cr + sy * sp * sr,
         ],
-        axis=1,
+        axis=2,
     ) + np.float32(0.0)  # no negative zeros: equal rows of a level fleet compress well
 
 
 def _metrics(ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
     """Yield agents' metrics; those that a reader cannot compute from the rest at every tick."""
-    every, sparse, agents = list(range(len(ticks))), _sparse_rows(ticks), len(ticks[0].alive)
+    every, sparse = list(range(len(ticks))), _sparse_rows(ticks)
     distance = [(row, figures[row].obstacle_distance) for row in sparse]
     near = {row: each for row, each in distance if each is not None}
     for entity, rows, values in (
@@ -182,8 +188,7 @@ def _metrics(ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[Colu
         (layout.OBSTACLE_DISTANCE, list(near), list(near.values())),
     ):
         if rows:
-            columns = rr.Scalars.columns(scalars=np.concatenate(values))
-            yield ColumnBlock.of_batches(entity, rows, columns, agents)
+            yield ColumnBlock(entity, rows, [components.SCALARS.rows(np.stack(values))])
 
 
 def _finite(values: Floats) -> Floats:
