@@ -65,7 +65,9 @@ def shown(chunks: list[Chunk], entity: str, component: str, time_s: float) -> li
         if chunk.entity_path == entity and not chunk.is_static and component in batch.schema.names:
             times = [each.total_seconds() for each in batch.column("sim_time").to_pylist()]
             rows += list(zip(times, batch.column(component).to_pylist(), strict=True))
-    before = [row for row in sorted(rows, key=lambda row: row[0]) if row[0] <= time_s + 1e-9]
+    # A null leaves what was shown before.
+    given = sorted((row for row in rows if row[1] is not None), key=lambda row: row[0])
+    before = [row for row in given if row[0] <= time_s + 1e-9]
     return before[-1][1] if before else []
 
 

@@ -8,6 +8,8 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from worldsim.recording.components import spread
+
 
 class Entity(NamedTuple):
     """What is logged under one entity path at one time, or as static data."""
@@ -30,6 +32,36 @@ class ColumnBlock:
     ) -> "ColumnBlock":
         """Return a block in which every row holds ``batch`` instances of each component."""
         return cls(entity, rows, columns.partition([batch] * len(rows)))
+
+
+def merged(blocks: Iterable[ColumnBlock]) -> list[ColumnBlock]:
+    """Return the same columns in as few blocks as can be: each costs much, whatever it holds.
+
+    Blocks of an entity become one where their components differ, with a row where any has one.
+    """
+    parts: dict[tuple[str, bool, int], list[ColumnBlock]] = {}
+    repeats: dict[tuple[str, str], int] = {}
+    for block in blocks:
+        columns = list(block.columns)
+        names = [str(column.component_descriptor()) for column in columns]
+        nth = max(repeats.get((block.entity, name), 0) for name in names)
+        repeats |= {(block.entity, name): nth + 1 for name in names}
+        part = ColumnBlock(block.entity, block.rows, columns)
+        parts.setdefault((block.entity, bool(block.rows), nth), []).append(part)
+    return [_as_one(some) for some in parts.values()]
+
+
+def _as_one(blocks: Sequence[ColumnBlock]) -> ColumnBlock:
+    """Return blocks of one entity, of different components, as one."""
+    rows = sorted({row for block in blocks for row in block.rows})
+    columns: list[rr.ComponentColumn] = []
+    for block in blocks:
+        if len(block.rows) == len(rows):
+            columns.extend(block.columns)
+        else:
+            at = np.searchsorted(rows, block.rows)
+            columns.extend(spread(column, at, len(rows)) for column in block.columns)
+    return ColumnBlock(blocks[0].entity, rows, columns)
 
 
 class ChangeDetector:

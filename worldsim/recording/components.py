@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
-from pyarrow.lib import Array, FixedSizeListArray, FixedSizeListType, ListArray
+from pyarrow.lib import Array, FixedSizeListArray, FixedSizeListType, ListArray, py_buffer
 from pyarrow.lib import array as arrow_array
 
 Offsets = NDArray[np.int32]
@@ -79,6 +79,21 @@ class StripType:
         return ArrowColumn(self._descriptor, rows)
 
 
+class TextType:
+    """A component whose instances are texts; example: columns of it."""
+
+    def __init__(self, example: rr.ComponentColumnList) -> None:
+        (column,) = example
+        self._descriptor = column.component_descriptor()
+        self._text = column.as_arrow_array().type.value_type
+
+    def rows(self, texts: Sequence[str], batch: int = 1) -> rr.ComponentColumn:
+        """Return a row for each ``batch`` of texts."""
+        offsets = np.arange(0, len(texts) + 1, batch, dtype=np.int32)
+        values = arrow_array(texts, type=self._text)
+        return ArrowColumn(self._descriptor, ListArray.from_arrays(arrow_array(offsets), values))
+
+
 def number_column(component: str, rows: NDArray[Any]) -> rr.ComponentColumn:
     """Return a component of qswarm's own as a column: numbers (T, ...), one row for each tick."""
     offsets = np.arange(len(rows) + 1, dtype=np.int32) * np.int32(rows[0].size)
@@ -86,7 +101,23 @@ def number_column(component: str, rows: NDArray[Any]) -> rr.ComponentColumn:
     return ArrowColumn(rr.ComponentDescriptor(component), numbers)
 
 
-def _offsets(lengths: Sequence[int]) -> Offsets:
+def spread(column: rr.ComponentColumn, at: NDArray[np.intp], rows: int) -> rr.ComponentColumn:
+    """Return a column with its rows at some of more rows, and none (null) at the others.
+
+    A null leaves what was shown before; an empty row would replace it.
+    """
+    filled = column.as_arrow_array()
+    lengths, valid = np.zeros(rows, dtype=np.int32), np.zeros(rows, dtype=np.bool_)
+    lengths[at], valid[at] = np.diff(filled.offsets.to_numpy()), True
+    # From buffers: with a mask, the constructor of lists imports all of Arrow's computing.
+    bits = py_buffer(np.packbits(valid, bitorder="little"))
+    sparse = ListArray.from_buffers(
+        filled.type, rows, [bits, py_buffer(_offsets(lengths))], children=[filled.values]
+    )
+    return ArrowColumn(column.component_descriptor(), sparse)
+
+
+def _offsets(lengths: Sequence[int] | Offsets) -> Offsets:
     offsets = np.zeros(len(lengths) + 1, dtype=np.int32)
     np.cumsum(lengths, out=offsets[1:])
     return offsets
@@ -111,3 +142,8 @@ STRIPS = StripType(rr.LineStrips3D.columns(strips=[[(0.0, 0.0, 0.0)] * 2]), POIN
 STRIP_COLOURS = NumberType(rr.LineStrips3D.columns(colors=_COLOUR))
 TRANSLATIONS = NumberType(rr.Transform3D.columns(translation=_POINT))
 SCALES = NumberType(rr.Transform3D.columns(scale=_POINT))
+
+BOX_LABELS = TextType(rr.Boxes3D.columns(labels=[""]))
+STATES = TextType(rr.StateChange.columns(state=[""]))
+LOG_TEXTS = TextType(rr.TextLog.columns(text=[""]))
+LOG_LEVELS = TextType(rr.TextLog.columns(level=[""]))

@@ -122,6 +122,9 @@ class FaultColumns:
         shown: Shown,
     ) -> dict[int, NDArray[np.intp]]:
         """Return the agents that an entity shows in the rows in which they, or they move."""
+        now = {id(each): each for each in situations}
+        if entity not in self._shown and not any(shown(each).any() for each in now.values()):
+            return {}
         agents = [
             np.flatnonzero(shown(each) & np.isfinite(tick.position).all(axis=1))
             for tick, each in zip(ticks, situations, strict=True)

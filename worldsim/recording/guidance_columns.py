@@ -22,7 +22,7 @@ from worldsim.recording.components import POINTS, STRIPS
 from worldsim.scenario.tables import Scenario
 from worldsim.truth.vehicle import Floats
 
-SAMPLES_HZ = 5.0
+SAMPLES_HZ = 2.0
 ARC_POINTS = 9
 RESTING_M = 1e-3
 """A vehicle so near to its target has no way to it."""

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-import rerun as rr
 from numpy.typing import NDArray
 
 from agent.messages import DISTRESS, MEMBER, ROLES, SUB_VERTEX, VERTEX
@@ -15,7 +14,7 @@ from worldsim.judge.tick import NO_ROLE, HierarchyRows, Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout, palette
 from worldsim.recording.columns import ChangeDetector, ColumnBlock, LineRateLimiter
-from worldsim.recording.components import SCALARS, STRIP_COLOURS, STRIPS
+from worldsim.recording.components import BOX_LABELS, SCALARS, STATES, STRIP_COLOURS, STRIPS
 from worldsim.recording.situation import DEAD, Situation
 from worldsim.truth.vehicle import Floats
 
@@ -71,18 +70,20 @@ class HierarchyColumns:
         self._role_changes = ChangeDetector()
 
     def blocks(
-        self,
-        ticks: Sequence[Tick],
-        figures: Sequence[Figures],
-        situations: Sequence[Situation],
+        self, ticks: Sequence[Tick], situations: Sequence[Situation]
     ) -> Iterator[ColumnBlock]:
         """Yield the columns of a block; blocks come in order."""
         yield from self._vehicle_labels(ticks, situations)
-        yield from self._queue_residuals(ticks, figures)
         hierarchies = [tick.hierarchy for tick in ticks if tick.hierarchy is not None]
         if len(hierarchies) == len(ticks):
             yield from self._parent_lines(ticks, hierarchies)
-            yield from self._figures(ticks, hierarchies)
+
+    def figures(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
+        """Yield agents' and queues' figures at the sampled ones of some ticks, and roles."""
+        yield from self._queue_residuals(ticks, figures)
+        yield from self._agent_figures(ticks)
+        hierarchies = [tick.hierarchy for tick in ticks if tick.hierarchy is not None]
+        if len(hierarchies) == len(ticks):
             yield from self._roles(hierarchies)
 
     def _vehicle_labels(
@@ -92,24 +93,30 @@ class HierarchyColumns:
 
         Large fleets show a label only under the mouse pointer, so one row for each block is enough.
         """
-        pairs = zip(ticks, situations, strict=True)
-        keys = np.stack([self._label_keys(tick, each) for tick, each in pairs])
+        keys = self._label_keys(ticks, situations)
         rows = self._label_changes.changed_rows(keys)
         if len(self._names) > layout.NAMED_MAX:
             rows = rows[-1:]
         if rows:
             labels = [label for row in rows for label in self._labels(keys[row])]
-            columns = rr.Boxes3D.columns(labels=labels)
-            yield ColumnBlock.of_batches(layout.VEHICLES, rows, columns, len(self._names))
+            columns = [BOX_LABELS.rows(labels, len(self._names))]
+            yield ColumnBlock(layout.VEHICLES, rows, columns)
 
-    def _label_keys(self, tick: Tick, situation: Situation) -> NDArray[np.int16]:
-        """Return role, tier and note (N, 3), which a label is made of; -1 where unknown."""
-        numbers = [self._notes.setdefault(note, len(self._notes)) for note in situation.notes]
-        note = np.array(numbers, dtype=np.int16)
-        if tick.hierarchy is None:
-            unknown = np.full(len(note), -1, dtype=np.int16)
-            return np.stack((unknown, unknown, note), axis=1)
-        return np.stack((tick.hierarchy.role, tick.hierarchy.tier, note), axis=1).astype(np.int16)
+    def _label_keys(
+        self, ticks: Sequence[Tick], situations: Sequence[Situation]
+    ) -> NDArray[np.int16]:
+        """Return role, tier and note (T, N, 3), which labels are made of; -1 where unknown."""
+        keys = np.full((len(ticks), len(self._names), 3), -1, dtype=np.int16)
+        noted: Situation | None = None
+        for row, tick, situation in zip(keys, ticks, situations, strict=True):
+            if situation is not noted:
+                noted = situation
+                notes = [self._notes.setdefault(note, len(self._notes)) for note in noted.notes]
+                numbers = np.array(notes, dtype=np.int16)
+            row[:, 2] = numbers
+            if tick.hierarchy is not None:
+                row[:, 0], row[:, 1] = tick.hierarchy.role, tick.hierarchy.tier
+        return keys
 
     def _labels(self, keys: NDArray[np.int16]) -> list[str]:
         """Return a label for each vehicle; the cross of a dead one has its own."""
@@ -140,15 +147,15 @@ class HierarchyColumns:
             ]
             yield ColumnBlock(layout.HIERARCHY, rows, columns)
 
-    def _figures(
-        self, ticks: Sequence[Tick], hierarchies: Sequence[HierarchyRows]
-    ) -> Iterator[ColumnBlock]:
-        rows = self._sampled_rows(ticks)
+    def _agent_figures(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
+        known = {row: ticks[row].hierarchy for row in self._sampled_rows(ticks)}
+        hierarchies = {row: each for row, each in known.items() if each is not None}
+        rows = list(hierarchies)
         if not rows:
             return
         for entity, series in (
-            (layout.TIER, [_tiers(hierarchies[row]) for row in rows]),
-            (layout.RECORD_AGE, [hierarchies[row].record_age_s for row in rows]),
+            (layout.TIER, [_tiers(each) for each in hierarchies.values()]),
+            (layout.RECORD_AGE, [each.record_age_s for each in hierarchies.values()]),
             (layout.NEIGHBOURS, [_neighbour_counts(ticks[row]) for row in rows]),
             (layout.SAFETY_FILTER, [_filtered(ticks[row]) for row in rows]),
         ):
@@ -172,8 +179,7 @@ class HierarchyColumns:
         for agent in map(int, np.flatnonzero(changed.any(axis=0))):
             rows = [int(row) for row in np.flatnonzero(changed[:, agent])]
             names = [role_name(int(role)) for role in roles[rows, agent]]
-            columns = rr.StateChange.columns(state=names)
-            yield ColumnBlock(layout.role_entity(agent), rows, columns)
+            yield ColumnBlock(layout.role_entity(agent), rows, [STATES.rows(names)])
 
     def _sampled_rows(self, ticks: Sequence[Tick]) -> list[int]:
         return [row for row, tick in enumerate(ticks) if tick.index % self._ticks_per_sample == 0]

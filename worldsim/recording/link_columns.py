@@ -4,6 +4,7 @@ The matrix has a row where it changed. Lines are drawn at as many ticks as their
 """
 
 from collections.abc import Generator, Iterator, Mapping, Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,10 @@ MISSING_EVERY_S = (0.2, 5.0)
 
 Missing = dict[str, Floats]
 """Lines (K, 2, 3) [m; world frame] by entity."""
-PairCodes = NDArray[np.int64]
-"""Pairs (hearer, heard) of N agents, each coded as hearer * N + heard."""
+Matrices = NDArray[np.bool_]
+"""For each tick, who hears whom (T, N * N)."""
+Pairs = tuple[NDArray[np.intp], NDArray[np.intp]]
+"""The lower and the higher agent of each pair."""
 
 
 class LinkColumns:
@@ -45,31 +48,38 @@ class LinkColumns:
         self, ticks: Sequence[Tick], situations: Sequence[Situation]
     ) -> Iterator[ColumnBlock]:
         """Yield the columns of a block; blocks come in order."""
-        yield from self._matrix(ticks)
-        heard = yield from self._lines(ticks)
+        hears = _hears(ticks)
+        yield from self._matrix(hears)
+        heard = yield from self._lines(ticks, hears)
         yield from self._verdicts(ticks, situations, heard)
 
-    def _matrix(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
-        hears = np.zeros((len(ticks), len(ticks[0].alive) ** 2), dtype=np.bool_)
-        for row, tick in zip(hears, ticks, strict=True):
-            row[_pair_codes(tick)] = True
+    def _matrix(self, hears: Matrices) -> Iterator[ColumnBlock]:
         # As bits: 5 kB for 200 agents, where pairs of numbers take 20.
         bits = np.packbits(hears, axis=1)
         rows = self._matrix_changes.changed_rows(bits)
         if rows:
             yield ColumnBlock(layout.LINK_STATE, rows, [number_column(layout.HEARS, bits[rows])])
 
-    def _lines(self, ticks: Sequence[Tick]) -> Generator[ColumnBlock, None, dict[int, int]]:
-        """Yield the lines of links; return how many are drawn in which rows."""
-        rows, drawn = [], []
-        for row, tick in enumerate(ticks):
+    def _lines(
+        self, ticks: Sequence[Tick], hears: Matrices
+    ) -> Generator[ColumnBlock, None, dict[int, int]]:
+        """Yield a line for each pair of which one hears the other; return how many in which rows.
+
+        Of more than LINES_MAX, the shortest are drawn.
+        """
+        agents = len(ticks[0].alive)
+        one, other = _pairs(agents)
+        there, back = one * agents + other, other * agents + one
+        drawn: dict[int, Floats] = {}
+        for row, (tick, heard) in enumerate(zip(ticks, hears, strict=True)):
             if self._line_rate.allows(tick.index):
-                rows.append(row)
-                drawn.append(link_lines(tick))
-                self._line_rate.count(tick.index, len(drawn[-1]))
-        if rows:
-            yield _strips(layout.LINKS, rows, drawn)
-        return dict(zip(rows, map(len, drawn), strict=True))
+                linked = np.flatnonzero(heard[there] | heard[back])
+                ends = tick.position[np.stack((one[linked], other[linked]), axis=1)]
+                drawn[row] = _shortest(ends)
+                self._line_rate.count(tick.index, len(drawn[row]))
+        if drawn:
+            yield _strips(layout.LINKS, list(drawn), list(drawn.values()))
+        return {row: len(lines) for row, lines in drawn.items()}
 
     def _verdicts(
         self,
@@ -123,28 +133,25 @@ def missing_links(tick: Tick, situation: Situation) -> Missing:
     LINES_MAX, the shortest are kept; of large fleets, none out of range.
     """
     agents = len(tick.alive)
-    heard = np.zeros((agents, agents), dtype=np.bool_)  # from row to column
-    hearer, source = np.divmod(_pair_codes(tick), agents)
-    heard[source, hearer] = True
-    unheard = ~heard & tick.alive[:, None] & tick.alive
-    np.fill_diagonal(unheard, val=False)
-    one, other = np.nonzero(np.triu(unheard | unheard.T))
-    distance = np.full((agents, agents), np.nan)
-    away = np.linalg.norm(tick.position[one] - tick.position[other], axis=1)
-    distance[one, other] = distance[other, one] = away
-    near = situation.radio.in_range(distance) & unheard
-    cut = near & situation.radio.cut(tick)
-    found = {}
-    for entity, links in (
-        (layout.LINKS_CUT, cut),
-        (layout.LINKS_LOST, near & ~(cut | cut.T)),
-        (layout.LINKS_OUT_OF_RANGE, unheard & ~(near | near.T)),
-    ):
-        pairs = np.argwhere(np.triu(links | links.T))
-        if entity == layout.LINKS_OUT_OF_RANGE and agents > layout.NAMED_MAX:
-            pairs = pairs[:0]
-        found[entity] = _shortest(tick.position[pairs])
-    return found
+    one, other = _pairs(agents)
+    hears, cut = _hears([tick])[0], situation.radio.cut(tick)
+    apart = tick.alive[one] & tick.alive[other]
+    apart &= ~(hears[one * agents + other] & hears[other * agents + one])
+    one, other = one[apart], other[apart]
+    ends = np.stack((tick.position[one], tick.position[other]), axis=1)
+    away = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    near, cuts = np.zeros((2, len(one)), dtype=np.bool_)
+    for source, hearer in ((one, other), (other, one)):
+        unheard = ~hears[hearer * agents + source]
+        unheard &= situation.radio.in_range(away, source, hearer)
+        near |= unheard
+        cuts |= unheard & cut[source, hearer]
+    far = ~near if agents <= layout.NAMED_MAX else np.zeros_like(near)
+    return {
+        layout.LINKS_CUT: _shortest(ends[cuts]),
+        layout.LINKS_LOST: _shortest(ends[near & ~cuts]),
+        layout.LINKS_OUT_OF_RANGE: _shortest(ends[far]),
+    }
 
 
 def _strips(entity: str, rows: Sequence[int], drawn: Sequence[Floats]) -> ColumnBlock:
@@ -152,34 +159,33 @@ def _strips(entity: str, rows: Sequence[int], drawn: Sequence[Floats]) -> Column
     return ColumnBlock(entity, rows, [STRIPS.parts(np.concatenate(drawn), lengths)])
 
 
-def link_lines(tick: Tick) -> Floats:
-    """Return a line (K, 2, 3) [m; world frame] for each pair of agents with a link.
-
-    A pair has one line, whether one or both hear the other. Of more than LINES_MAX, the shortest
-    are kept.
-    """
-    agents = len(tick.alive)
-    hearer, heard = np.divmod(_pair_codes(tick), agents)
-    low, high = np.minimum(hearer, heard), np.maximum(hearer, heard)
-    pairs = np.unique((low * agents + high)[low < high])
-    ends: Floats = tick.position[np.stack(np.divmod(pairs, agents), axis=1)]
-    return _shortest(ends)
-
-
 def _shortest(ends: Floats) -> Floats:
     """Return the LINES_MAX shortest of lines (K, 2, 3), of those between vehicles in the world."""
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    along = ends[:, 1] - ends[:, 0]
+    square = np.einsum("ij,ij->i", along, along)
     if len(ends) > LINES_MAX:
-        shortest = np.sort(np.argsort(length, kind="stable")[:LINES_MAX])
-        ends, length = ends[shortest], length[shortest]
-    in_world: Floats = ends[np.isfinite(length)]
+        shortest = np.sort(np.argpartition(square, LINES_MAX)[:LINES_MAX])
+        ends, square = ends[shortest], square[shortest]
+    in_world: Floats = ends[np.isfinite(square)]
     return in_world
 
 
-def _pair_codes(tick: Tick) -> PairCodes:
-    """Return the links between agents that exist; telemetry may name agents that do not."""
-    agents = len(tick.alive)
-    hearer, heard = tick.links.T.astype(np.int64)
+@cache
+def _pairs(agents: int) -> Pairs:
+    """Return all pairs of agents."""
+    return np.triu_indices(agents, 1)
+
+
+def _hears(ticks: Sequence[Tick]) -> Matrices:
+    """Return who hears whom (T, N * N), from hearer to heard, row by row.
+
+    Telemetry may name agents that do not exist; their links are left out.
+    """
+    agents = len(ticks[0].alive)
+    hears = np.zeros((len(ticks), agents * agents), dtype=np.bool_)
+    links = np.concatenate([tick.links for tick in ticks])
+    row = np.repeat(np.arange(len(ticks)), [len(tick.links) for tick in ticks])
+    hearer, heard = links.T.astype(np.int64)
     exist = (hearer >= 0) & (hearer < agents) & (heard >= 0) & (heard < agents)
-    codes: PairCodes = (hearer * agents + heard)[exist]
-    return codes
+    hears[row[exist], hearer[exist] * agents + heard[exist]] = True
+    return hears

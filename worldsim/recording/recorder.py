@@ -2,6 +2,7 @@
 
 Ticks are collected and sent once per second of simulated time, one block for each entity. That
 costs a tenth of sending them one by one, and loses at most that second when the process is killed.
+Figures and drawings at a lower rate, which only viewers need, are sent every DETAIL_BLOCKS seconds.
 """
 
 import json
@@ -31,7 +32,8 @@ from worldsim.judge.verdict import Figures
 from worldsim.recording import layout
 from worldsim.recording.agent_colours import AgentColours
 from worldsim.recording.blueprint import blueprint_of
-from worldsim.recording.columns import ColumnBlock, Entity
+from worldsim.recording.columns import ColumnBlock, Entity, merged
+from worldsim.recording.components import LOG_LEVELS, LOG_TEXTS
 from worldsim.recording.fault_columns import FaultColumns
 from worldsim.recording.formation_entities import FormationEntities
 from worldsim.recording.guidance_columns import GuidanceColumns
@@ -63,6 +65,8 @@ from worldsim.truth.obstacles import Obstacles
 
 APPLICATION = "qswarm"
 BLOCK_S = 1.0
+DETAIL_BLOCKS = 4
+"""Whatever it holds, a block of an entity costs as much as a hundred numbers, or more."""
 FLUSH_TIMEOUT_S = 5.0
 EVENT_TIME_SLACK_S = 1e-6
 """Event times are rounded to the microsecond."""
@@ -115,6 +119,9 @@ class RunRecorder:
         self._guidance = GuidanceColumns(scenario) if forms else None
         self._team_view = TeamView(1.0 / tick_hz)
         self._ticks_per_block = max(1, round(tick_hz * BLOCK_S))
+        self._blocks_sent = 0
+        self._seen: list[tuple[Tick, Figures]] = []
+        """The ticks whose detail is yet to be sent."""
         self._ticks: list[Tick] = []
         self._figures: list[Figures] = []
         self._events: list[RunEvent] = []
@@ -151,6 +158,7 @@ class RunRecorder:
         found: what the run showed of each expectation; none where it was not judged to its end.
         """
         self._attempt(self._send_block)
+        self._attempt(self._send_detail)
         if found:
             self._attempt(self._log_verdict, verdict(found))
         # Also after a failure: what was recorded before it is then a complete file.
@@ -207,26 +215,44 @@ class RunRecorder:
             self._colours.begin_phase(self._formation_of(event.tables), event.mission)
             self._state_columns.begin_phase(event.formation)
         if self._ticks:
-            times = _BlockTimes(self._ticks)
-            # All blocks are made before any is sent, so that a failure leaves no partial second.
-            for block in tuple(self._blocks()):
-                at = times.columns(block.rows)
-                rr.send_columns(block.entity, at, block.columns, recording=self._stream)
+            self._send(self._ticks, self._blocks())
+            self._seen.extend(zip(self._ticks, self._figures, strict=True))
         self._log_formation()
         if self._events:
             self._send_events()
+        self._blocks_sent += 1
+        if self._blocks_sent % DETAIL_BLOCKS == 0:
+            self._send_detail()
         self._flush()
+
+    def _send(self, ticks: Sequence[Tick], blocks: Iterator[ColumnBlock]) -> None:
+        times = _BlockTimes(ticks)
+        # All blocks are made before any is sent, so that a failure leaves no partial second.
+        for block in merged(blocks):
+            at = times.columns(block.rows)
+            rr.send_columns(block.entity, at, block.columns, recording=self._stream)
+
+    def _send_detail(self) -> None:
+        if self._seen:
+            ticks = [tick for tick, _ in self._seen]
+            self._send(ticks, self._detail(ticks, [figures for _, figures in self._seen]))
+            self._seen = []
+
+    def _detail(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
+        yield from self._tick_columns.steady(len(ticks) - 1)
+        yield from self._hierarchy_columns.figures(ticks, figures)
+        yield from self._state_columns.connectivity(ticks)
+        if self._guidance is not None:
+            yield from self._guidance.blocks(ticks)
 
     def _blocks(self) -> Iterator[ColumnBlock]:
         situations = [self._situations.at(tick) for tick in self._ticks]
         yield from self._tick_columns.blocks(self._ticks, self._figures, situations)
-        yield from self._hierarchy_columns.blocks(self._ticks, self._figures, situations)
+        yield from self._hierarchy_columns.blocks(self._ticks, situations)
         yield from self._state_columns.blocks(self._ticks, self._figures, situations)
         yield from self._fault_columns.blocks(self._ticks, situations)
         yield from self._obstacles.blocks(self._ticks)
         yield from self._team_view.blocks(self._ticks)
-        if self._guidance is not None:
-            yield from self._guidance.blocks(self._ticks)
 
     def _log_formation(self) -> None:
         """Log the formation's changes and the frame's motion, in the order of time."""
@@ -264,9 +290,10 @@ class RunRecorder:
                 yield Entity(layout.panel_entity(question), _document(text))
 
     def _log_at(self, time_s: float, tick: int, entities: Iterator[Entity]) -> None:
-        self._stream.set_time(layout.SIM_TIME, duration=time_s)
-        self._stream.set_time(layout.TICK, sequence=tick)
-        for entity in entities:
+        for at, entity in enumerate(entities):
+            if at == 0:
+                self._stream.set_time(layout.SIM_TIME, duration=time_s)
+                self._stream.set_time(layout.TICK, sequence=tick)
             self._stream.log(entity.path, entity.archetype)
 
     def _send_events(self) -> None:
@@ -274,7 +301,8 @@ class RunRecorder:
         texts = [self._text(event) for event in self._events]
         levels = [_level(event) for event in self._events]
         columns = [
-            *rr.TextLog.columns(text=texts, level=levels),
+            LOG_TEXTS.rows(texts),
+            LOG_LEVELS.rows(levels),
             *rr.AnyValues.columns(event=[json.dumps(as_row(event)) for event in self._events]),
         ]
         at = _time_columns(times_s, [self._tick_at(time_s) for time_s in times_s])

@@ -92,12 +92,14 @@ class RadioRules:
         """What else is wrong with the radio, in words."""
         return self._faults
 
-    def in_range(self, distance: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return which links are within their range (N, N), from row to column.
-
-        distance (N, N) [m]; not so where it is NaN.
-        """
-        within: NDArray[np.bool_] = distance <= self._reach_m
+    def in_range(
+        self,
+        distance: NDArray[np.float64],
+        source: NDArray[np.intp],
+        hearer: NDArray[np.intp],
+    ) -> NDArray[np.bool_]:
+        """Return which links (K,) are within their range; distance (K,) [m], not so for NaN."""
+        within: NDArray[np.bool_] = distance <= self._reach_m[source, hearer]
         return within
 
     def cut(self, tick: Tick) -> NDArray[np.bool_]:

@@ -6,14 +6,13 @@ Each has a row where its state changes.
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-import rerun as rr
 
 from worldsim.judge.network_strength import algebraic_connectivity
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout
 from worldsim.recording.columns import ColumnBlock
-from worldsim.recording.components import SCALARS
+from worldsim.recording.components import SCALARS, STATES
 from worldsim.recording.situation import Situation
 
 NO_FORMATION = "no formation"
@@ -52,8 +51,6 @@ class StateColumns:
         yield from self._states(layout.RADIO_CONDITION, [_radio(each) for each in situations])
         for agent in range(self._named):
             yield from self._conditions(agent, situations)
-        if self._small:
-            yield from self._connectivity(ticks)
 
     def _phase(self, tick: Tick, figures: Figures) -> str:
         if not (tick.place >= 0).any():
@@ -67,8 +64,7 @@ class StateColumns:
                 self._shown[entity] = state
                 rows.append(row)
         if rows:
-            columns = rr.StateChange.columns(state=[states[row] for row in rows])
-            yield ColumnBlock(entity, rows, columns)
+            yield ColumnBlock(entity, rows, [STATES.rows([states[row] for row in rows])])
 
     def _conditions(self, agent: int, situations: Sequence[Situation]) -> Iterator[ColumnBlock]:
         """Yield what is wrong with an agent, from the first time that anything is."""
@@ -76,9 +72,13 @@ class StateColumns:
         if entity in self._shown or any(states):
             yield from self._states(entity, [state or RUNNING for state in states])
 
-    def _connectivity(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
-        """Yield lambda_2 of the running agents, of which two are linked if each hears the other."""
-        rows = [row for row, tick in enumerate(ticks) if tick.index % self._ticks_per_sample == 0]
+    def connectivity(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
+        """Yield lambda_2 of the running agents, of which two are linked if each hears the other.
+
+        At the sampled ones of some ticks; of small fleets only.
+        """
+        sampled = self._ticks_per_sample
+        rows = [row for row, tick in enumerate(ticks) if self._small and tick.index % sampled == 0]
         values = [self._lambda2_of(ticks[row]) for row in rows]
         if rows:
             found = np.array([np.nan if each is None else each for each in values])

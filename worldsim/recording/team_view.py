@@ -45,6 +45,7 @@ class TeamView:
         self._radius_m = LEAST_RADIUS_M
         self._cell_m = 0.0
         self._corner: NDArray[np.int64] | None = None
+        """Of the ground's middle, in cells; None before the first tick."""
 
     def blocks(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         """Yield the view's transforms and the ground of a block of ticks; blocks come in order."""
@@ -54,8 +55,17 @@ class TeamView:
         scales = np.repeat(radii_m[:, None, None], 3, axis=2)
         columns = [TRANSLATIONS.rows(centres[:, None]), SCALES.rows(scales)]
         yield ColumnBlock(layout.TEAM, range(len(ticks)), columns)
+        rows, places = [], []
         for row, (centre, radius_m) in enumerate(zip(centres, radii_m.tolist(), strict=True)):
-            yield from self._ground(row, centre, radius_m)
+            cell_m = self._cell_m
+            place = self._ground(centre, radius_m)
+            if place is not None:
+                rows.append(row)
+                places.append(place)
+            if self._cell_m != cell_m:
+                yield _grid(row, self._cell_m)
+        if rows:
+            yield ColumnBlock(layout.GROUND, rows, [TRANSLATIONS.rows(np.array(places)[:, None])])
 
     def _centres(self, team: Floats) -> Floats:
         """Return the view's centre at each tick (T, 3) [m; world frame]."""
@@ -86,10 +96,8 @@ class TeamView:
             radii_m[row] = self._radius_m
         return radii_m
 
-    def _ground(
-        self, row: int, centre: NDArray[np.float64], radius_m: float
-    ) -> Iterator[ColumnBlock]:
-        """Yield the grid where its cells change, and its place where that is another cell."""
+    def _ground(self, centre: NDArray[np.float64], radius_m: float) -> Floats | None:
+        """Return where the ground is now (3,) [m; world frame]; None where nothing changes."""
         cell_m = self._cell_m
         if not CELL * radius_m <= cell_m <= 2.6 * CELL * radius_m:
             cell_m = _round_length(CELL * radius_m)
@@ -102,12 +110,10 @@ class TeamView:
             # The height is kept for a cell more, lest the ground jumps with every breath.
             corner[2] = last[2] if 0 <= height / cell_m - last[2] + 1.0 <= 3.0 else corner[2]
             if (corner == last).all():
-                return
-        if cell_m != self._cell_m:
-            yield _grid(row, cell_m)
+                return None
         self._cell_m, self._corner = cell_m, corner
-        columns = [TRANSLATIONS.rows((corner * cell_m)[None, None])]
-        yield ColumnBlock(layout.GROUND, [row], columns)
+        place: Floats = corner.astype(np.float64) * cell_m
+        return place
 
 
 def _team(ticks: Sequence[Tick]) -> Floats:

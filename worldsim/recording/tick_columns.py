@@ -22,8 +22,8 @@ from worldsim.truth.vehicle import Floats
 
 ARROW_RADII = 2.6
 """Length of the arrow that shows a vehicle's heading [radii of the vehicle]."""
-SPARSE_TICKS = 4
-"""What only viewers need of a large fleet is recorded at one tick of so many."""
+SPARSE_TICKS, POSE_TICKS = 4, 2
+"""What only viewers need of a large fleet is recorded at one tick of so many; and their poses."""
 
 
 class TickColumns:
@@ -65,7 +65,15 @@ class TickColumns:
         yield from self._coloured_entities(ticks, [each.dead for each in situations])
         yield from self._links.blocks(ticks, situations)
         yield from self._packets(ticks)
-        yield from self._reference_lines(len(ticks) - 1)
+
+    def steady(self, last: int) -> Iterator[ColumnBlock]:
+        """Yield what hardly changes, from the first to the last row of some ticks."""
+        yield from self._reference_lines(last)
+        series = self._colours.series()
+        if self._series_changes.changed_rows(series[None]):
+            latest = rr.SeriesLines.columns(colors=series).partition([len(series)])
+            for entity in self._agent_metrics:
+                yield ColumnBlock(entity, (), latest)
 
     def _headings(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         """Yield an arrow ahead of each vehicle; of a large fleet, at some ticks only."""
@@ -86,18 +94,12 @@ class TickColumns:
         self, ticks: Sequence[Tick], dead: Sequence[NDArray[np.bool_]]
     ) -> Iterator[ColumnBlock]:
         colours = self._colours.vehicles(ticks, dead)
-        agents = colours.shape[1]
         yield from _trails(ticks, colours)
         rows = self._colour_changes.changed_rows(colours)
         if rows:
             changed = colours[rows]
             yield ColumnBlock(layout.VEHICLES, rows, [components.BOX_COLOURS.rows(changed)])
             yield ColumnBlock(layout.TARGETS, rows, [components.POINT_COLOURS.rows(changed)])
-        series = self._colours.series()
-        if self._series_changes.changed_rows(series[None]):
-            latest = rr.SeriesLines.columns(colors=series).partition([agents])
-            for entity in self._agent_metrics:
-                yield ColumnBlock(entity, (), latest)
 
     def _missions(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         series = np.stack([tick.mission for tick in ticks])
@@ -119,16 +121,19 @@ class TickColumns:
                 yield ColumnBlock(layout.packet_entity(counter), rows, columns)
 
     def _reference_lines(self, last: int) -> Iterator[ColumnBlock]:
-        """Yield the reference lines from the first to the last row of a block."""
+        """Yield the reference lines from the first to the last row."""
         rows = sorted({0, last})
         for metric, values in self._limits.items():
             columns = [components.SCALARS.rows(np.array([values] * len(rows)))]
             yield ColumnBlock(layout.limit_entity(metric), rows, columns)
 
 
-def _sparse_rows(ticks: Sequence[Tick]) -> list[int]:
-    """Return the rows of a block at which what only viewers need is recorded."""
-    step = 1 if len(ticks[0].alive) <= layout.NAMED_MAX else SPARSE_TICKS
+def _sparse_rows(ticks: Sequence[Tick], of_large: int = SPARSE_TICKS) -> list[int]:
+    """Return the rows of a block at which what only viewers need is recorded.
+
+    Of a large fleet it is one tick of so many.
+    """
+    step = 1 if len(ticks[0].alive) <= layout.NAMED_MAX else of_large
     return [row for row, tick in enumerate(ticks) if tick.index % step == 0]
 
 
@@ -145,15 +150,16 @@ def _trails(ticks: Sequence[Tick], colours: palette.Colours) -> Iterator[ColumnB
 
 
 def _poses(ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
-    rows = range(len(ticks))
-    attitude = _quaternions(np.stack([tick.attitude for tick in ticks]))
-    boxes = [
-        components.BOX_CENTRES.rows(np.stack([tick.position for tick in ticks])),
-        components.BOX_QUATERNIONS.rows(attitude),
-    ]
-    yield ColumnBlock(layout.VEHICLES, rows, boxes)
+    rows = _sparse_rows(ticks, POSE_TICKS)
+    if rows:
+        attitude = _quaternions(np.stack([ticks[row].attitude for row in rows]))
+        boxes = [
+            components.BOX_CENTRES.rows(np.stack([ticks[row].position for row in rows])),
+            components.BOX_QUATERNIONS.rows(attitude),
+        ]
+        yield ColumnBlock(layout.VEHICLES, rows, boxes)
     targets = [components.POINTS.rows(np.stack([tick.target for tick in ticks]))]
-    yield ColumnBlock(layout.TARGETS, rows, targets)
+    yield ColumnBlock(layout.TARGETS, range(len(ticks)), targets)
 
 
 def _quaternions(attitude: Float32s) -> Float32s:
