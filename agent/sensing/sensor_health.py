@@ -26,8 +26,9 @@ NEAR_M: Final = 1.2
 FRESH_S: Final = 0.5
 SLACK_M: Final = 0.3
 LOOKS: Final = 3
-"""So many looks in a row that miss a neighbour make the sensors distrusted; so many that find one
-make them trusted again. Neighbours that have flown away prove nothing."""
+"""So many looks in a row that miss a near neighbour make the sensors distrusted; so many that find
+one, however far, make them trusted again: an agent that stands still is not where its team is.
+Neighbours that have flown away prove nothing."""
 NO_READING: tuple[object, ...] = ((), (), ())
 
 
@@ -85,7 +86,9 @@ class SensorHealth:
             fresh = any(self._missed_s.get(other) != stamp_s for other, stamp_s in missed.items())
             self._missed, self._met = self._missed + fresh, 0
             self._blind = self._blind or self._missed >= LOOKS
-        elif any(missed is False for _, missed in looks):
+        elif any(missed is False for _, missed in looks) or (
+            self._blind and any(self._is_missed(observation, b) is False for b in neighbours)
+        ):
             self._missed, self._met = 0, self._met + 1
             self._blind = self._blind and self._met < LOOKS
         self._missed_s = missed

@@ -141,7 +141,7 @@ def test_a_run_with_faults_equals_virtual_time(
     start: Start, rough: Write, run: Path, shards: int
 ) -> None:
     fleet = lockstep(start, rough(6.0), run, "--no-recording", "--shards", str(shards))
-    assert fleet.status(60.0) in (0, 1), fleet.text
+    assert fleet.status(60.0) in (1, 3), fleet.text  # six seconds are too short to form
     summary, flight = summary_of(run), fly(load(Path(rough(6.0))))
     assert summary["duration_s"] == 6.0, summary["reason"]
     assert summary["trace_sha256"] == flight.loop.trace.sha256

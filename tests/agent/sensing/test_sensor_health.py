@@ -148,6 +148,19 @@ def test_a_blind_sensor_is_trusted_again_once_it_senses_a_neighbour():
     assert watch.update(observation(0, vehicles=vehicle))
 
 
+def test_a_blind_sensor_is_trusted_again_once_it_senses_a_neighbour_farther_away():
+    """The team has formed elsewhere; nobody comes near an agent that stands still."""
+    watch, away = sensor_health(), (1.9, 0.0, 0.0)
+    for look in range(LOOKS):
+        speaking = heard_beacon(1, look, stamp_s=0.01 * look, at=(1.0, 0.0, 0.0))
+        watch.compare(observation(0), [speaking])
+    assert not watch.update(observation(0))
+    there = heard_beacon(1, 9, stamp_s=0.0, at=away)
+    for _ in range(LOOKS):
+        watch.compare(observation(0, vehicles=(away,)), [there])
+    assert watch.update(observation(0, vehicles=(away,)))
+
+
 def test_jumping_scans_are_wrong_and_quiet_ones_are_right_again():
     watch, random = sensor_health((LASER,), ranging=False), Random(5)
     ranges = [random.randrange(1 << 16) for _ in range(61 * 8)]
