@@ -140,6 +140,7 @@ def change(t_s: float, kind: str, agents: list[int], reformed_s: float | None) -
         "agents": agents,
         "reformed_s": reformed_s,
         "timed_from_s": t_s,
+        "changed": None,
         "asked_s": 5.0 - t_s if reformed_s is None else reformed_s,
     }
 

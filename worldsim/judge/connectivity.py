@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from agent.assignment.slot_selection import ALONE_S
 from agent.comms.gossip import LEAST_RELAYED_SILENCE_S
+from agent.comms.neighbours import MAX_AGE_S
 from agent.comms.unidentified_vehicles import SAME_VEHICLE_M
 from netem.conditions import NetworkConditions
 from netem.link import burst_variance_factor, unusable_share
@@ -78,6 +79,15 @@ class Components(NamedTuple):
         """Return whether the same agents hear of each other."""
         alike = np.array_equal(self.label, other.label)
         return alike and np.array_equal(self.closed, other.closed)
+
+
+class Spreads(NamedTuple):
+    """Whether what agents send reaches the whole team, over each channel."""
+
+    local: bool
+    """Whether beacons join all agents, over any number of links."""
+    multihop: bool
+    """Whether news reaches all in a bounded time."""
 
 
 class Connectivity:
@@ -164,6 +174,17 @@ class Connectivity:
         linked = usable & (self._lost_over(LOCAL, distance) < 1.0)
         return _labels(_reached(_neighbours(linked)).rows, alive)
 
+    def spreads(self, tick: Tick) -> Spreads:
+        """Return over which channels the running agents hear of each other at a tick."""
+        found = self.components(tick)
+        agents = int(np.count_nonzero(tick.alive))
+        bounded = self.dissemination_s(agents, found.hops, found.loss) < inf
+        groups = self.groups(tick.position, tick.alive)
+        return Spreads(
+            local=not self._too_old[LOCAL] and groups.max(initial=0) == 0,
+            multihop=not self._too_old[MULTIHOP] and bounded and found.label.max(initial=0) == 0,
+        )
+
     def dissemination_s(self, agents: int, hops: int, loss: float | None = None) -> float:
         """Return B [s]: a record reaches every agent in this time, with probability 1 - 1e-6.
 
@@ -193,6 +214,9 @@ class Connectivity:
         multihop = models.of_any_link(MULTIHOP)
         self._burst_factor = max(1.0, *map(burst_variance_factor, multihop))
         self._delay_s = max(map(_longest_delay_s, multihop))
+        least_s = [min(map(_least_delay_s, models.of_any_link(at))) for at in range(len(CHANNELS))]
+        self._too_old = [delay_s > MAX_AGE_S for delay_s in least_s]
+        """Of each channel, whether every frame is too old to be accepted when it comes."""
         links = [link for at in range(len(CHANNELS)) for link in models.of_any_link(at)]
         queued_s = max(map(_longest_queued_s, links))
         self._in_flight_s = max(map(_longest_delay_s, links)) + queued_s + self._slack_s
@@ -259,6 +283,12 @@ def _longest_delay_s(model: LinkModel) -> float:
     """Return the longest delay on a link [s]."""
     widest = 1.0 if model.distribution == "uniform" else MAX_QUANTILE
     return (model.delay_ms + widest * model.jitter_ms) / 1000.0
+
+
+def _least_delay_s(model: LinkModel) -> float:
+    """Return the least delay on a link [s]."""
+    widest = 1.0 if model.distribution == "uniform" else MAX_QUANTILE
+    return (model.delay_ms - widest * model.jitter_ms) / 1000.0
 
 
 def _longest_queued_s(model: LinkModel) -> float:

@@ -3,14 +3,8 @@
 from typing import assert_never
 
 from worldsim.judge.connectivity import LONGEST_STOP_S
-from worldsim.judge.radio_events import (
-    Flapped,
-    Healed,
-    Jammed,
-    NetemOutage,
-    Partitioned,
-    RadioRunEvent,
-)
+from worldsim.judge.cutting_faults import CuttingFaults
+from worldsim.judge.radio_events import LinkRunEvent, NetemOutage
 from worldsim.judge.run_events import (
     AgentFaultRunEvent,
     ClockChanged,
@@ -20,45 +14,47 @@ from worldsim.judge.run_events import (
     Starved,
     WorldStopped,
 )
-from worldsim.scenario.tables import CONVERGED_M
+from worldsim.judge.tick import Tick
+from worldsim.scenario.tables import CONVERGED_M, Scenario
 
 
 class PartingFaults:
-    """The partitions, jams, flaps and wrong clocks in force, and whether agents are observed.
+    """The faults in force by which the team cannot be one, and whether agents are observed.
 
-    slack_s: two ticks [s]. Clocks that differ by no more part nobody, nor do steps of one tick.
+    Beside those of the radio that cut links, these are wrong clocks and poses, and slow and starved
+    agents, beyond bounds.
     """
 
-    def __init__(self, slack_s: float) -> None:
-        self._slack_s = slack_s
-        self._partitions: set[int] = set()
+    def __init__(self, scenario: Scenario) -> None:
+        self._slack_s = 2.0 / scenario.fleet.tick_hz
+        """Clocks that differ by no more part nobody, nor do steps of one tick [s]."""
+        self._cutting = CuttingFaults(scenario)
         self._others: set[int] = set()
         self.unobserved = False
         """Whether netem is down or the world was stopped, and not all are observed again yet."""
 
     def __bool__(self) -> bool:
-        return bool(self._partitions or self._others or self.unobserved)
+        return bool(self._cutting or self._others or self.unobserved)
+
+    def see(self, tick: Tick) -> bool:
+        """Take a tick before it is judged; return whether the radio begins to part, or ceases."""
+        before = bool(self._cutting)
+        self._cutting.see(tick)
+        return before != bool(self._cutting)
 
     def handle_stop(self, event: WorldStopped | Reconnected) -> None:
         """Take the stop of the world, or the end of such a time."""
         self.unobserved = isinstance(event, WorldStopped)
 
-    def handle_event(self, event: RadioRunEvent) -> None:
-        """Take an event of the radio."""
-        match event:
-            case Partitioned():
-                self._partitions.add(event.number)
-            case Healed():
-                ended = self._partitions if event.number is None else {event.number}
-                self._partitions = self._partitions - ended
-            case Jammed():
-                self._mark(event.number, begins=event.jam is not None)
-            case Flapped():
-                self._mark(event.number, begins=event.flap is not None)
-            case NetemOutage():
-                self.unobserved = True
-            case _:
-                pass  # changed conditions part nobody for sure
+    def handle_event(self, event: LinkRunEvent | NetemOutage) -> bool:
+        """Take an event of the radio; return whether it disturbs the team.
+
+        A partition, jam or flap that never cut a link of the team does not.
+        """
+        if isinstance(event, NetemOutage):
+            self.unobserved = True
+            return True
+        return self._cutting.handle_event(event)
 
     def handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
         """Take the beginning or the end of a fault of an agent."""

@@ -168,10 +168,16 @@ def radio_sentence(event: RadioRunEvent) -> str:
     return words
 
 
+def settings_text(event: RadioRunEvent) -> str | None:
+    """Return what conditions an event changes, or changes back; None for another event."""
+    if not isinstance(event, ConditionsChanged):
+        return None
+    return f"end of {_settings(event.undone)}" if event.undone is not None else _settings(event)
+
+
 def _changed(event: ConditionsChanged) -> str:
-    if event.undone is not None:
-        return f"link conditions restored: end of {_settings(event.undone)}"
-    return f"link conditions changed: {_settings(event)}"
+    what = "restored" if event.undone is not None else "changed"
+    return f"link conditions {what}: {settings_text(event)}"
 
 
 def _by_others(event: Sabotaged | NetemOutage) -> str:

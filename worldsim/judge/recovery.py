@@ -11,7 +11,7 @@ of its own slot for 2 s.
 import msgspec
 
 from worldsim.judge.asked_time import AskedTime
-from worldsim.judge.radio_events import RadioRunEvent
+from worldsim.judge.radio_events import RadioRunEvent, settings_text
 from worldsim.judge.run_events import (
     LOSS_KINDS,
     RETURN_KINDS,
@@ -42,6 +42,8 @@ class Recovery(msgspec.Struct):
     """
     asked_s: float = 0.0
     """The longest time without such a fault that the team had, or took [s]."""
+    changed: str | None = None
+    """What conditions of the radio changed; None where none did."""
 
 
 class Recoveries:
@@ -71,7 +73,9 @@ class Recoveries:
 
     def handle_radio(self, event: RadioRunEvent | Reconnected) -> None:
         """Take a change of the radio, after which the team is not parted, or no more."""
-        self._begin(event)
+        begun = self._begin(event)
+        if not isinstance(event, Reconnected):
+            begun.changed = settings_text(event)
 
     def handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
         """Take a change of an agent's fault, after which the team is not parted, or no more."""

@@ -124,7 +124,7 @@ class Judge:
         self.clearance = ObstacleClearance(scenario)
         bounded = scenario.expect.attitude_within_deg is not None
         self._attitudes = HeldAttitudes(scenario) if bounded else None
-        self._parting = PartingFaults(2.0 / scenario.fleet.tick_hz)
+        self._parting = PartingFaults(scenario)
         self._held = HeldFormation(fault_window_s(scenario), self._parting)
         strength = scenario.expect.min_lambda2 is not None
         self._strength = NetworkStrength(scenario) if strength else None
@@ -180,13 +180,17 @@ class Judge:
             return  # whatever somebody sends, it excuses nobody
         if self._strength is not None:
             self._strength.handle_event(event)
-        self._parting.handle_event(event)
+        disturbs = self._parting.handle_event(event)
         self._note_parting(event.t_s)
+        if not disturbs:
+            return  # what has cut no link excuses nobody
         self._held.open_window(event.t_s)
         if not self._parting:
             self._recoveries.handle_radio(event)
 
     def _handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
+        if event.agent is None:
+            return  # what struck nobody excuses nobody
         if self._attitudes is not None:
             self._attitudes.handle_event(event)
         self._parting.handle_agent_fault(event)
@@ -223,6 +227,9 @@ class Judge:
         """Judge a tick; ticks come in order."""
         last = self._last if self._last is not None else tick
         self._last = tick
+        if self._parting.see(tick):
+            self._note_parting(tick.time_s)
+            self._held.open_window(tick.time_s)
         self._hovering.see(tick)
         separation = self._separation.swept(tick.position)
         distance, too_near = self.clearance.see(last, tick) if self.clearance else (None, False)

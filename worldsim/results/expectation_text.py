@@ -27,6 +27,7 @@ class RecoveryRow(TypedDict):
     reformed_s: float | None  # from timed_from_s until the formation is whole again
     timed_from_s: float | None  # t_s, or the end of the last fault that forbade it
     asked_s: float  # the longest time without such a fault, until it is whole again or to the end
+    changed: str | None  # conditions of the radio, where they are what changed
 
 
 class EncounterRow(TypedDict):
@@ -256,10 +257,11 @@ def _slowest(row: ExpectationRow, run: Circumstances) -> RecoveryRow | None:
 
 
 def _change(recovery: RecoveryRow) -> str:
-    agents = recovery["agents"]
+    agents, changed = recovery["agents"], recovery["changed"]
+    kind = recovery["kind"] if changed is None else f"{recovery['kind']} ({changed})"
     names = ", ".join(f"a{agent}" for agent in agents)
     if not agents:
-        return f"{recovery['kind']} at {recovery['t_s']:.4g} s"
+        return f"{kind} at {recovery['t_s']:.4g} s"
     who = names if len(agents) <= MAX_NAMED else f"{len(agents)} agents"
     return f"{recovery['kind']} of {who} at {recovery['t_s']:.4g} s"
 
