@@ -13,7 +13,7 @@ from tests.judge.test_held_formation import FLIGHT, JAM, WINDOW_S, Off, away, ra
 from tests.recording.flights import straight_flight
 from worldsim.judge.asked_time import AskedTime
 from worldsim.judge.finding import Expectation
-from worldsim.judge.run_events import ClockChanged, Killed, PoseChanged, RunEvent
+from worldsim.judge.run_events import ClockChanged, Killed, PoseChanged, RunEvent, SlowChanged
 from worldsim.judge.verdict import Judge
 
 CONVERGE = f"converge {FLIGHT.formation.name}"
@@ -71,6 +71,37 @@ def test_convergence_that_a_fault_forbids_to_the_end_is_open(
 ) -> None:
     judge = judged(away(0.0, 99.0), events, within_s)
     assert found(rows(judge)[CONVERGE]) == expected
+
+
+@pytest.mark.parametrize(
+    ("events", "within_s", "expected"),
+    [
+        (pose(0.0), 7.0, (6.0, True)),
+        (pose(0.0), None, (6.0, True)),
+        (pose(0.0), 5.0, (6.0, None)),
+        (pose(5.5), 5.0, (6.0, False)),  # the limit was over before the fault
+        (pose(7.0), 7.0, (6.0, True)),
+        (pose(7.0), 5.0, (6.0, False)),
+        ([*pose(0.0, 3.0), *pose(7.0)], 5.0, (3.0, True)),  # it stood before the second fault
+    ],
+)
+def test_a_team_that_converges_though_a_fault_forbids_it_has_its_true_time(
+    events: list[RunEvent], within_s: float | None, expected: Row
+) -> None:
+    assert found(rows(judged(away(0.0, 6.0), events, within_s))[CONVERGE]) == expected
+
+
+@pytest.mark.parametrize(("until_s", "held"), [(10.5, True), (14.0, None)])
+def test_a_team_that_re_forms_though_a_fault_forbids_it_has_its_true_time(
+    until_s: float, held: bool | None
+) -> None:
+    slow = SlowChanged(t_s=8.0, agent=0, planned=True, number=7, delay_s=0.5)
+    ended = msgspec.structs.replace(slow, t_s=17.0, ends=True)
+    judge = judged(away(8.0, until_s), [slow, kill(8.0), ended])
+    lost = judge.recoveries[0]
+    assert lost.reformed_s == pytest.approx(until_s - 8.0, abs=0.06)
+    assert lost.timed_from_s is None
+    assert rows(judge)["reform_within_s"].held is held
 
 
 @pytest.mark.parametrize(("until_s", "expected"), [(12.0, (2.0, True)), (16.0, (6.0, False))])

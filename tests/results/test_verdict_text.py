@@ -194,6 +194,13 @@ def test_a_formation_that_was_replaced_names_the_next_mission(summary: Summary) 
     ("timed_from_s", "got", "held", "words"),
     [
         (None, None, None, "a did not converge: a fault that forbids it was in force to the end"),
+        (None, 1.5, True, "met      a: converged in 1.5 s though a fault forbade it (limit 3 s)"),
+        (
+            None,
+            4.0,
+            None,
+            "open     a: converged in 4 s while a fault forbade it: not timed (limit",
+        ),
         (2.0, 1.5, True, "a: converged in 1.5 s from 2 s on, the end of a fault that forbids it"),
         (
             4.0,

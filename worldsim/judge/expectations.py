@@ -81,10 +81,12 @@ class RunExpectations:
     def _converged(self, phase: Phase) -> Expectation:
         within_s = self._scenario.expect.converge_within_s
         asked_s = phase.asked_s(self._end_s(phase))
-        got_s = None if phase.converge_s is None else asked_s
+        # Where a fault forbade it to the last, the true time tells more than what was asked for.
+        untimed = phase.timed_from_s is None
+        got_s = phase.converge_s if untimed or phase.converge_s is None else asked_s
         held: bool | None = got_s is not None and (within_s is None or got_s <= within_s)
-        if got_s is None and asked_s < self._time_to_converge_s(phase):
-            held = None
+        if held is False and (got_s is None or untimed):
+            held = None if asked_s < self._time_to_converge_s(phase) else False
         name = f"converge {phase.formation.name}"
         return Expectation(name=name, wanted=within_s, got=got_s, held=held)
 
@@ -118,10 +120,11 @@ class RunExpectations:
         ]
         open_s = [each.asked_s for each in self._measured.recoveries if each.reformed_s is None]
         worst_s = max(known_s) if known_s and not open_s else None
-        too_late = any(time_s > within_s for time_s in known_s)
-        too_late = too_late or any(time_s >= within_s for time_s in open_s)
+        recoveries = self._measured.recoveries
+        too_late = any(each.is_late(within_s) for each in recoveries)
         # While a fault parts the team, it has still to re-form after its end.
-        is_open = bool(open_s or self._measured.parted)
+        untimed = any(time_s > within_s for time_s in known_s)
+        is_open = bool(open_s or untimed or self._measured.parted)
         held = False if too_late else None if is_open else True
         return Expectation(name="reform_within_s", wanted=within_s, got=worst_s, held=held)
 

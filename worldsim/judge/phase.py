@@ -100,7 +100,8 @@ class Phase:
     def timed_from_s(self) -> float | None:
         """From when the time to converge counts [s; simulated time]; None while a fault forbids it.
 
-        It is the start, or the end of the last fault that forbade it before the convergence.
+        It is the start, or the end of the last fault that forbade it before the convergence. It
+        stays None where the team converged though a fault forbade it: that was not timed.
         """
         return self._asked.from_s
 
@@ -183,6 +184,8 @@ class Phase:
         self.at_slots = 0.0 <= worst <= CONVERGED_M
         in_place = self.at_slots and self._filled
         self._timer.see(time_s, in_place)
+        if self._timer.converged_s is not None:
+            self._asked.settle(self._timer.converged_s)
         return in_place
 
     def _slot_positions(self, tick: Tick) -> list[Vector | None]:

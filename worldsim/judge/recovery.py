@@ -34,7 +34,10 @@ class Recovery(msgspec.Struct):
     agents: list[int]
     """The agents that were lost, came back, or have or had a fault; none for the radio."""
     reformed_s: float | None = None
-    """From ``timed_from_s`` to the start of the 2 s [s]; None until the team has re-formed."""
+    """From ``timed_from_s`` to the start of the 2 s [s]; None until the team has re-formed.
+
+    From ``t_s`` where a fault forbade it to the last: that was not timed.
+    """
     timed_from_s: float | None = None
     """From when the time counts: ``t_s``, or the end of the last fault that forbade re-forming.
 
@@ -44,6 +47,12 @@ class Recovery(msgspec.Struct):
     """The longest time without such a fault that the team had, or took [s]."""
     changed: str | None = None
     """What conditions of the radio changed; None where none did."""
+
+    def is_late(self, within_s: float) -> bool:
+        """Return whether the team has had a time [s] to re-form, and has not done so in it."""
+        if self.reformed_s is None:
+            return self.asked_s >= within_s
+        return self.asked_s > within_s
 
 
 class Recoveries:
@@ -113,8 +122,11 @@ class Recoveries:
         for recovery, asked in self._open:
             recovery.asked_s = asked.until(tick.time_s if since_s is None else since_s)
         if since_s is not None and tick.time_s - since_s >= CONVERGED_S - 1e-9:
-            for recovery, _ in self._open:
-                recovery.reformed_s = recovery.asked_s
+            for recovery, asked in self._open:
+                asked.settle(since_s)
+                recovery.timed_from_s, recovery.reformed_s = asked.from_s, recovery.asked_s
+                if asked.from_s is None:
+                    recovery.reformed_s = since_s - recovery.t_s
             self._open = []
 
     def _all_back(self, tick: Tick) -> bool:

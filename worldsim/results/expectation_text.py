@@ -24,7 +24,7 @@ class RecoveryRow(TypedDict):
     t_s: float
     kind: str
     agents: list[int]
-    reformed_s: float | None  # from timed_from_s until the formation is whole again
+    reformed_s: float | None  # from timed_from_s, or t_s if null, to a whole formation
     timed_from_s: float | None  # t_s, or the end of the last fault that forbade it
     asked_s: float  # the longest time without such a fault, until it is whole again or to the end
     changed: str | None  # conditions of the radio, where they are what changed
@@ -119,6 +119,8 @@ def _spans(run: Circumstances) -> Iterator[Span]:
 def _convergence(row: ExpectationRow, span: Span) -> str:
     name, got, wanted = row["name"].removeprefix(CONVERGE), row["got"], row["wanted"]
     if got is not None:
+        if span.forbidden:
+            return f"{name}: converged in {got:.3g} s{_untimed(row)}"
         return f"{name}: converged in {got:.3g} s{_timed(span.timed_from_s)}{_limit(row)}"
     timed = _timed(span.timed_from_s)
     if row["held"] is None and span.forbidden:
@@ -128,6 +130,13 @@ def _convergence(row: ExpectationRow, span: Span) -> str:
     if row["held"] is False:
         return f"{name} did not converge within {wanted:g} s{timed}"
     return f"{name} did not converge{_within(wanted, span)}{timed}"
+
+
+def _untimed(row: ExpectationRow) -> str:
+    """Return that the team formed though a fault forbade it."""
+    if row["held"] is None:
+        return f" while a fault forbade it: not timed (limit {row['wanted']:g} s)"
+    return f" though a fault forbade it{_limit(row)}"
 
 
 def _timed(from_s: float | None) -> str:
@@ -235,6 +244,8 @@ def _reform(row: ExpectationRow, run: Circumstances) -> str:
         return f"formation after a fault: one was in force to the end{limit}"
     reformed_s, from_s = worst["reformed_s"], worst["timed_from_s"]
     timed = _timed(None if from_s == worst["t_s"] else from_s)
+    if reformed_s is not None and from_s is None:
+        return f"{_change(worst)}: re-formed after {reformed_s:.3g} s{_untimed(row)}"
     if reformed_s is not None:
         return f"{_change(worst)}: re-formed after {reformed_s:.3g} s{timed}{limit}"
     left = Span(worst["asked_s"], "the run ended")
@@ -244,6 +255,8 @@ def _reform(row: ExpectationRow, run: Circumstances) -> str:
 def _slowest(row: ExpectationRow, run: Circumstances) -> RecoveryRow | None:
     """Return the recovery that took longest so far; of those without an end, where none is late.
 
+    Where all have an end, the slowest of those that were not timed.
+
     None where only a fault in force keeps the team from it.
     """
 
@@ -252,8 +265,11 @@ def _slowest(row: ExpectationRow, run: Circumstances) -> RecoveryRow | None:
 
     if row["held"] is not None:
         return max(run.recoveries, key=asked_s)
-    timed = [each for each in run.recoveries if each["timed_from_s"] is not None]
-    return max((each for each in timed if each["reformed_s"] is None), key=asked_s, default=None)
+    open_ = [each for each in run.recoveries if each["reformed_s"] is None]
+    if not open_:
+        return max(run.recoveries, key=lambda each: each["reformed_s"] or 0.0, default=None)
+    timed = [each for each in open_ if each["timed_from_s"] is not None]
+    return max(timed, key=asked_s, default=None)
 
 
 def _change(recovery: RecoveryRow) -> str:
