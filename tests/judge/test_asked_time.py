@@ -13,7 +13,14 @@ from tests.judge.test_held_formation import FLIGHT, JAM, WINDOW_S, Off, away, ra
 from tests.recording.flights import straight_flight
 from worldsim.judge.asked_time import AskedTime
 from worldsim.judge.finding import Expectation
-from worldsim.judge.run_events import ClockChanged, Killed, PoseChanged, RunEvent, SlowChanged
+from worldsim.judge.run_events import (
+    ClockChanged,
+    Killed,
+    PoseChanged,
+    Restarted,
+    RunEvent,
+    SlowChanged,
+)
 from worldsim.judge.verdict import Judge
 
 CONVERGE = f"converge {FLIGHT.formation.name}"
@@ -142,6 +149,28 @@ def test_a_new_disturbance_of_one_agent_needs_a_new_time_of_standing() -> None:
     times_s = [(each.kind, each.reformed_s) for each in judge.recoveries]
     assert times_s == [("kill", pytest.approx(1.0)), ("pose", pytest.approx(0.0))]
     assert WINDOW_S > 1.0
+
+
+@pytest.mark.parametrize(
+    ("lost_s", "until_s", "held"),
+    [
+        ([8.0, 10.0], 10.5, True),  # within the limits of both
+        ([8.0, 10.0], 12.0, None),  # 4 s after the first, 2 s after the second
+        ([8.0, 10.0], 14.0, False),  # 4 s after the second, undisturbed
+        ([8.0, 10.0, 12.0, 14.0, 16.0, 18.0], 99.0, None),  # nobody had 3 s
+        ([8.0, 11.0, 13.0], 13.5, False),  # the first had all of its time
+    ],
+)
+def test_a_loss_that_another_one_overtakes_is_open_and_the_last_one_is_judged(
+    lost_s: list[float], until_s: float, held: bool | None
+) -> None:
+    judge = judged(away(7.0, until_s), [kill(t_s) for t_s in lost_s])
+    assert rows(judge)["reform_within_s"].held is held
+
+
+def test_a_start_that_was_refused_overtakes_nothing() -> None:
+    refused = Restarted(t_s=9.0, agent=None, planned=True, refused="no room")
+    assert rows(judged(away(7.0, 99.0), [kill(8.0), refused]))["reform_within_s"].held is False
 
 
 @given(st.lists(st.floats(0.0, 100.0), min_size=1, max_size=8).map(sorted), st.booleans())

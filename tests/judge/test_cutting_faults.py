@@ -22,6 +22,7 @@ def words(judge: Judge) -> str:
             "reformed_s": each.reformed_s,
             "timed_from_s": each.timed_from_s,
             "asked_s": each.asked_s,
+            "overtaken_s": each.overtaken_s,
             "changed": each.changed,
         }
         for each in judge.recoveries

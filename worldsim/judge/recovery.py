@@ -45,11 +45,18 @@ class Recovery(msgspec.Struct):
     """
     asked_s: float = 0.0
     """The longest time without such a fault that the team had, or took [s]."""
+    overtaken_s: float | None = None
+    """What of that time it had before the next disturbance [s]; None where it re-formed before."""
     changed: str | None = None
     """What conditions of the radio changed; None where none did."""
 
     def is_late(self, within_s: float) -> bool:
-        """Return whether the team has had a time [s] to re-form, and has not done so in it."""
+        """Return whether the team has had a time [s] to re-form, and has not done so in it.
+
+        It had only the time until the next disturbance.
+        """
+        if self.overtaken_s is not None:
+            return self.overtaken_s >= within_s
         if self.reformed_s is None:
             return self.asked_s >= within_s
         return self.asked_s > within_s
@@ -74,11 +81,10 @@ class Recoveries:
 
     def handle_event(self, event: LossEvent | ReturnEvent) -> None:
         """Take the loss or return of an agent; without an agent, a start that was refused."""
-        last = self._disturbed(event)
         if event.agent is None:
-            self._open = [each for each in self._open if each[0] is not last]
+            self.all.append(Recovery(event.t_s, event.kind, []))
         else:
-            last.agents.append(event.agent)
+            self._disturbed(event).agents.append(event.agent)
 
     def handle_radio(self, event: RadioRunEvent | Reconnected) -> None:
         """Take a change of the radio, after which the team is not parted, or no more."""
@@ -103,6 +109,10 @@ class Recoveries:
     def _begin(
         self, event: LossEvent | ReturnEvent | AgentFaultRunEvent | RadioRunEvent | Reconnected
     ) -> Recovery:
+        until_s = event.t_s if self.standing_since_s is None else self.standing_since_s
+        for each, its in self._open:
+            if each.overtaken_s is None:
+                each.overtaken_s = its.until(until_s)
         self.standing_since_s = None
         asked = AskedTime(event.t_s, forbidden=self._forbidden)
         recovery = Recovery(event.t_s, event.kind, [], timed_from_s=asked.from_s)

@@ -38,6 +38,7 @@ ADDED_LATER = (
     "I5",
     "timed_from_s",
     "asked_s",
+    "overtaken_s",
     "changed",
 )
 """Keys that an older summary lacks."""

@@ -27,6 +27,7 @@ class RecoveryRow(TypedDict):
     reformed_s: float | None  # from timed_from_s, or t_s if null, to a whole formation
     timed_from_s: float | None  # t_s, or the end of the last fault that forbade it
     asked_s: float  # the longest time without such a fault, until it is whole again or to the end
+    overtaken_s: float | None  # that time until the next change; null if whole before it
     changed: str | None  # conditions of the radio, where they are what changed
 
 
@@ -242,6 +243,16 @@ def _reform(row: ExpectationRow, run: Circumstances) -> str:
     worst = _slowest(row, run)
     if worst is None:
         return f"formation after a fault: one was in force to the end{limit}"
+    return _unrestored(row, run, worst)
+
+
+def _unrestored(row: ExpectationRow, run: Circumstances, worst: RecoveryRow) -> str:
+    """Return how the team did after the change that is worst, in words."""
+    limit = _limit(row)
+    if row["held"] is None and worst["overtaken_s"] is not None:
+        had_s = worst["overtaken_s"]
+        by = _change(_overtaker(worst, run))
+        return f"{_change(worst)}: overtaken by the {by} after {had_s:.3g} s{limit}"
     reformed_s, from_s = worst["reformed_s"], worst["timed_from_s"]
     timed = _timed(None if from_s == worst["t_s"] else from_s)
     if reformed_s is not None and from_s is None:
@@ -253,23 +264,34 @@ def _reform(row: ExpectationRow, run: Circumstances) -> str:
 
 
 def _slowest(row: ExpectationRow, run: Circumstances) -> RecoveryRow | None:
-    """Return the recovery that took longest so far; of those without an end, where none is late.
-
-    Where all have an end, the slowest of those that were not timed.
+    """Return the recovery that had the most time so far; of the open ones, where none is late.
 
     None where only a fault in force keeps the team from it.
     """
 
-    def asked_s(recovery: RecoveryRow) -> float:
-        return recovery["asked_s"]
+    def had_s(recovery: RecoveryRow) -> float:
+        overtaken_s = recovery["overtaken_s"]
+        return recovery["asked_s"] if overtaken_s is None else overtaken_s
 
     if row["held"] is not None:
-        return max(run.recoveries, key=asked_s)
-    open_ = [each for each in run.recoveries if each["reformed_s"] is None]
-    if not open_:
-        return max(run.recoveries, key=lambda each: each["reformed_s"] or 0.0, default=None)
-    timed = [each for each in open_ if each["timed_from_s"] is not None]
-    return max(timed, key=asked_s, default=None)
+        return max(run.recoveries, key=had_s)
+    open_ = [
+        each
+        for each in run.recoveries
+        if (
+            each["timed_from_s"] is not None
+            if each["reformed_s"] is None
+            else each["reformed_s"] > row["wanted"]
+        )
+    ]
+    return max(open_, key=had_s, default=None)
+
+
+def _overtaker(recovery: RecoveryRow, run: Circumstances) -> RecoveryRow:
+    """Return the next change after a recovery that was overtaken."""
+    later = run.recoveries[run.recoveries.index(recovery) + 1 :]
+    refused = [each for each in later if not each["agents"] and each["kind"] in ("restart", "join")]
+    return next(each for each in later if each not in refused)
 
 
 def _change(recovery: RecoveryRow) -> str:

@@ -67,6 +67,7 @@ def _found(judge: Judge, ended_s: float) -> list[str]:
             "reformed_s": row.reformed_s,
             "timed_from_s": row.timed_from_s,
             "asked_s": row.asked_s,
+            "overtaken_s": row.overtaken_s,
             "changed": row.changed,
         }
         for row in judge.recoveries

@@ -399,6 +399,7 @@ def _recovery_rows(judge: Judge) -> list[RecoveryRow]:
             "reformed_s": recovery.reformed_s,
             "timed_from_s": recovery.timed_from_s,
             "asked_s": recovery.asked_s,
+            "overtaken_s": recovery.overtaken_s,
             "changed": recovery.changed,
         }
         for recovery in judge.recoveries
