@@ -33,6 +33,8 @@ MISS = {
     "partition": "partition = [[0, 1]]",
     "jam": "jam = { centre_m = [500, 0, 0], radius_m = 1 }",
     "netem": "netem = { loss_percent = 0 }",
+    "restart": "restart = [1]",
+    "resume": "resume = [1]",
 }
 SENSED = '[vehicle]\nsensors = ["proximity"]\n'
 LEFT = "[[event]]\nat_s = 2.0\nleave = [1]\n"

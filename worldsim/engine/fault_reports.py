@@ -102,17 +102,27 @@ class FaultReports:
             case FaultOrder(fault=Heal()):
                 self._end([each for each in self.all if each.kind == "partition"], t_s)
                 return
-            case ResumeProcesses():
-                self._release(operation.agents, ("pause",), t_s)
-                return
-            case StartProcesses():
-                self._release(operation.incarnations, ("kill", "leave", "pause"), t_s)
+            case ResumeProcesses() | StartProcesses():
+                self._take_return(operation, t_s, by)
                 return
             case FaultOrder(event=event) if event is not None:
                 kind, agents = event.radio_kind, event.victims
             case _:
                 return
         self.all.append(FaultReport(operation.number, kind, t_s, by, agents))
+
+    def _take_return(self, operation: ResumeProcesses | StartProcesses, t_s: float, by: By) -> None:
+        """Take a return of agents: it ends faults, or is an idle one where there is nobody."""
+        if isinstance(operation, ResumeProcesses):
+            self._release(operation.agents, ("pause",), t_s)
+            kind, idle = "resume", not operation.agents
+        else:
+            self._release(operation.incarnations, ("kill", "leave", "pause"), t_s)
+            kind, idle = operation.kind, not operation.incarnations and operation.refused is None
+        if idle:
+            report = FaultReport(operation.number, kind, t_s, by, ())
+            report.to_s = t_s
+            self.all.append(report)
 
     def _take_stop(self, operation: Operation, t_s: float, by: By) -> None:
         """Take the beginning of a fault of netem's processes or the world's."""

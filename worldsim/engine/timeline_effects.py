@@ -308,8 +308,14 @@ class TimelineEffects:
                 event(t_s=self._t_s, agent=agent, planned=True, by=by, incarnation=incarnation)
             )
         if not operation.incarnations:
-            refused = operation.refused or NOBODY_TO_RESTART
-            self._emit(event(t_s=self._t_s, agent=None, planned=True, by=by, refused=refused))
+            refused, number = operation.refused, None
+            if refused is None:
+                refused, number = NOBODY_TO_RESTART, operation.number
+            self._emit(
+                event(
+                    t_s=self._t_s, agent=None, planned=True, by=by, number=number, refused=refused
+                )
+            )
 
     def _set_sensors(self, operation: SetSensorMode, by: By) -> None:
         sensor, mode = operation.sensor or "all", operation.mode or WORKS_AGAIN

@@ -144,6 +144,8 @@ class FaultSpans:
             case Resumed(agent=int(agent)):
                 self._paused.discard(agent)
                 self._release(agent, ("pause",), event.t_s)
+            case Resumed(number=int()) | Restarted(number=int(), refused=str()):
+                self._take_idle(event)
             case Restarted(agent=int(agent)):
                 self._ended.discard(agent)
                 self._paused.discard(agent)
@@ -154,6 +156,12 @@ class FaultSpans:
                 self._strike(event.number, event, ends=event.ends)
             case Intruded() | WorldStopped() | DiskFilled():
                 self._take_other(event)
+
+    def _take_idle(self, event: Resumed | Restarted) -> None:
+        """Take a return that found nobody: it begins and ends at once."""
+        if event.number is not None:
+            span = self._begin(event.number, event.kind, event)
+            span.agents, span.to_s = set(), event.t_s
 
     def _take_radio(self, event: RadioRunEvent) -> None:
         match event:

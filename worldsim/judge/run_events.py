@@ -54,6 +54,8 @@ class StartEvent(PlannedEvent, frozen=True, kw_only=True):
     incarnation: int | None = None
     refused: str | None = None
     """The reason for which no process started."""
+    number: int | None = None
+    """The event's number, where it found nobody to restart; None in an older recording."""
 
 
 class Restarted(StartEvent, frozen=True, tag="restart"):

@@ -214,7 +214,9 @@ class Judge:
 
     def _change_team(self, event: LossEvent | ReturnEvent) -> None:
         if isinstance(event, Restarted | Joined):
-            if event.refused not in (None, NOBODY_TO_RESTART):
+            if event.refused == NOBODY_TO_RESTART:
+                return
+            if event.refused is not None:
                 self._without_room.append(event)
             if event.agent is not None:
                 self._missions.forget(event.agent)
