@@ -102,7 +102,8 @@ def test_the_viewer_is_named_where_there_is_a_recording(summary: Summary) -> Non
         ),
         (
             row("reform_within_s", 10.0, None, True),
-            "  -        formation after a fault: not tested, there was none (limit 10 s)",
+            "  -        formation after a fault: not tested, there was none that takes it away"
+            " (limit 10 s)",
         ),
         (
             row("attitude_within_deg", 5.0, 41.26, False),
@@ -253,8 +254,8 @@ def test_one_agent_is_not_plural(summary: Summary) -> None:
 def test_late_frames_and_rejected_messages_are_lines_where_there_are_any(summary: Summary) -> None:
     rejected = {
         "agents": {"corrupt": 3, "replay": 9},
-        "netem": {"ahead": 261, "stale": 4},
-        "world": {},
+        "netem": {"ahead": 261, "stale": 4, "incarnation": 7},
+        "world": {"arrivals": 2},
     }
     excess = {"p50": 37.5, "p99": 62.5, "max": 80.0}
     delivery = {"excess_ms": excess, "within_fraction": 0.998, "bound_ms": 62.5}
@@ -264,8 +265,10 @@ def test_late_frames_and_rejected_messages_are_lines_where_there_are_any(summary
         " 99.80 % of frames within 62.5 ms (one slot and one tick)"
     )
     assert refused == (
-        "  rejected messages: 3 corrupt, 9 replay (older than one already used) by agents;"
-        " 261 ahead (too early), 4 stale (too late) by netem"
+        "  messages rejected by agents: 3 corrupt, 9 replay (older than one already used);"
+        " by netem: 261 ahead (too early), 4 stale (too late),"
+        " 7 with the mark of a process that does not run any more, or never did;"
+        " by the world: 2 reports of delays that cannot be read"
     )
 
 

@@ -39,7 +39,8 @@ app = typer.Typer(
         "qswarm COMMAND --help",
     )
     + "\n\nExit status: 0 all expectations met; 1 an expectation not met or an invariant violated;"
-    " 2 bad input, nothing started; 3 inconclusive: the host was too slow or the run ended early;"
+    " 2 bad input, nothing started; 3 inconclusive: the host was too slow, the run ended early"
+    " or was too short, a fault struck nothing, or results were lost;"
     " 130 interrupted.",
     add_completion=False,
     rich_markup_mode=None,

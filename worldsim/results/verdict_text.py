@@ -27,9 +27,14 @@ CAUSE_WORDS = {
     "ahead": "ahead (too early)",
     "stale": "stale (too late)",
     "replay": "replay (older than one already used)",
-    "incarnation": "of a process that was replaced",
+    "incarnation": "with the mark of a process that does not run any more, or never did",
+    "arrivals": "reports of delays that cannot be read",
+    "verdicts": "reports of netem that cannot be read",
+    "truth": "of positions that do not fit the run",
+    "orders": "orders of faults that cannot be read",
 }
 """Causes of rejection in words; the others are words already."""
+COMPONENT_WORDS = {"world": "the world"}
 LEAD_TOLD_S = 5.0
 """From this lead on, the verdict tells that queues stood before the whole formation [s]."""
 METRES_FROM_M = 0.1
@@ -198,9 +203,11 @@ def _delivery(delivery: DeliveryRow | None) -> list[str]:
 def _rejected(rejected: dict[str, dict[str, int]]) -> list[str]:
     """Return a line on rejected messages: how many by which component; none if there are none."""
     parts = [
-        f"{_causes(causes)} by {component}" for component, causes in rejected.items() if causes
+        f"by {COMPONENT_WORDS.get(component, component)}: {_causes(causes)}"
+        for component, causes in rejected.items()
+        if causes
     ]
-    return [f"  rejected messages: {'; '.join(parts)}"] if parts else []
+    return [f"  messages rejected {'; '.join(parts)}"] if parts else []
 
 
 def _causes(causes: dict[str, int]) -> str:
