@@ -8,6 +8,7 @@ import random
 from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,9 @@ import pytest
 
 from netem.wire.shutdown import StopRequest
 from worldsim.campaign.pool import Job, simulate
-from worldsim.recording.verify import ADDED_LATER, Verification, compared, judged_again, verify
+from worldsim.recording.comparison import ADDED_LATER, COUNTS, SCHEMA, UNRECORDED, is_idle
+from worldsim.recording.verify import Verification, compared, judged_again, verify
+from worldsim.results.fault_rows import idle_text
 from worldsim.scenario.file import parse
 
 SCENARIO = """
@@ -45,15 +48,6 @@ partition = [[0]]
 [expect]
 converge = false
 """
-UNRECORDED = {
-    "schema", "reason", "rejected_by_cause", "direct_links", "needed_links", "bytes_per_s",
-    "delivery", "delivery_late_ms", "late_tick_fraction", "real_time_factor", "trace_sha256",
-    "overload", "resources",
-    "version", "commit", "commit_dirty", "python", "packages", "host",
-}  # fmt: skip
-"""Keys of summary.json of which a recording shows nothing."""
-COUNTS = {"frames", "readings", "steps", "messages", "observations", "stopped_s", "writes"}
-"""What a fault struck, counted by the engine and the radio: a recording does not show it."""
 BITS = (1, 1, 1, 1, 3, 3, 20, 20, 300, 300)
 """Flipped bits in each damaged recording."""
 
@@ -98,15 +92,17 @@ def another(value: Any) -> Any:
 
 
 def without_figures(summary: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in summary.items() if key not in UNRECORDED}
+    return {key: value for key, value in summary.items() if key not in {*UNRECORDED, "schema"}}
 
 
 def test_the_summary_as_it_was_written_agrees(run: Path, judged: Verification) -> None:
     verification = compared(judged, run / "summary.json")
     assert verification.differences == ()
     assert verification.inconclusive is None
-    known = without_figures(json.loads((run / "summary.json").read_text()))
-    assert set(known) == {*judged.figures, "outcome"}
+    summary = json.loads((run / "summary.json").read_text())
+    assert set(without_figures(summary)) == {*judged.figures, "outcome"}
+    assert {*judged.figures, *UNRECORDED, "outcome", "schema"} == set(summary)
+    assert summary["schema"] == SCHEMA
 
 
 def test_any_changed_figure_is_named_and_proves_nothing(
@@ -116,8 +112,8 @@ def test_any_changed_figure_is_named_and_proves_nothing(
     edited = tmp_path / "summary.json"
     unfound = []
     for *above, key in paths_in(without_figures(summary)):
-        if above[:1] == ["packets"] and key not in judged.figures["packets"]:
-            continue
+        if (*above, key) == ("packets", "rejected"):
+            continue  # no figure of the recording: a contradiction
         if above[:1] == ["faults"] and key in COUNTS:
             continue
         changed = deepcopy(summary)
@@ -148,12 +144,66 @@ def test_a_key_that_a_summary_lacks_is_named(
     run: Path, judged: Verification, tmp_path: Path
 ) -> None:
     summary = json.loads((run / "summary.json").read_text())
-    for key, value in without_figures(summary).items():
-        if value == [] or key in ADDED_LATER:
-            continue  # as in a summary from before there was such a list
+    for key in summary:
         rest = {other: value for other, value in summary.items() if other != key}
         (tmp_path / "summary.json").write_text(json.dumps(rest))
-        assert compared(judged, tmp_path / "summary.json").exit_status == 3, key
+        named = [each.key for each in compared(judged, tmp_path / "summary.json").differences]
+        assert any(each.partition(".")[0] == key for each in named), key
+
+
+def test_the_summary_of_an_older_recording_may_lack_keys(
+    run: Path, judged: Verification, tmp_path: Path
+) -> None:
+    summary = json.loads((run / "summary.json").read_text())
+    rest = {key: value for key, value in summary.items() if key not in ADDED_LATER}
+    (tmp_path / "summary.json").write_text(json.dumps(rest))
+    older = compared(replace(judged, exact=False), tmp_path / "summary.json")
+    assert older.differences == ()
+
+
+def test_an_outcome_that_the_run_cannot_have_is_named(
+    run: Path, judged: Verification, tmp_path: Path
+) -> None:
+    """No host is too slow for virtual time, and a fault that struck nothing allows no pass."""
+    summary = json.loads((run / "summary.json").read_text())
+    slow = {"outcome": "inconclusive", "reason": "the host was too slow"}
+    failed = replace(judged, outcome="fail", passes=False)
+    for flown in (judged, failed):
+        (tmp_path / "summary.json").write_text(json.dumps(summary | slow))
+        verification = compared(flown, tmp_path / "summary.json")
+        assert [each.key for each in verification.differences] == ["outcome"]
+    summary["faults"][1]["frames"] = 0
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    verification = compared(judged, tmp_path / "summary.json")
+    assert verification.contradictions == ("outcome is pass, but faults.1 struck nothing",)
+    assert verification.exit_status == 3
+    allowed = compared(replace(judged, idle_faults=True), tmp_path / "summary.json")
+    assert allowed.contradictions == ()
+    idle = {"outcome": "inconclusive", "reason": "the partition at 3 s struck nothing"}
+    (tmp_path / "summary.json").write_text(json.dumps(summary | idle))
+    honest = compared(judged, tmp_path / "summary.json")
+    assert (honest.differences, honest.contradictions) == ((), ())
+
+
+@pytest.mark.parametrize("count", [None, -1, True, "3"])
+def test_a_count_that_is_none_is_named(
+    run: Path, judged: Verification, tmp_path: Path, count: object
+) -> None:
+    summary = json.loads((run / "summary.json").read_text())
+    summary["faults"][1]["frames"] = count
+    summary["packets"]["rejected"] = count
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    named = [each.split()[0] for each in compared(judged, tmp_path / "summary.json").contradictions]
+    assert named == ["packets.rejected", "faults.1.frames"]
+
+
+def test_an_idle_fault_is_one_by_the_verdict_too() -> None:
+    kinds = ("jam", "clock", "slow", "kill", "intruder", "disk_full")
+    blank = dict.fromkeys((*COUNTS, "process", "agents"))
+    for kind, key, count in product(kinds, COUNTS, (None, 0, 3)):
+        for agents in (None, [], [1]):
+            row: Any = {**blank, "kind": kind, "from_s": 1.0, "agents": agents, key: count}
+            assert is_idle(row) == (idle_text([row]) is not None), row
 
 
 @pytest.mark.parametrize(
@@ -198,7 +248,7 @@ def test_a_cut_recording_is_inconclusive(run: Path, tmp_path: Path, share: float
 
 
 def test_a_pass_of_a_recording_that_fails_is_named(run: Path, judged: Verification) -> None:
-    failed = replace(judged, passes=False)
+    failed = replace(judged, outcome="fail", passes=False)
     verification = compared(failed, run / "summary.json")
     assert [each.key for each in verification.differences] == ["outcome"]
     assert verification.exit_status == 3

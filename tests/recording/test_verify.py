@@ -13,14 +13,9 @@ import pytest
 from tests.recording.flights import record, straight_flight, wedge
 from worldsim.judge.finding import InvariantTally
 from worldsim.judge.verdict import Judge
+from worldsim.recording.comparison import SCHEMA, UNRECORDED, Difference
 from worldsim.recording.recorder import RunRecorder
-from worldsim.recording.verify import (
-    Difference,
-    Verification,
-    compared,
-    judged_again,
-    verify,
-)
+from worldsim.recording.verify import Verification, compared, judged_again, verify
 from worldsim.results.verdict_text import verified
 from worldsim.scenario.tables import Scenario
 
@@ -56,24 +51,27 @@ def summary_of(judge: Judge, scenario: Scenario | None = None) -> dict[str, Any]
     """Return a run's summary, as far as its recording shows it."""
     flown = scenario or wedge(4)
     return {
+        **dict.fromkeys(UNRECORDED),
+        "schema": SCHEMA,
         "outcome": "pass",
         "scenario": flown.name,
         "seed": flown.seed,
         "mode": "virtual",
         "agents": flown.fleet.agents,
         "duration_s": flown.duration_s,
-        "expectations": [
-            {"name": row.name, "wanted": row.wanted, "got": row.got, "held": row.held}
-            for row in judge.expectations()
-        ],
+        "expectations": [row.row for row in judge.expectations()],
         "min_separation_m": judge.min_separation_m,
         "min_obstacle_distance_m": None,
         "attitude_error_deg": judge.attitude_error_deg,
         "turns_over_limit_fraction": judge.turns_over_limit_fraction,
         "invariants": msgspec.to_builtins(judge.invariants()),
         "sub_formations": [queues.row for queues in judge.sub_formations],
+        "in_formation_fraction": judge.in_formation_fraction,
+        "max_slot_error_m": judge.max_slot_error_m,
+        "min_lambda2": judge.min_lambda2,
         "recoveries": [],
         "encounters": [],
+        "faults": [],
         "packets": list(straight_flight(flown))[-1].packets,
         "phases": [
             {
@@ -81,6 +79,7 @@ def summary_of(judge: Judge, scenario: Scenario | None = None) -> dict[str, Any]
                 "from_s": phase.from_s,
                 "converged": phase.converge_s is not None,
                 "converge_s": phase.converge_s,
+                "timed_from_s": phase.timed_from_s,
                 "residual_m": phase.residual_m,
                 "queues_converge_s": dict(zip(queues.names, queues.converge_s, strict=True)),
             }
@@ -110,12 +109,14 @@ def test_without_a_summary_the_recording_is_judged_but_inconclusive(
     assert last == f"inconclusive ({why})  {tmp_path}"
 
 
-@pytest.mark.parametrize("reason", ["interrupted after 2.0 s", "the host was too slow"])
+@pytest.mark.parametrize("reason", ["results were lost: no space", "the host was too slow"])
 def test_an_inconclusive_run_stays_inconclusive(
-    tmp_path: Path, judge: Judge, compare: Callable[[], Verification], reason: str
+    tmp_path: Path, judge: Judge, judged: Verification, reason: str
 ) -> None:
-    write_summary(tmp_path, judge, outcome="inconclusive", reason=reason)
-    verification = compare()
+    mode = "virtual" if reason.startswith("results") else "processes"
+    write_summary(tmp_path, judge, outcome="inconclusive", reason=reason, mode=mode)
+    flown = replace(judged, run=tmp_path, figures=judged.figures | {"mode": mode})
+    verification = compared(flown, tmp_path / "summary.json")
     assert verification.differences == ()
     assert not verification.held
     assert verification.exit_status == 3
@@ -130,7 +131,15 @@ def test_a_recording_that_ends_early_is_inconclusive(tmp_path: Path) -> None:
     write_summary(tmp_path, judge)
     verification = verify(tmp_path)
     assert (verification.whole, verification.held, verification.exit_status) == (False, False, 3)
-    assert "inconclusive (the recording ends at 4.95 s of 8 s)" in verified(verification)
+    text = verified(verification)
+    assert "inconclusive (the recording ends at 4.95 s of 8 s)" in text
+    assert "summary.json not compared: the recording ends at 4.95 s of 8 s; what does" in text
+    false = {"seed": 42, "agents": 99, "min_separation_m": 9.0, "mode": "lockstep", "schema": 2}
+    write_summary(tmp_path, judge, **false, duration_s=4.0)
+    verification = compared(verification, tmp_path / "summary.json")
+    assert {each.key for each in verification.differences} == {*false, "duration_s"}
+    assert verification.exit_status == 3
+    assert "agrees" not in verified(verification)
 
 
 def test_a_true_summary_does_not_differ(tmp_path: Path, judge: Judge) -> None:

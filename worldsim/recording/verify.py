@@ -18,7 +18,17 @@ import msgspec
 from worldsim.judge.fault_spans import FaultSpans
 from worldsim.judge.finding import Expectation, InvariantTally
 from worldsim.judge.recovery import Recovery
+from worldsim.judge.run_events import WorldStopped
 from worldsim.judge.verdict import Judge
+from worldsim.recording.comparison import (
+    REPEATABLE,
+    Difference,
+    Shown,
+    contradictions,
+    differences,
+    differences_in_part,
+    value_at,
+)
 from worldsim.recording.isolated_reader import read_run_apart
 from worldsim.recording.layout import RECORDING_FILE, SUMMARY_FILE
 from worldsim.recording.readback import DamagedError, Readback, RecordingError
@@ -27,36 +37,10 @@ from worldsim.recording.rejudged import in_order, rejudge
 Figure = float | None
 HELD, NOT_HELD, UNREADABLE, INCONCLUSIVE = 0, 1, 2, 3
 TIME_SLACK_S = 1e-9
-ABSENT = "no such key"
-"""Stands for a value that is not there."""
-ADDED_LATER = (
-    "sub_formations",
-    "in_formation_fraction",
-    "max_slot_error_m",
-    "margin",
-    "min_lambda2",
-    "I5",
-    "timed_from_s",
-    "asked_s",
-    "overtaken_s",
-    "changed",
-)
-"""Keys that an older summary lacks."""
 MAX_NAMED = 4
 """Of more differences, the first are named."""
 MAX_REASON = 300
 """Length of the reason for which a recording cannot be read [characters]."""
-REPEATABLE = ("lockstep", "virtual")
-"""Modes in which the radio's counters at the last tick are those of the summary."""
-
-
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """A figure of which summary and recording give different values."""
-
-    key: str  # the path in summary.json, joined by dots
-    summary: Any
-    recording: Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,13 +86,23 @@ class Verification:
     invariants: dict[str, InvariantTally] = field(default_factory=dict)
     passes: bool = False
     """Whether nothing that the recording shows speaks against the run."""
+    outcome: str = "fail"
+    """That of the recorded ticks: "pass", "fail", or "inconclusive" where they are too few."""
+    idle_faults: bool = False
+    """Whether the scenario allows faults that strike nothing."""
+    ended_s: Figure = None
+    """When the scenario killed the world, and so ended the run early [s]."""
     figures: dict[str, Any] = field(default_factory=dict)
     """Everything that was recomputed, under the keys of summary.json."""
     summary: bool = False
     """Whether there is a summary to compare with."""
     doubt: str | None = None
     """Why the recording proves nothing, from its summary; None: the summary gives no reason."""
+    uncompared: str | None = None
+    """Why only figures were compared that do not depend on the run's length; None: all were."""
     differences: tuple[Difference, ...] = ()
+    contradictions: tuple[str, ...] = ()
+    """Where the summary contradicts itself, in words."""
 
     @property
     def whole(self) -> bool:
@@ -118,16 +112,26 @@ class Verification:
         return self.problem is None and self.finished and reaches
 
     @property
+    def cut(self) -> str | None:
+        """Where the recording ends before the run's planned end, in words; None where not."""
+        if self.whole:
+            return None
+        ends = "ends" if self.finished else "is cut off: it ends"
+        return f"the recording {ends} at {self.until_s:.4g} s of {self.duration_s:g} s"
+
+    @property
     def inconclusive(self) -> str | None:
-        """Why the recording neither passes nor fails; None where it does."""
-        if self.doubt is None and not self.whole:
-            ends = "ends" if self.finished else "is cut off: it ends"
-            return f"the recording {ends} at {self.until_s:.4g} s of {self.duration_s:g} s"
-        if self.doubt is None and self.differences:
+        """Why the recording neither passes nor fails; None where it does.
+
+        A summary that is not true comes first: then its own reason is in doubt, too.
+        """
+        if self.differences:
             keys = ", ".join(each.key for each in self.differences[:MAX_NAMED])
             more = f" and {len(self.differences) - MAX_NAMED} more"
             return f"{SUMMARY_FILE} differs in {keys}{more * (len(self.differences) > MAX_NAMED)}"
-        return self.doubt
+        if self.contradictions:
+            return f"{SUMMARY_FILE} contradicts itself: {self.contradictions[0]}"
+        return self.doubt or self.cut
 
     @property
     def held(self) -> bool:
@@ -167,6 +171,7 @@ def judged_again(run: Path, recording: Path) -> Verification:
 def verification_of(run: Path, readback: Readback, judge: Judge) -> Verification:
     """Return what a recording shows by the judge that saw it."""
     scenario, found = readback.scenario, judge.shortcomings()
+    ended_s = _ended_s(readback)
     return Verification(
         run=run,
         finished=readback.finished,
@@ -184,20 +189,46 @@ def verification_of(run: Path, readback: Readback, judge: Judge) -> Verification
         recoveries=tuple(judge.recoveries),
         invariants=judge.invariants(),
         passes=judge.ticks > 0 and not any(found),
+        outcome=_outcome(judge, ended_s is not None),
+        idle_faults=scenario.expect.idle_faults,
+        ended_s=ended_s,
         figures=_figures(readback, judge),
     )
+
+
+def _ended_s(readback: Readback) -> Figure:
+    """Return when the world was killed as planned [s]; None where it was not."""
+    for event in readback.events:
+        if isinstance(event, WorldStopped) and event.cause == "kill":
+            return event.t_s
+    return None
+
+
+def _outcome(judge: Judge, cut: bool) -> str:
+    """Return the outcome of the ticks that a judge saw. cut: whether the run ended early."""
+    found = judge.shortcomings()
+    if found.violated:
+        return "fail"
+    if cut:
+        return "inconclusive"
+    if not judge.ticks or found.unseen or found.missed:
+        return "fail"
+    return "inconclusive" if found.unjudged else "pass"
 
 
 def _figures(readback: Readback, judge: Judge) -> dict[str, Any]:
     """Return the figures of a run that its recording shows, under the keys of summary.json."""
     scenario, last = readback.scenario, readback.ticks[-1:]
     packets = last[0].packets if last and readback.mode in REPEATABLE else {}
+    ended_s = _ended_s(readback)
+    if ended_s is not None and last and abs(ended_s - last[0].time_s) > TIME_SLACK_S:
+        packets = {}  # the radio went on after the last tick
     figures: dict[str, Any] = {
         "scenario": scenario.name,
         "seed": scenario.seed,
         "mode": readback.mode,
         "agents": scenario.fleet.agents,
-        "duration_s": scenario.slots / scenario.slot_hz,
+        "duration_s": scenario.slots / scenario.slot_hz if ended_s is None else ended_s,
         "expectations": [row.row for row in judge.expectations()],
         "min_separation_m": judge.min_separation_m,
         "min_obstacle_distance_m": judge.min_obstacle_distance_m,
@@ -244,80 +275,46 @@ def compared(judged: Verification, file: Path) -> Verification:
         summary = json.loads(file.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         return replace(judged, doubt=f"{SUMMARY_FILE} cannot be read: {error}")
-    differences = tuple(_differences(summary, judged)) if judged.whole else ()
-    return replace(judged, summary=True, doubt=_doubt(summary), differences=differences)
+    shown = _shown(judged)
+    if shown is None:
+        shown = Shown(judged.figures, judged.outcome, judged.exact, judged.until_s)
+        found = differences_in_part(summary, shown, judged.duration_s)
+        uncompared = judged.cut
+    else:
+        found, uncompared = differences(summary, shown), None
+    return replace(
+        judged,
+        summary=True,
+        doubt=_doubt(summary),
+        uncompared=uncompared,
+        differences=tuple(found),
+        contradictions=tuple(contradictions(summary, shown, judged.idle_faults)),
+    )
+
+
+def _shown(judged: Verification) -> Shown | None:
+    """Return what a recording shows of a run; None where it is shorter than the run.
+
+    In virtual time a run that the scenario's kill of the world ended is recorded to its end, too.
+    """
+    if judged.whole or _is_of_killed_world(judged):
+        return Shown(judged.figures, judged.outcome, judged.exact, judged.until_s)
+    return None
+
+
+def _is_of_killed_world(judged: Verification) -> bool:
+    """Return whether a recording in virtual time reaches the planned kill of the world."""
+    if judged.ended_s is None or not judged.finished or judged.figures["mode"] != "virtual":
+        return False
+    return judged.until_s > judged.ended_s - judged.tick_s - TIME_SLACK_S
 
 
 def _doubt(summary: Any) -> str | None:
     """Return why a run is inconclusive by its summary; None where it is not."""
-    if _value_at(summary, "outcome") != "inconclusive":
+    if value_at(summary, "outcome") != "inconclusive":
         return None
     reason = summary.get("reason") or "inconclusive"
     return f"{SUMMARY_FILE}: {_one_line(str(reason))}"
-
-
-def _differences(summary: Any, judged: Verification) -> Iterator[Difference]:
-    """Yield the figures that differ; a figure that the summary lacks differs too."""
-    for key, recorded in judged.figures.items():
-        summarised = _value_at(summary, key)
-        if summarised == ABSENT and (recorded in ([], {}) or key in ADDED_LATER):
-            continue  # an older summary has no such list
-        if key == "packets" and isinstance(summarised, dict):
-            summarised = {name: summarised[name] for name in recorded if name in summarised}
-        if key == "faults":
-            operated = judged.figures["mode"] != "virtual"
-            summarised = _comparable(summarised, recorded, operated)
-        yield from _unequal(key, summarised, recorded)
-    outcome = _value_at(summary, "outcome")
-    recorded = "pass" if judged.passes else "fail"
-    if str(outcome) not in {"inconclusive", recorded}:
-        yield Difference("outcome", outcome, recorded)
-
-
-def _comparable(faults: Any, recorded: dict[str, Any], operated: bool) -> Any:
-    """Return a summary's faults by number, with the keys that a recording shows of each.
-
-    operated: whether there may be faults that found no agent and left no event.
-    """
-    if not isinstance(faults, list) or not all(isinstance(each, dict) for each in faults):
-        return faults
-    found: dict[str, Any] = {}
-    for each in faults:
-        number = str(each.get("number"))
-        if number in found:
-            return faults
-        if operated and number not in recorded and each.get("agents") == []:
-            continue
-        names = set(recorded.get(number) or each)
-        found[number] = {name: value for name, value in each.items() if name in names}
-    return found
-
-
-def _unequal(key: str, summarised: Any, recorded: Any) -> Iterator[Difference]:
-    """Yield the differences of two values and of all that they hold."""
-    before, after = _items(summarised), _items(recorded)
-    if after is None or (before is None and not after):
-        # JSON has true and 1 apart, Python takes them for equal.
-        if summarised != recorded or isinstance(summarised, bool) != isinstance(recorded, bool):
-            yield Difference(key, summarised, recorded)
-        return
-    for name in dict.fromkeys((*after, *(before or {}))):
-        summarised, recorded = (before or {}).get(name, ABSENT), after.get(name, ABSENT)
-        if summarised == ABSENT and name in ADDED_LATER:
-            continue
-        yield from _unequal(f"{key}.{name}", summarised, recorded)
-
-
-def _items(value: Any) -> dict[str, Any] | None:
-    """Return what a table, or a list of tables, holds; None for a plain value."""
-    if isinstance(value, list) and any(isinstance(each, dict) for each in value):
-        return {str(index): each for index, each in enumerate(value)}
-    return value if isinstance(value, dict) else None
-
-
-def _value_at(summary: Any, key: str) -> Any:
-    """Return the value of a key; ABSENT where there is none."""
-    return summary.get(key, ABSENT) if isinstance(summary, dict) else ABSENT
 
 
 def _finite(value: Any) -> Any:

@@ -17,11 +17,12 @@ from typing import Any
 
 from worldsim.judge.run_events import RunEvent
 from worldsim.judge.tick import Tick
+from worldsim.recording.comparison import Difference
 from worldsim.recording.isolated_reader import read_run_apart
 from worldsim.recording.layout import RECORDING_FILE, SUMMARY_FILE
 from worldsim.recording.readback import Readback, RecordingError
 from worldsim.recording.rejudged import Rejudged, rejudge
-from worldsim.recording.verify import Difference, Verification, compared, verification_of
+from worldsim.recording.verify import Verification, compared, verification_of
 from worldsim.results import run_tables
 from worldsim.results.run_tables import LAYOUTS, RunRows
 from worldsim.results.summary import SCHEMA

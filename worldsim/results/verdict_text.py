@@ -102,11 +102,7 @@ def verified(verification: "Verification") -> str:
     rows: list[ExpectationRow] = [row.row for row in verification.expectations]
     expectations = _expectations(rows, _recorded_circumstances(verification))
     cut = "" if verification.whole else f" of {verification.duration_s:g} s"
-    none = f"  no {SUMMARY_FILE} to compare with"
-    agreement = [
-        f"  DIFFERS  {each.key}: {each.summary} in summary.json, {each.recording} in the recording"
-        for each in verification.differences
-    ] or [f"  {SUMMARY_FILE} agrees" if verification.summary else none]
+    agreement = _agreement(verification)
     if not verification.exact:
         agreement.insert(0, "  positions in single precision: recorded by an older version")
     expectations += _encounters(verification.figures["encounters"])
@@ -116,6 +112,20 @@ def verified(verification: "Verification") -> str:
     )
     outcome = f"{_verified_outcome(verification)}  {verification.run}"
     return "\n".join([head, *expectations, *agreement, outcome])
+
+
+def _agreement(verification: "Verification") -> list[str]:
+    """Return where summary.json differs, or contradicts itself, or else how far it agrees."""
+    if not verification.summary:
+        return [f"  no {SUMMARY_FILE} to compare with"]
+    wrong = [
+        f"  DIFFERS  {each.key}: {each.summary} in summary.json, {each.recording} in the recording"
+        for each in verification.differences
+    ] + [f"  CONTRADICTS  {SUMMARY_FILE}: {each}" for each in verification.contradictions]
+    if verification.uncompared is None:
+        return wrong or [f"  {SUMMARY_FILE} agrees"]
+    rest = "" if wrong else "; what does not depend on its length agrees"
+    return [*wrong, f"  {SUMMARY_FILE} not compared: {verification.uncompared}{rest}"]
 
 
 def _verified_outcome(verification: "Verification") -> str:
