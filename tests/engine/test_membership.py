@@ -147,3 +147,10 @@ def test_an_agent_that_left_restarts_clear_of_present_vehicles() -> None:
     where = back.poses[2].position
     away = np.linalg.norm(np.delete(position, 2, axis=0) - where, axis=1)
     assert away.min() >= 0.6
+
+
+def test_sabotage_takes_hold_of_an_agent_that_is_dead_when_it_begins() -> None:
+    """The medium leaves its radio off until the agent is back."""
+    members = Membership(scenario())
+    members.apply(begin(members, 0, Kill((0,))), 0.0)
+    assert members.victims(1, (0, 3), CLAIMS) == (0, 3)

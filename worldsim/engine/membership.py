@@ -155,8 +155,11 @@ class Membership:
         return SetSensorMode(number, agents, fault.kind, fault.mode)
 
     def victims(self, number: int, selectors: Selectors, claims: Claims) -> tuple[int, ...]:
-        """Return the agents whose radios an event's saboteur uses: those with a process."""
-        return self._selected(number, selectors, STARTED, claims)
+        """Return the agents whose radios an event's saboteur uses.
+
+        The medium keeps a radio off while its agent is dead or gone: it is used once it is back.
+        """
+        return self._selected(number, selectors, KNOWN, claims)
 
     def agent_fault(
         self, number: int, fault: AgentFault, ends: bool, claims: Claims
