@@ -87,6 +87,8 @@ RADIO = [
     ("jam = { centre_m = [0, 0, 0], radius_m = 0 }", "jam.radius_m", "from 0.001"),
     ("flap = { period_s = 1, links = [[0, 9]] }", "flap.links[0]", "no agent 9; 0 to 8"),
     ("intruder = { agents = [9] }", "intruder.agents[0]", "no agent 9; 0 to 8"),
+    ("kill = [0, 'random:10']", "kill[1]", "10 agents of the 9 by then"),
+    ("slow = { agents = ['random:10'], delay_s = 1 }", "slow.agents[0]", "10 agents of the 9"),
     ("intruder = { agents = [1], per_s = 1e9 }", "intruder.per_s", "from 1 up to 20000"),
     ("sabotage = { kind = 'spoof', agents = [9] }", "sabotage.agents[0]", "no agent 9; 0 to 8"),
     ("sabotage = { kind = 'spoof', agents = ['vertex:V9'] }", "sabotage.agents[0]", "no vertex"),

@@ -318,7 +318,7 @@ class EventChecks:
             case VertexAgent() | QueueAgents():
                 return _not_allowed(selector, allowed)
             case RandomAgents() | AllAgents() | OtherProcess():
-                return _other_process_problem(kind)
+                return _unplaced_problem(kind, self.fleet.id_count)
         assert_never(kind)
 
     def _name(self, kind: str, name: str, names: list[str]) -> str | None:
@@ -397,11 +397,17 @@ class EventChecks:
             yield Problem(error.key, error.detail)
 
 
-def _other_process_problem(kind: RandomAgents | AllAgents | OtherProcess) -> str | None:
-    """Return what is wrong with a selector of a process of no agent among those of agents."""
-    if not isinstance(kind, OtherProcess):
-        return None
-    return f"{kind.name!r} is no agent; allowed alone, as kill or pause = [{kind.name!r}]"
+def _unplaced_problem(kind: RandomAgents | AllAgents | OtherProcess, agents: int) -> str | None:
+    """Return what is wrong with a selector that names no agent or place.
+
+    It draws more agents than there are by then, or names a process of none among those of agents.
+    """
+    match kind:
+        case RandomAgents(number) if number > agents:
+            return f"{number} agents of the {agents} by then"
+        case OtherProcess(name):
+            return f"{name!r} is no agent; allowed alone, as kill or pause = [{name!r}]"
+    return None
 
 
 def _world_problems(event: EventTable) -> Iterator[Problem]:
