@@ -16,6 +16,12 @@ from tests.commands.conftest import Command
             ("fault", "run", "explode", "2"),
             "'explode'; allowed: kill, leave, restart, pause, resume, join",
         ),
+        (("fault", "run", "heal"), "'heal'; it is of the radio; write qswarm netem run heal"),
+        (
+            ("netem", "run", "kill", "2"),
+            "'kill'; it is not of the radio; write qswarm fault run kill",
+        ),
+        (("netem", "run", "jam", "for_s=2"), "'for_s=2'; it is an option; write --for VALUE"),
         (("fault", "run", "join", "some"), "SELECTOR: 'some'; a whole number from 0"),
         (
             ("netem", "run", "explode"),

@@ -42,6 +42,8 @@ EventName = Annotated[
 
 EventKeys = Mapping[str, float | str | None]
 NO_KEYS: EventKeys = {}
+_OPTIONS = {"for_s": "--for", "name": "--name"}
+"""Keys of an event that are options of a command."""
 _NEEDED = {"join": "say how many agents join", "end": "name the fault to end"}
 """What is missing where no word follows an action; agents after the others."""
 
@@ -137,6 +139,8 @@ def fault(
     any kind before its time, by its name: its kind and number, as in "kill-2", unless --name gave
     it another one.
     """
+    if action in RADIO_ACTIONS and action not in FAULTS:
+        raise _bad(action, "ACTION", f"it is of the radio; write qswarm netem {run} {action}")
     if action not in FAULTS:
         raise _bad(action, "ACTION", f"allowed: {', '.join(FAULTS)}")
     event = _fault(action, selectors or [])
@@ -188,8 +192,15 @@ def change_radio(run: Path, action: str, words: list[str], more: EventKeys) -> i
         case "partition" | "jam" | "flap" | "sabotage":
             event = {action: _table(words)}
         case _:
-            raise _bad(action, "ACTION", f"allowed: {', '.join(RADIO_ACTIONS)}")
+            raise _not_of_radio(run, action)
     return _request(run, event, more)
+
+
+def _not_of_radio(run: Path, action: str) -> typer.BadParameter:
+    detail = f"allowed: {', '.join(RADIO_ACTIONS)}"
+    if action in FAULTS:
+        detail = f"it is not of the radio; write qswarm fault {run} {action}"
+    return _bad(action, "ACTION", detail)
 
 
 def _selectors(words: list[str]) -> list[int | str]:
@@ -280,6 +291,8 @@ def _table(settings: list[str]) -> dict[str, Any]:
         key, equals, _ = (part.strip() for part in setting.partition("="))
         if not equals or not key:
             raise _bad(setting, "KEY=VALUE", "write it as KEY=VALUE")
+        if key in _OPTIONS:
+            raise _bad(setting, "KEY=VALUE", f"it is an option; write {_OPTIONS[key]} VALUE")
         for before in given:
             if f"{key}.".startswith(f"{before}.") or f"{before}.".startswith(f"{key}."):
                 raise _bad(setting, "KEY=VALUE", f"{before} is given before")
