@@ -185,6 +185,21 @@ def test_an_outcome_that_the_run_cannot_have_is_named(
     assert (honest.differences, honest.contradictions) == ((), ())
 
 
+def test_a_run_that_a_kill_of_the_world_ended_is_compared_in_full(tmp_path: Path) -> None:
+    flown = SCENARIO.replace("kill = [2]", 'kill = ["world"]').replace("at_s = 2.0", "at_s = 1.01")
+    simulate(Job(parse(flown), tmp_path / "run", recording=True), StopRequest())
+    verification = verify(tmp_path / "run")
+    assert (verification.whole, verification.uncompared) == (False, None)
+    assert (verification.differences, verification.contradictions) == ((), ())
+    assert verification.exit_status == 3
+    file = tmp_path / "run" / "summary.json"
+    summary = json.loads(file.read_text())
+    false = {"turns_over_limit_fraction": 0.5, "outcome": "pass", "duration_s": 6.0, "faults": []}
+    file.write_text(json.dumps(summary | false))
+    named = {each.key.partition(".")[0] for each in compared(verification, file).differences}
+    assert named == set(false)
+
+
 @pytest.mark.parametrize("count", [None, -1, True, "3"])
 def test_a_count_that_is_none_is_named(
     run: Path, judged: Verification, tmp_path: Path, count: object

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from worldsim.judge.event import PlannedEvent
-from worldsim.judge.run_events import RunEvent
+from worldsim.judge.run_events import RunEvent, WorldStopped
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures, Judge
 from worldsim.recording.readback import Readback
@@ -33,6 +33,9 @@ def rejudge(readback: Readback) -> Rejudged:
             judge.handle_event(events[noted])
             noted += 1
         figures.append(judge.see(tick))
+    if any(isinstance(each, WorldStopped) and each.cause == "kill" for each in events[noted:]):
+        for event in events[noted:]:  # the run ended between two ticks
+            judge.handle_event(event)
     return Rejudged(judge, figures)
 
 
