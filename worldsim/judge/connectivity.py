@@ -181,8 +181,10 @@ class Connectivity:
         bounded = self.dissemination_s(agents, found.hops, found.loss) < inf
         groups = self.groups(tick.position, tick.alive)
         return Spreads(
-            local=not self._too_old[LOCAL] and groups.max(initial=0) == 0,
-            multihop=not self._too_old[MULTIHOP] and bounded and found.label.max(initial=0) == 0,
+            local=not self._too_old[LOCAL] and int(groups.max(initial=0)) == 0,
+            multihop=(
+                not self._too_old[MULTIHOP] and bounded and int(found.label.max(initial=0)) == 0
+            ),
         )
 
     def dissemination_s(self, agents: int, hops: int, loss: float | None = None) -> float:

@@ -6,8 +6,6 @@ conditions counts where with it news does not reach all in a bounded time, and w
 
 from itertools import permutations
 
-import msgspec
-
 from netem.conditions import NetworkConditions
 from netem.faults import Flap
 from netem.link_parameters import Conditions
@@ -25,15 +23,13 @@ from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import Scenario
 
 
-class _Cut(msgspec.Struct):
-    """A partition, jam or flap in force."""
+class _Cut:
+    """A partition, jam or flap in force. network: with this fault alone."""
 
-    network: NetworkConditions
-    """With this fault alone."""
-    flap: Flap | None
-    partitions: bool
-    struck: bool = False
-    """Whether it has cut a link since it began."""
+    def __init__(self, network: NetworkConditions, flap: Flap | None, partitions: bool) -> None:
+        self.network, self.flap, self.partitions = network, flap, partitions
+        self.struck = False
+        """Whether it has cut a link since it began."""
 
     def cuts(self, running: list[int], tick: Tick | None) -> bool:
         """Return whether it cuts a link between two running agents now.
