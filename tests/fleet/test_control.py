@@ -122,9 +122,18 @@ def test_a_saboteur_works_until_it_is_ended() -> None:
     assert fleet.ask(end="sabotage-1").faults == ()
     fleet.fly(3.0)
     assert fleet.virtual.medium_counters.sent - sent < 0.7 * sent
-    fleet.ask(kill=[2])
-    with pytest.raises(RequestError, match="no such agent has a radio"):
-        fleet.ask(sabotage={"kind": "flood", "agents": [2]})
+
+
+def test_a_saboteur_takes_hold_of_an_agent_that_is_dead_once_it_is_back() -> None:
+    fleet = OperatedFleet()
+    fleet.ask(kill=[2], for_s=1)
+    (_, active) = fleet.ask(sabotage={"kind": "flood", "agents": [2]}).faults
+    assert active.fault.victims == (2,)
+    fleet.fly(2.0)
+    dead = dict(fleet.virtual.medium_counters.struck).get(active.number, 0)
+    fleet.fly(6.0)
+    alive = dict(fleet.virtual.medium_counters.struck)[active.number] - dead
+    assert alive > 100 > dead
 
 
 def test_every_fault_in_force_is_reported_with_whom_it_strikes_and_until_when() -> None:

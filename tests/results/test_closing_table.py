@@ -68,7 +68,7 @@ def row(name: str, wanted: Any, got: Any, held: bool | None, margin: Any = None)
             [
                 "formation restored after each fault",
                 "<= 10 s",
-                "not tested, there was none",
+                "not tested, none took it away",
                 "not tested",
             ],
         ),

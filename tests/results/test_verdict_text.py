@@ -102,8 +102,7 @@ def test_the_viewer_is_named_where_there_is_a_recording(summary: Summary) -> Non
         ),
         (
             row("reform_within_s", 10.0, None, True),
-            "  -        formation after a fault: not tested, there was none that takes it away"
-            " (limit 10 s)",
+            "  -        formation after a fault: not tested, none took it away (limit 10 s)",
         ),
         (
             row("attitude_within_deg", 5.0, 41.26, False),

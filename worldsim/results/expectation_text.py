@@ -237,7 +237,7 @@ def _unmeasured(row: ExpectationRow) -> str:
 def _reform(row: ExpectationRow, run: Circumstances) -> str:
     limit = _limit(row)
     if not was_tested(row):
-        return f"formation after a fault: not tested, there was none that takes it away{limit}"
+        return f"formation after a fault: not tested, none took it away{limit}"
     if row["held"]:
         return f"formation restored within {row['got']:.3g} s of each fault{limit}"
     worst = _slowest(row, run)
