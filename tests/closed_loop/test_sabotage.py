@@ -94,5 +94,5 @@ def test_a_fault_says_how_many_frames_of_a_saboteur_were_received() -> None:
 
 def test_sabotage_by_nobodys_radio_strikes_nothing() -> None:
     flight = fly(scenario(CLEAN, "at_s = 0.5\nkill = [1, 2]", sabotage("garbage")))
-    assert [each.agents for each in flight.loop.effects.faults.all] == [[1, 2], []]
-    assert flight.rejected == 0
+    assert [each.agents for each in flight.loop.effects.faults.all] == [[1, 2], [1, 2]]
+    assert (flight.medium_counters.struck, flight.rejected) == ((), 0), "their radios are off"
