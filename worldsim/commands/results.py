@@ -24,7 +24,7 @@ RecordedRun = Annotated[
 @commands.command(
     epilog=examples(
         "qswarm export runs/mine --parquet",
-        "qswarm export runs/mine --csv --mcap --out /tmp/mine",
+        "qswarm export runs/mine --csv --mcap --out tables",
         "python -c \"import pandas; pandas.read_parquet('runs/mine/export/poses.parquet').info()\"",
     )
 )
