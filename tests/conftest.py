@@ -13,6 +13,7 @@ FLYING = (
     "export",
     "judge",
     "link_check",
+    "pictures",
     "random_flights",
     "recording",
     "report",

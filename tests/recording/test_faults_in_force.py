@@ -132,8 +132,7 @@ def missing(links: list[tuple[int, int]], *events: RunEvent) -> dict[str, set[tu
         situations.handle_event(event)
     found = missing_links(tick, situations.at(replace(tick, time_s=9.0)))
     return {
-        entity: {tuple(x.index(end[0]) for end in line) for line in lines.tolist()}
-        for entity, lines in found.items()
+        entity: {(one, other) for one, other in pairs.tolist()} for entity, pairs in found.items()
     }
 
 

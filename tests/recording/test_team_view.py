@@ -97,13 +97,20 @@ def test_the_view_does_not_zoom_out_to_a_vehicle_left_behind() -> None:
 
 
 def test_targets_are_in_view() -> None:
-    ticks = [replace(tick, target=tick.target + 3.0) for tick in flight(moving)]
+    ticks = [replace(tick, target=tick.target + 0.5) for tick in flight(moving)]
     ticks[9].target[0] = np.nan
     blocks = blocks_of(ticks)
     centres = numbers(blocks, layout.TEAM, "Transform3D:translation")
     scales = numbers(blocks, layout.TEAM, "Transform3D:scale")
     shown = [(tick.target - c) / s for tick, c, s in zip(ticks, centres, scales, strict=True)]
     assert np.nanmax(np.linalg.norm(shown, axis=2)) <= 1.0
+
+
+def test_targets_far_away_do_not_make_the_team_a_dot() -> None:
+    ticks = [replace(tick, target=tick.target + 100.0) for tick in flight(lambda _: START)]
+    scales = numbers(blocks_of(ticks), layout.TEAM, "Transform3D:scale")
+    team_m = np.linalg.norm(START - 0.5 * (START.min(axis=0) + START.max(axis=0)), axis=1).max()
+    assert scales.max() <= 1.7 * team_m
 
 
 def test_a_single_agent_is_not_a_point_in_the_view() -> None:

@@ -22,9 +22,11 @@ LINES_PER_S = 2000
 
 MISSING_EVERY_S = (0.2, 5.0)
 """Missing links are looked for at least so often, also in a large fleet, where they are many."""
+MOVED_EVERY_S = 1.0
+"""Between two looks, their lines move with the vehicles at least so often."""
 
-Missing = dict[str, Floats]
-"""Lines (K, 2, 3) [m; world frame] by entity."""
+Missing = dict[str, NDArray[np.intp]]
+"""Pairs of agents (K, 2) by entity."""
 Matrices = NDArray[np.bool_]
 """For each tick, who hears whom (T, N * N)."""
 Pairs = tuple[NDArray[np.intp], NDArray[np.intp]]
@@ -36,12 +38,12 @@ class LinkColumns:
 
     def __init__(self, tick_hz: float) -> None:
         self._matrix_changes = ChangeDetector()
-        self._missed: dict[str, int] = {}
-        """How many lines each entity of missing links shows."""
+        self._missing: Missing = {}
+        """The missing links that are shown."""
         self._tick_hz = tick_hz
         self._sought_in: Situation | None = None
-        self._sought_at = 0
-        """Where missing links were last looked for."""
+        self._sought_at = self._moved_at = 0
+        """The ticks at which missing links were last looked for, and last drawn."""
         self._line_rate = LineRateLimiter(tick_hz, LINES_PER_S)
 
     def blocks(
@@ -71,15 +73,16 @@ class LinkColumns:
         one, other = _pairs(agents)
         there, back = one * agents + other, other * agents + one
         drawn: dict[int, Floats] = {}
+        heard_pairs: dict[int, int] = {}
         for row, (tick, heard) in enumerate(zip(ticks, hears, strict=True)):
             if self._line_rate.allows(tick.index):
                 linked = np.flatnonzero(heard[there] | heard[back])
-                ends = tick.position[np.stack((one[linked], other[linked]), axis=1)]
-                drawn[row] = _shortest(ends)
+                drawn[row] = _lines(tick, np.stack((one[linked], other[linked]), axis=1))
+                heard_pairs[row] = len(linked)
                 self._line_rate.count(tick.index, len(drawn[row]))
         if drawn:
             yield _strips(layout.LINKS, list(drawn), list(drawn.values()))
-        return {row: len(lines) for row, lines in drawn.items()}
+        return heard_pairs
 
     def _verdicts(
         self,
@@ -89,20 +92,24 @@ class LinkColumns:
     ) -> Iterator[ColumnBlock]:
         """Yield the pairs that do not hear each other, by the reason, where there are any.
 
-        They are looked for where the situation changes, and else rarely. heard: how many pairs hear
-        each other, in which rows.
+        They are looked for where the situation changes, and else rarely; in between, their lines
+        move with the vehicles. heard: how many pairs hear each other, in which rows.
         """
-        rows = [row for row in heard if self._is_due(ticks[row], situations[row])]
-        missing = [missing_links(ticks[row], situations[row]) for row in rows]
-        yield from self._counts(rows, [heard[row] for row in rows], missing)
+        shown: dict[int, Missing] = {}
+        sought: dict[int, Missing] = {}
+        before = self._missing
+        for row in heard:
+            if self._is_due(ticks[row], situations[row]):
+                sought[row] = self._missing = missing_links(ticks[row], situations[row])
+            if row in sought or self._has_moved(ticks[row]):
+                shown[row] = self._missing
+                self._moved_at = ticks[row].index
+        yield from self._counts([heard[row] for row in sought], sought)
         for entity in (layout.LINKS_LOST, layout.LINKS_CUT, layout.LINKS_OUT_OF_RANGE):
-            drawn = [each[entity] for each in missing]
-            # While there are none, nothing is repeated.
-            before = [self._missed.get(entity, 0), *map(len, drawn)]
-            some = [at for at in range(len(drawn)) if before[at] or before[at + 1]]
-            self._missed[entity] = before[-1]
-            if some:
-                yield _strips(entity, [rows[at] for at in some], [drawn[at] for at in some])
+            yield from _moving_lines(entity, ticks, shown, len(before.get(entity, ())))
+
+    def _has_moved(self, tick: Tick) -> bool:
+        return tick.index >= self._moved_at + round(self._tick_hz * MOVED_EVERY_S)
 
     def _is_due(self, tick: Tick, situation: Situation) -> bool:
         """Return whether missing links are to be found at a tick."""
@@ -114,23 +121,23 @@ class LinkColumns:
         return True
 
     def _counts(
-        self, rows: Sequence[int], heard: Sequence[int], missing: Sequence[Missing]
+        self, heard: Sequence[int], missing: Mapping[int, Missing]
     ) -> Iterator[ColumnBlock]:
         """Yield how many pairs have a link, and how many are missing, by the reason."""
-        if rows:
+        if missing:
             counts = [
-                [linked, *(len(lines) for lines in each.values())]
-                for linked, each in zip(heard, missing, strict=True)
+                [linked, *(len(pairs) for pairs in each.values())]
+                for linked, each in zip(heard, missing.values(), strict=True)
             ]
-            yield ColumnBlock(layout.LINK_COUNTS, rows, [SCALARS.rows(np.array(counts))])
+            yield ColumnBlock(layout.LINK_COUNTS, list(missing), [SCALARS.rows(np.array(counts))])
 
 
 def missing_links(tick: Tick, situation: Situation) -> Missing:
-    """Return a line (K, 2, 3) [m; world frame] for each pair that does not hear each other.
+    """Return the pairs of agents (K, 2) that do not hear each other.
 
     By entity. A pair of running agents is cut where a fault cuts a direction in which it is not
-    heard, else lost where such a direction is within its range, else out of range. Of more than
-    LINES_MAX, the shortest are kept; of large fleets, none out of range.
+    heard, else lost where such a direction is within its range, else out of range. Of large fleets,
+    none is out of range.
     """
     agents = len(tick.alive)
     one, other = _pairs(agents)
@@ -138,8 +145,8 @@ def missing_links(tick: Tick, situation: Situation) -> Missing:
     apart = tick.alive[one] & tick.alive[other]
     apart &= ~(hears[one * agents + other] & hears[other * agents + one])
     one, other = one[apart], other[apart]
-    ends = np.stack((tick.position[one], tick.position[other]), axis=1)
-    away = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    pairs = np.stack((one, other), axis=1)
+    away = np.linalg.norm(tick.position[other] - tick.position[one], axis=1)
     near, cuts = np.zeros((2, len(one)), dtype=np.bool_)
     for source, hearer in ((one, other), (other, one)):
         unheard = ~hears[hearer * agents + source]
@@ -148,10 +155,28 @@ def missing_links(tick: Tick, situation: Situation) -> Missing:
         cuts |= unheard & cut[source, hearer]
     far = ~near if agents <= layout.NAMED_MAX else np.zeros_like(near)
     return {
-        layout.LINKS_CUT: _shortest(ends[cuts]),
-        layout.LINKS_LOST: _shortest(ends[near & ~cuts]),
-        layout.LINKS_OUT_OF_RANGE: _shortest(ends[far]),
+        layout.LINKS_CUT: pairs[cuts],
+        layout.LINKS_LOST: pairs[near & ~cuts],
+        layout.LINKS_OUT_OF_RANGE: pairs[far],
     }
+
+
+def _moving_lines(
+    entity: str, ticks: Sequence[Tick], shown: Mapping[int, Missing], before: int
+) -> Iterator[ColumnBlock]:
+    """Yield the lines of missing links in some rows, and none once, where they end.
+
+    before: how many lines are shown before the first row.
+    """
+    rows, drawn = [], []
+    for row, missing in shown.items():
+        lines = _lines(ticks[row], missing[entity])
+        if len(lines) or before:
+            rows.append(row)
+            drawn.append(lines)
+        before = len(lines)
+    if rows:
+        yield _strips(entity, rows, drawn)
 
 
 def _strips(entity: str, rows: Sequence[int], drawn: Sequence[Floats]) -> ColumnBlock:
@@ -159,8 +184,12 @@ def _strips(entity: str, rows: Sequence[int], drawn: Sequence[Floats]) -> Column
     return ColumnBlock(entity, rows, [STRIPS.parts(np.concatenate(drawn), lengths)])
 
 
-def _shortest(ends: Floats) -> Floats:
-    """Return the LINES_MAX shortest of lines (K, 2, 3), of those between vehicles in the world."""
+def _lines(tick: Tick, pairs: NDArray[np.intp]) -> Floats:
+    """Return the lines (K, 2, 3) [m; world frame] of pairs of agents, of those in the world.
+
+    Of more than LINES_MAX, the shortest.
+    """
+    ends = tick.position[pairs]
     along = ends[:, 1] - ends[:, 0]
     square = np.einsum("ij,ij->i", along, along)
     if len(ends) > LINES_MAX:

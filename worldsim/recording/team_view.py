@@ -2,8 +2,9 @@
 
 The 3D view is drawn in the coordinates of this frame. Its origin lies amid the running agents, and
 its unit of length is the distance of the farthest of them and of their targets: a camera at rest in
-it shows the team at every time. The unit grows at once and shrinks slowly, so that the picture is
-calm. The ground is a grid that rests in the world: it moves by whole cells, to stay below the team.
+it shows the team at every time. Targets far beyond the team are out of view, lest the team is a
+dot. The unit grows at once and shrinks slowly, so that the picture is calm. The ground is a grid
+that rests in the world: it moves by whole cells, to stay below the team.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,6 +21,8 @@ from worldsim.recording.components import SCALES, TRANSLATIONS
 from worldsim.truth.vehicle import Floats
 
 LEAST_RADIUS_M = 1.5
+TARGETS_WITHIN = 1.5
+"""Targets are in view up to this distance [distances of the farthest agent]."""
 MARGIN = 1.08
 """The view's radius to the distance of the farthest agent."""
 FOLLOW_S = 1.0
@@ -86,9 +89,9 @@ class TeamView:
         targets = np.stack([tick.target for tick in ticks])
         alive = np.stack([tick.alive for tick in ticks])
         aims: Floats = np.where(alive[..., None], targets, np.nan).astype(np.float64)
-        seen = np.concatenate((team, aims), axis=1) - centres[:, None, :]
-        square = np.einsum("ijk,ijk->ij", seen, seen)
-        reach_m = np.sqrt(np.where(np.isnan(square), 0.0, square).max(axis=1))
+        team_m, aims_m = _reach(team, centres), _reach(aims, centres)
+        least_m = np.maximum(team_m, LEAST_RADIUS_M)
+        reach_m = np.maximum(team_m, np.minimum(aims_m, TARGETS_WITHIN * least_m))
         radii_m = np.zeros(len(ticks))
         for row, reached_m in enumerate(reach_m.tolist()):
             shrunk_m = self._radius_m * self._shrink
@@ -127,6 +130,14 @@ def _team(ticks: Sequence[Tick]) -> Floats:
     running[~np.any(seen, axis=1)] = True
     team: Floats = np.where(running[..., None], position, np.nan)
     return team
+
+
+def _reach(points: Floats, centres: Floats) -> Floats:
+    """Return how far the farthest of points (T, N, 3) is from a centre (T, 3), NaN left out."""
+    away = points - centres[:, None, :]
+    square = np.einsum("ijk,ijk->ij", away, away)
+    reach: Floats = np.sqrt(np.where(np.isnan(square), 0.0, square).max(axis=1))
+    return reach
 
 
 def _round_length(least_m: float) -> float:

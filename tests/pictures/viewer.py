@@ -1,18 +1,18 @@
-"""Makes a picture of a recording without a display: ``python docs/picture.py RUN.rrd 3.0 OUT.png``.
+"""The rerun viewer without a display: it opens recordings and takes pictures of them.
 
-A fourth argument opens another tab of the layout: network, structure or faults. Needs a software
-Vulkan driver (Debian: mesa-vulkan-drivers), whose file VK_ICD_FILENAMES may name.
+It needs a software Vulkan driver (Debian: mesa-vulkan-drivers), whose file VK_ICD_FILENAMES may
+name.
 """
 
 import os
 import socket
 import subprocess
-import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from time import monotonic, sleep
+from typing import NamedTuple
 
 import rerun_cli
 from PIL import Image
@@ -28,15 +28,23 @@ NOTICE_S = 8.0
 """For so long the viewer shows a notice of its start."""
 
 
-def main() -> None:
-    """Take one picture of a recording at a simulated time [s]."""
-    recording, at_s, out = Path(sys.argv[1]), float(sys.argv[2]), Path(sys.argv[3])
+class View(NamedTuple):
+    """What to take a picture of: a time [s], a tab of the layout, and the file to write."""
+
+    at_s: float
+    tab: str
+    file: Path
+
+
+def take(recording: Path, views: Sequence[View]) -> None:
+    """Take pictures (PNG) of a recording."""
     with viewer() as client:
         client.open(str(recording.resolve()))
-        client.set_time("sim_time", duration=at_s, play_state="paused")
-        for tab in sys.argv[4:]:
-            open_tab(client, tab)
-        save(settled(client), out)
+        sleep(NOTICE_S)
+        for view in views:
+            client.set_time("sim_time", duration=view.at_s, play_state="paused")
+            open_tab(client, view.tab)
+            save(settled(client), view.file)
 
 
 def open_tab(client: ViewerClient, name: str) -> None:
@@ -89,7 +97,6 @@ def connected(port: int) -> ViewerClient:
 
 def settled(client: ViewerClient) -> bytes:
     """Return a picture as soon as two in a row are alike."""
-    sleep(NOTICE_S)
     until = monotonic() + SETTLE_S
     before = b""
     while monotonic() < until:
@@ -107,7 +114,3 @@ def save(picture: bytes, out: Path) -> None:
         width, height = image.size
         page = image.convert("RGB").crop((0, TOP_BAR_PX, width, height))
         page.save(out, optimize=True)
-
-
-if __name__ == "__main__":
-    main()
