@@ -1,9 +1,11 @@
-"""Lengths of vectors in plain floats, for decisions: they differ from math.dist by rounding alone.
+"""Lengths and turns of vectors in plain floats.
 
-Compiled code calls these without making objects. What is flown is computed by math.dist and hypot.
+Compiled code calls the lengths without making objects. They differ from math.dist by rounding
+alone, and serve decisions: what is flown is computed by math.dist and hypot.
 """
 
-from math import sqrt
+from collections.abc import Iterable
+from math import cos, sin, sqrt
 
 from agent.messages import Vector
 
@@ -23,3 +25,9 @@ def length(vector: Vector) -> float:
 def across(vector: Vector) -> float:
     """Return the length of a vector's horizontal part."""
     return sqrt(vector[0] * vector[0] + vector[1] * vector[1])
+
+
+def turned(vectors: Iterable[Vector], yaw: float) -> list[Vector]:
+    """Return vectors of a level body's axes in the world's axes; yaw: its heading [rad]."""
+    c, s = cos(yaw), sin(yaw)
+    return [(c * x - s * y, s * x + c * y, z) for x, y, z in vectors]

@@ -18,6 +18,7 @@ from typing import Final, Protocol, assert_never
 
 from agent.config import AvoidanceKind
 from agent.messages import ZERO, Vector
+from agent.vectors import turned
 
 LINES: Final = 8
 AGENTS: Final = 4
@@ -78,15 +79,26 @@ class Constellation:
         near = [p for p in points if p[0] * p[0] + p[1] * p[1] + p[2] * p[2] < self._near]
         if not near:
             return ZERO
-        c, s = cos(yaw), sin(yaw)
+        common = turned([(-BEHIND_M, 0.0, 0.0)], yaw)[0]
         x = y = z = 0.0
         for line in DEFAULT_LINES:
-            turned = [(c * a - s * b, s * a + c * b, h) for a, b, h in line]
-            dx, dy, dz = self._line_term(turned, (-BEHIND_M * c, -BEHIND_M * s, 0.0), near)
+            dx, dy, dz = self._line_term(turned(line, yaw), common, near)
             x, y, z = x + dx, y + dy, z + dz
         length = sqrt(x * x + y * y + z * z)
         scale = min(1.0, MAX_OMEGA_M / max(length, 1e-9))
         return (-scale * x, -scale * y, -scale * z)
+
+    def bent_lines(self, yaw: float, points: Sequence[Vector]) -> list[list[Vector]]:
+        """Return the agents of each line, from the common one on, as sensed points bend them.
+
+        yaw: heading [rad]; points and lines: relative to the vehicle [m; world axes].
+        """
+        common = turned([(-BEHIND_M, 0.0, 0.0)], yaw)[0]
+        near = list(points)
+        return [
+            [common, *[here for _, here in self._bent(turned(line, yaw), common, near)]]
+            for line in DEFAULT_LINES
+        ]
 
     def _line_term(self, default: list[Vector], common: Vector, points: list[Vector]) -> Vector:
         """Return the term of one line [m; world axes].
@@ -94,13 +106,11 @@ class Constellation:
         default: its undisturbed agents; common: the common agent; both and the points relative to
         the vehicle [m; world axes].
         """
-        before, last, drawn_in = common, common, 1.0
+        last, drawn_in = common, 1.0
         x = y = z = 0.0
-        for a, (u, v, w) in enumerate(default):
-            ahead = default[0] if a == 0 else _beyond(before, last)
-            f = self._free_share(ahead, points)
+        for a, (f, here) in enumerate(self._bent(default, common, points)):
+            u, v, w = default[a]
             drawn_in = min(drawn_in, f)
-            here = ahead if f == 1.0 else (f * ahead[0], f * ahead[1], f * ahead[2])
             x += DISPLACEMENT_GAIN * (here[0] - u)
             y += DISPLACEMENT_GAIN * (here[1] - v)
             z += DISPLACEMENT_GAIN * (here[2] - w)
@@ -109,8 +119,22 @@ class Constellation:
                 dx, dy, dz = here[0] - last[0], here[1] - last[1], here[2] - last[2]
                 weight = TANGENT_GAIN * share / max(sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
                 x, y, z = x + weight * dx, y + weight * dy, z + weight * dz
-            before, last = last, here
+            last = here
         return (x, y, z)
+
+    def _bent(
+        self, default: list[Vector], common: Vector, points: list[Vector]
+    ) -> list[tuple[float, Vector]]:
+        """Return each agent of a line: the free share of the way to it, and where it stands."""
+        before, last = common, common
+        bent = []
+        for a in range(len(default)):
+            ahead = default[0] if a == 0 else _beyond(before, last)
+            f = self._free_share(ahead, points)
+            here = ahead if f == 1.0 else (f * ahead[0], f * ahead[1], f * ahead[2])
+            bent.append((f, here))
+            before, last = last, here
+        return bent
 
     def _free_share(self, ahead: Vector, points: list[Vector]) -> float:
         """Return the free share of the way from the vehicle to an agent: 1 if all of it is free.

@@ -6,11 +6,12 @@ some seconds, and a point that a later ray passes through: vehicles move on and 
 
 from array import array
 from collections.abc import Iterable, Sequence
-from math import atan2, cos, hypot, pi, sin
+from math import atan2, hypot, pi
 from typing import Final
 
 from agent.messages import NO_ECHO_MM, PROXIMITY_RANGE_M, Scan, Vector
 from agent.sensing.ray_pattern import Grid, Pattern
+from agent.vectors import turned
 
 KEPT_S: Final = 6.0
 CUBE_M: Final = 0.15
@@ -59,7 +60,7 @@ class PointMap:
         if pattern is None or len(ranges) != len(pattern.axes):
             return
         self._forget_old(now_s)
-        axes = _turned(pattern.axes, yaw)
+        axes = turned(pattern.axes, yaw)
         if pattern.grid is not None:
             self._clear_passed(pattern.grid, ranges, pattern.range_m, here, yaw)
         for axis, millimetres in zip(axes, ranges, strict=True):
@@ -127,11 +128,6 @@ def _passed(point: MapPoint, millimetres: int, away_m: float) -> bool:
     else:
         point.misses = MISSES if 0.001 * millimetres > away_m + PASSED_M else 0
     return point.misses >= MISSES
-
-
-def _turned(axes: Iterable[Vector], yaw: float) -> list[Vector]:
-    c, s = cos(yaw), sin(yaw)
-    return [(c * x - s * y, s * x + c * y, z) for x, y, z in axes]
 
 
 def _wrapped(angle: float) -> float:

@@ -1,8 +1,11 @@
 """Faults of single agents whose processes go on: the others are unaffected, and nobody collides."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
+from agent.messages import Observation
 from tests.closed_loop.test_faults import (
     BAD,
     check_safety,
@@ -135,6 +138,9 @@ class Heard:
         if tick.time_s > 12.0:
             for agent, heard in enumerate(np.bincount(tick.links[:, 0], minlength=9).tolist()):
                 self.least[agent] = min(self.least[agent], heard)
+
+    def observe(self, observations: Sequence[tuple[int, Observation]]) -> None:
+        """What agents observe is not looked at."""
 
     def event(self, event: RunEvent) -> None:
         """The loop keeps the events itself."""

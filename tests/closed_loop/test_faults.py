@@ -1,12 +1,14 @@
 """The timeline in flight: missions, losses, joins, partitions; for a few seeds each."""
 
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from random import Random
 
 import numpy as np
 import pytest
 
+from agent.messages import Observation
 from worldsim.engine.virtual import Flight, fly
 from worldsim.judge.run_events import RunEvent
 from worldsim.judge.tick import Tick
@@ -32,6 +34,9 @@ class TickList:
 
     def tick(self, tick: Tick, figures: Figures) -> None:
         self.ticks.append(tick)
+
+    def observe(self, observations: Sequence[tuple[int, Observation]]) -> None:
+        """What agents observe is not looked at."""
 
     def event(self, event: RunEvent) -> None:
         """The loop keeps the events itself."""

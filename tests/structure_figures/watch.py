@@ -6,13 +6,14 @@ layout for their number, each within 0.12 m of its own, for 2 s.
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import inf
 from typing import Any, assert_never
 
 import numpy as np
 
-from agent.messages import FramePath, Place
+from agent.messages import FramePath, Observation, Place
 from agent.qstructure.formation import formation_of
 from agent.qstructure.frame_path import ends_s
 from tests.structure_figures.bound import arrival_bound_s
@@ -107,6 +108,9 @@ class Watcher:
         path = path_of(scenario.frame)
         self._phase, self._frame_rests_s = Phase(formation, 0.0, path), ends_s(path)
         self._open("form", 0.0)
+
+    def observe(self, observations: Sequence[tuple[int, Observation]]) -> None:
+        """What agents observe is not looked at."""
 
     def event(self, event: RunEvent) -> None:
         """Take an event, before the tick of its time."""

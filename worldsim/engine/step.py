@@ -5,7 +5,7 @@ the start of the slot it calls ``open``; it takes the observations to the agents
 to ``apply_command``, and then calls ``close``. The clock decides how messages travel.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from math import nan
 from typing import Protocol, final
 
@@ -46,6 +46,9 @@ class Recorder(Protocol):
 
     def tick(self, tick: Tick, figures: Figures) -> None:
         """Record one tick."""
+
+    def observe(self, observations: Sequence[tuple[int, Observation]]) -> None:
+        """Record what some agents observe, each given with its agent."""
 
     def event(self, event: RunEvent) -> None:
         """Record one event."""
@@ -169,6 +172,8 @@ class SlotLoop:
         observations = list(zip(group, world.observe(group), strict=True)) if group else []
         for agent, observation in observations:
             self._headings[agent] = observation.yaw
+        if self._recorder is not None and self._records_ticks:
+            self._recorder.observe(observations)
         if slow:
             observations = [self._with_delay(*each) for each in observations]
         mission = self.effects.missions.unknown(running)

@@ -31,7 +31,15 @@ FORMATION_LAYERS = tuple(
     for part in (layout.SLOTS_PART, layout.SPHERES_PART, layout.QUEUES_PART)
 )
 GUIDANCE_LAYERS = (layout.TARGETS, layout.HIERARCHY)
-ASKED_FOR = (layout.LINKS_OUT_OF_RANGE, layout.CAST_ZONES, layout.BOBBERS, layout.WAYS)
+ASKED_FOR = (
+    layout.LINKS_OUT_OF_RANGE,
+    layout.CAST_ZONES,
+    layout.BOBBERS,
+    layout.WAYS,
+    layout.GUIDING_LINES,
+    layout.CONSTELLATION,
+    layout.RAYS,
+)
 """Detail that every view hides."""
 LAYERS = (
     *LINK_LAYERS,

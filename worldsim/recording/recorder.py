@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
+from agent.messages import Observation
 from agent.qstructure.formation import Formation, FormationSpec
 from worldsim.judge.event_text import WARNINGS, sentence
 from worldsim.judge.run_events import (
@@ -48,6 +49,7 @@ from worldsim.recording.panels import (
     queue_colours,
     verdict,
 )
+from worldsim.recording.sensing_columns import SensingColumns
 from worldsim.recording.situation import Situations
 from worldsim.recording.state_columns import StateColumns
 from worldsim.recording.static_entities import (
@@ -117,6 +119,7 @@ class RunRecorder:
         self._fault_columns = FaultColumns(radius_m, half_sizes(scenario))
         self._obstacles = ObstacleEntities(Obstacles(scenario.obstacle))
         self._guidance = GuidanceColumns(scenario) if forms else None
+        self._sensing = SensingColumns(scenario)
         self._team_view = TeamView(1.0 / tick_hz)
         self._ticks_per_block = max(1, round(tick_hz * BLOCK_S))
         self._blocks_sent = 0
@@ -136,6 +139,11 @@ class RunRecorder:
         self._figures.append(figures)
         if len(self._ticks) >= self._ticks_per_block:
             self._attempt(self._send_block)
+
+    def observe(self, observations: Sequence[tuple[int, Observation]]) -> None:
+        """Record what some agents observe."""
+        if self._working:
+            self._sensing.observe(observations)
 
     def event(self, event: RunEvent) -> None:
         """Record one event."""
@@ -244,6 +252,7 @@ class RunRecorder:
         yield from self._state_columns.connectivity(ticks)
         if self._guidance is not None:
             yield from self._guidance.blocks(ticks)
+        yield from self._sensing.blocks(ticks)
 
     def _blocks(self) -> Iterator[ColumnBlock]:
         situations = [self._situations.at(tick) for tick in self._ticks]

@@ -112,6 +112,12 @@ def _guidance_styles() -> Iterator[Entity]:
     yield Entity(layout.WAYS, rr.LineStrips3D.from_fields(colors=colours, radii=radii))
     bobbers = rr.Points3D.from_fields(colors=np.array([palette.BOBBER]), radii=[TARGET_RADIUS_M])
     yield Entity(layout.BOBBERS, bobbers)
+    bent = np.array([palette.CONSTELLATION])
+    yield Entity(layout.GUIDING_LINES, rr.LineStrips3D.from_fields(colors=bent, radii=radii))
+    agents = rr.Points3D.from_fields(colors=bent, radii=[2.0 * LINK_RADIUS_M])
+    yield Entity(layout.CONSTELLATION, agents)
+    sensed = np.array([palette.SENSED])
+    yield Entity(layout.RAYS, rr.LineStrips3D.from_fields(colors=sensed, radii=radii))
 
 
 def _fault_styles() -> Iterator[Entity]:

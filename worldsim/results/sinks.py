@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol
 
+from agent.messages import Observation
 from worldsim.engine.step import Recorder
 from worldsim.judge.run_events import RunEvent, as_row
 from worldsim.judge.tick import Tick
@@ -31,6 +32,11 @@ class Sinks:
         """Record one tick."""
         if self._recorder is not None:
             self._recorder.tick(tick, figures)
+
+    def observe(self, observations: Sequence[tuple[int, Observation]]) -> None:
+        """Record what some agents observe, each given with its agent."""
+        if self._recorder is not None:
+            self._recorder.observe(observations)
 
     def fill_disk(self, full: bool) -> None:
         """Let every write of events and recorder fail as on a full disk, or no longer."""
