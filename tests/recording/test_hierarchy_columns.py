@@ -9,14 +9,19 @@ from rerun.chunk import Chunk, RrdReader
 
 from agent.messages import DISTRESS, MEMBER, SUB_VERTEX, VERTEX
 from tests.recording.flights import record, straight_flight, wedge
-from worldsim.judge.tick import HierarchyRows, Tick
-from worldsim.recording.hierarchy_columns import parent_lines
+from worldsim.judge.tick import NO_ROLE, HierarchyRows, Tick
+from worldsim.judge.verdict import Figures
+from worldsim.recording import layout
+from worldsim.recording.columns import ColumnBlock
+from worldsim.recording.hierarchy_columns import HierarchyColumns, parent_lines
 from worldsim.recording.recorder import RunRecorder
+from worldsim.recording.situation import Situations
 
 AGENTS = 5
 PARENT = (-1, 0, 1, 1, -1)
 TIER = (0, 1, 2, 2, -1)
 ROLE = (VERTEX, SUB_VERTEX, MEMBER, MEMBER, DISTRESS)
+NO_FIGURES = Figures(separation=np.zeros(AGENTS), slot_error=np.zeros(AGENTS), converged=False)
 
 
 def hierarchy(role: tuple[int, ...] = ROLE) -> HierarchyRows:
@@ -84,6 +89,27 @@ def test_each_agent_with_a_parent_has_a_line_to_it(chunks: list[Chunk]) -> None:
     ends, tiers = parent_lines(tick.position, hierarchy())
     assert tiers.tolist() == [1, 2, 2]
     np.testing.assert_array_equal(ends[0], tick.position[[1, 0]])
+
+
+def test_a_vehicle_that_left_has_neither_label_nor_tier() -> None:
+    there, gone = ticks()[0], ticks()[20]
+    gone.position[4] = np.nan
+    gone.hierarchy.role[4] = NO_ROLE  # type: ignore[union-attr]
+    columns = HierarchyColumns(20.0, AGENTS, 4)
+    situations = [Situations(AGENTS, wedge(AGENTS).netem).at(there)] * 2
+    drawn = [
+        *columns.blocks([there, gone], situations),
+        *columns.figures([there, gone], [NO_FIGURES] * 2),
+    ]
+    labels = last_row(drawn, layout.VEHICLES)
+    assert labels == ["a0 vertex", "a1 sub-vertex 1", "a2", "a3", ""]
+    np.testing.assert_array_equal(last_row(drawn, layout.TIER), [0.0, 1.0, 2.0, 2.0, np.nan])
+
+
+def last_row(drawn: list[ColumnBlock], entity: str) -> list[object]:
+    (column,) = [each for block in drawn if block.entity == entity for each in block.columns]
+    latest: list[object] = column.as_arrow_array().to_pylist()[-1]
+    return latest
 
 
 def test_labels_and_roles_have_a_row_where_they_change(chunks: list[Chunk]) -> None:

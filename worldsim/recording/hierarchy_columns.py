@@ -105,27 +105,33 @@ class HierarchyColumns:
     def _label_keys(
         self, ticks: Sequence[Tick], situations: Sequence[Situation]
     ) -> NDArray[np.int16]:
-        """Return role, tier and note (T, N, 3), which labels are made of; -1 where unknown."""
-        keys = np.full((len(ticks), len(self._names), 3), -1, dtype=np.int16)
+        """Return role, tier, note and presence (T, N, 4), which labels are made of.
+
+        Role and tier are -1 where unknown; presence is 1 of a vehicle in the world, else 0.
+        """
+        keys = np.full((len(ticks), len(self._names), 4), -1, dtype=np.int16)
         noted: Situation | None = None
         for row, tick, situation in zip(keys, ticks, situations, strict=True):
             if situation is not noted:
                 noted = situation
                 notes = [self._notes.setdefault(note, len(self._notes)) for note in noted.notes]
                 numbers = np.array(notes, dtype=np.int16)
-            row[:, 2] = numbers
+            row[:, 2], row[:, 3] = numbers, np.isfinite(tick.position[:, 0])
             if tick.hierarchy is not None:
                 row[:, 0], row[:, 1] = tick.hierarchy.role, tick.hierarchy.tier
         return keys
 
     def _labels(self, keys: NDArray[np.int16]) -> list[str]:
-        """Return a label for each vehicle; the cross of a dead one has its own."""
+        """Return a label for each vehicle in the world; the cross of a dead one has its own.
+
+        The viewer would draw the label of any other amid the view.
+        """
         notes = list(self._notes)
         labels = []
-        for name, (role, tier, note) in zip(self._names, keys.tolist(), strict=True):
+        for name, (role, tier, note, present) in zip(self._names, keys.tolist(), strict=True):
             said = f" ({notes[note]})" if notes[note] else ""
-            dead = notes[note].startswith(DEAD)
-            labels.append("" if dead else name + LABEL_SUFFIXES[role].format(tier=tier) + said)
+            hidden = not present or notes[note].startswith(DEAD)
+            labels.append("" if hidden else name + LABEL_SUFFIXES[role].format(tier=tier) + said)
         return labels
 
     def _parent_lines(
@@ -204,8 +210,8 @@ def parent_lines(position: Floats, hierarchy: HierarchyRows) -> tuple[Floats, ND
 
 
 def _tiers(hierarchy: HierarchyRows) -> NDArray[np.float64]:
-    """Return the tiers (N,); NaN where there is no queue that could have tiers."""
-    return np.where(hierarchy.role == UNPLACED, np.nan, hierarchy.tier)
+    """Return the tiers (N,); NaN where there is no queue that could have tiers, or no process."""
+    return np.where(np.isin(hierarchy.role, (NO_ROLE, UNPLACED)), np.nan, hierarchy.tier)
 
 
 def _filtered(tick: Tick) -> NDArray[np.float64]:
