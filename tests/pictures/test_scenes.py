@@ -113,7 +113,7 @@ def test_lines_join_vehicles(moments: Moments, name: str) -> None:
 def test_colours_are_those_that_the_panel_names(moments: Moments, name: str) -> None:
     for tick, scene in moments[name]:
         panels = [scene.text(layout.panel_entity(question)) for question in QUESTIONS]
-        assert len({panel.rsplit("Colours are", 1)[1] for panel in panels}) == 1
+        assert len({panel.rsplit("**Now", 1)[1] for panel in panels}) == 1
         colours = colours_of_queues(panels[0])
         shown = scene.values(layout.VEHICLES, BOX_COLOURS)
         trails = scene.values(layout.AGENTS, POINT_COLOURS)
@@ -160,7 +160,7 @@ def test_labels_name_every_vehicle(moments: Moments, name: str) -> None:
 
 
 def colours_of_queues(panel: str) -> list[int]:
-    """Return the colour of each queue as a panel names it: "queues of X: blue Q1, green Q2"."""
-    listed = panel.split("Colours are queues of", 1)[1].split(":", 1)[1].split(";", 1)[0]
+    """Return the colour of each queue as a panel names it: "its queues: blue Q1, green Q2"."""
+    listed = panel.split("Colours are its queues:", 1)[1].split(";", 1)[0]
     words = [part.split()[0] for part in listed.split(",")]
     return [int(palette.QUEUES[palette.QUEUE_COLOUR_NAMES.index(word)]) for word in words]

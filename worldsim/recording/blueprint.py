@@ -20,8 +20,13 @@ BACKGROUND = (13, 17, 24)
 EYE_DIRECTION = np.array([-0.8, -1.0, 0.5])  # from the centre of view [world axes]
 EYE_DISTANCE = 2.2  # [radii of the team]; a ball of this radius fills the height of the view
 
-PANEL_SHARE, STATES_SHARE = 1.8, 1.8
+PANEL_SHARE, STATES_SHARE = 1.6, 2.4
 """Heights of the panel of words and of timelines of states [heights of a plot]."""
+
+Plot = rrb.View | rrb.Tabs
+"""A view, or some of which one is seen."""
+ALL_EVENTS = ("CRITICAL", "ERROR", "WARN", "INFO")
+FAULT_EVENTS = ("CRITICAL", "ERROR", "WARN")
 
 LINK_LAYERS = (layout.LINKS, layout.LINKS_LOST, layout.LINKS_CUT)
 FAULT_LAYERS = (layout.SIDES, layout.LINKS_CUT)
@@ -75,57 +80,64 @@ def blueprint_of(scenario: Scenario) -> rrb.Blueprint:
     )
 
 
-def _page(question: str, plots: Sequence[rrb.View]) -> rrb.Horizontal:
+def _page(question: str, plots: Sequence[Plot]) -> rrb.Horizontal:
     """Return a tab: its view over the events, and its panel of words over its plots."""
     panels = rrb.Tabs(
         rrb.TextDocumentView(origin=layout.panel_entity(question), name="What you see"),
         rrb.TextDocumentView(origin=layout.VERDICT, name="Verdict"),
         rrb.TextDocumentView(origin=layout.SCENARIO, name="Scenario"),
     )
-    main = rrb.Vertical(_flight_view(question), _event_view(), row_shares=[7, 2])
+    levels = FAULT_EVENTS if question in (NETWORK, FAULTS) else ALL_EVENTS
+    main = rrb.Vertical(_flight_view(question), _event_view(levels), row_shares=[7, 2])
     shares = [STATES_SHARE if isinstance(plot, rrb.StateTimelineView) else 1 for plot in plots]
     side = rrb.Vertical(panels, *plots, row_shares=[PANEL_SHARE, *shares])
     return rrb.Horizontal(main, side, column_shares=[9, 5], name=question.capitalize())
 
 
-def _motion(obstacles: bool, forms: bool) -> list[rrb.View]:
+def _motion(obstacles: bool, forms: bool) -> list[Plot]:
     """Return plots of the motion; obstacles: whether there are any; forms: whether slots are."""
     slots = [_series("Distance to own slot [m]", layout.SLOT_ERROR)]
     distance = [_series("Distance to nearest obstacle [m]", layout.OBSTACLE_DISTANCE)]
     return [
         _series("Distance to nearest vehicle [m]", layout.SEPARATION),
         *(distance if obstacles else ()),
-        _series("Control force |u|", layout.FORCE),
         *(slots if forms else ()),
-        _series("Wanted turn [deg], left positive", layout.TURN_DEG),
+        rrb.Tabs(
+            _series("Control force |u| [m/s]", layout.FORCE),
+            _series("Wanted turn [deg], left positive", layout.TURN_DEG),
+        ),
     ]
 
 
-def _network(records: bool) -> list[rrb.View]:
+def _network(records: bool) -> list[Plot]:
     """Return plots of the network; records: whether agents keep records of their team."""
     ages = [_series("Age of oldest team record [s]", layout.RECORD_AGE)]
     return [
         _series("Pairs of agents by link", layout.LINK_COUNTS, named=True),
         _series("Connectivity lambda_2 (0: the team is parted)", layout.LAMBDA2),
-        _series("Neighbours heard", layout.NEIGHBOURS),
-        *(ages if records else ()),
-        _series("Frames of the radio, from the start", layout.PACKETS, named=True),
+        rrb.Tabs(
+            _series("Neighbours heard", layout.NEIGHBOURS),
+            *(ages if records else ()),
+            _series("Frames of the radio, from the start", layout.PACKETS, named=True),
+        ),
     ]
 
 
-def _structure() -> list[rrb.View]:
+def _structure() -> list[Plot]:
     return [
         rrb.StateTimelineView(
             origin="/",
             contents=[f"{layout.PHASE}/**", f"{layout.ROLES}/**"],
             name="Phase and roles",
         ),
-        _series("Largest slot distance in each queue [m]", layout.QUEUE_RESIDUAL, named=True),
-        _series("Tier (-1: in distress)", layout.TIER),
+        rrb.Tabs(
+            _series("Largest slot distance in each queue [m]", layout.QUEUE_RESIDUAL, named=True),
+            _series("Tier (-1: in distress)", layout.TIER),
+        ),
     ]
 
 
-def _faults() -> list[rrb.View]:
+def _faults() -> list[Plot]:
     return [
         rrb.StateTimelineView(origin=layout.CONDITIONS, name="What is in force"),
         _series("Distance to own slot [m]", layout.SLOT_ERROR),
@@ -171,15 +183,19 @@ def _trail() -> rrb.VisibleTimeRanges:
     return rrb.VisibleTimeRanges([trail])
 
 
-def _event_view() -> rrb.TextLogView:
-    """Return the list of events: their text begins with the time, which the viewer would cut."""
+def _event_view(levels: Sequence[str]) -> rrb.TextLogView:
+    """Return the list of events: their text begins with the time, which the viewer would cut.
+
+    levels: of the events that are listed.
+    """
     times = [
         rrb.encodings.TimelineColumn(timeline, visible=False)
         for timeline in (layout.SIM_TIME, layout.TICK)
     ]
     columns = rrb.TextLogColumns(timeline_columns=times, text_log_columns=["LogLevel", "Body"])
-    listed = rrb.TextLogRows(filter_by_log_level=["CRITICAL", "ERROR", "WARN", "INFO"])
-    return rrb.TextLogView(origin=layout.EVENTS, name="Events", columns=columns, rows=listed)
+    listed = rrb.TextLogRows(filter_by_log_level=list(levels))
+    name = "Events" if levels == ALL_EVENTS else "Faults and changes of the radio"
+    return rrb.TextLogView(origin=layout.EVENTS, name=name, columns=columns, rows=listed)
 
 
 def _series(name: str, origin: str, named: bool = False) -> rrb.TimeSeriesView:

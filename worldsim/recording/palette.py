@@ -26,21 +26,22 @@ QUEUES = np.array(
 QUEUE_COLOUR_NAMES = ("blue", "orange", "green", "magenta", "cyan", "pink", "lime", "violet")
 """The colours of QUEUES in words."""
 _GOLD, _BLUE, _RED = 0xFFD54FFF, 0x4FC3F7FF, 0xFF3B30FF
-TIERS = np.array([_GOLD, 0x7BE0ADFF, _BLUE, 0x7E8CFFFF, 0xC77DFFFF], dtype=np.uint32)
-"""Tier 1 first; all deeper tiers have the last colour."""
+TIERS = np.array([_GOLD, 0xFFF0B8FF, 0xE4E7ECFF, 0xA9B4C4FF], dtype=np.uint32)
+"""Tier 1 first; all deeper tiers have the last colour. None is the colour of a queue."""
 SHARED_VERTEX = np.uint32(_GOLD)
 UNPLACED = np.uint32(0xC8CDD6FF)
 IN_DISTRESS = np.uint32(_RED)
 NOT_RUNNING = np.uint32(0x8A909CFF)
-LINK = np.uint32(0x333D4DFF)
+LINK = np.uint32(0x5B6B82FF)
 LINK_LOST = np.uint32(0xD9A441FF)
-LINK_CUT = np.uint32(0xC23B4BFF)
+LINK_CUT = np.uint32(0x9E3040FF)
 LINK_OUT_OF_RANGE = np.uint32(0x55406EFF)
 JAM = np.uint32(0xFF5C8A60)
 PAUSED = np.uint32(0xA8AFBAFF)
 DEAD = np.uint32(0x0B0C0EFF)
 DEAD_CROSS = np.uint32(0xF2F4F7FF)
-SIDES = np.array([0xFFFFFFFF, 0xFFB000FF, 0x00D1B2FF, 0xB388FFFF], dtype=np.uint32)
+SIDES = np.array([0xFFFFFFFF, 0x77839AFF, 0xFFE0C2FF, 0xBCEBF2FF], dtype=np.uint32)
+"""Of partitions, A first: pale, so that none is taken for a queue."""
 HEADING = np.uint32(0xE6EAF0FF)
 GUIDANCE = np.uint32(0x9BA8B8FF)
 BOBBER = np.uint32(0xFFF176FF)

@@ -25,27 +25,30 @@ QUESTIONS = {
 FORMING = "q_structure"
 """The controller that is known to take up formations."""
 SYMBOLS = {
-    MOTION: "Box with an arrow: a vehicle and its nose. Trail: its last 4 s. Brown: an obstacle.",
+    MOTION: "Box with an arrow: a vehicle and its nose. Trail: its last 4 s, in the colour that it"
+    " had. Brown: an obstacle. Red lines in the plots: limits.",
     NETWORK: "Grey line: one hears the other. Amber: within range, but not heard. Red: cut by a"
-    " fault. Disc: the side of a partition. Red sphere: a jam. Pairs out of range are hidden.",
-    STRUCTURE: "Thick line: from an agent to the one that it follows, gold in tier 1, then green"
-    " and blue. Wire sphere: a slot. Large dot: the target on its queue that an agent flies to.",
-    FAULTS: "White cross: dead. Hollow box: paused. Disc: the side of a partition. Red sphere: a"
-    " jam. A label says what is wrong with its agent.",
+    " fault. Disc: the side of a partition (A white, B grey). Red sphere: a jam. Pairs out of range"
+    " are hidden.",
+    STRUCTURE: "A queue is a line of slots behind a vertex. The agent at a vertex leads: its label"
+    " says so. Thick line: from an agent to the one that it follows, gold in tier 1, then paler."
+    " Large dot: where an agent flies to.",
+    FAULTS: "White cross: dead. Hollow box: paused. Disc: the side of a partition (A white, B"
+    " grey). Red sphere: a jam. A label says what is wrong with its agent.",
 }
 """What a tab's 3D view draws."""
-FORMATION_SYMBOLS = "Wire sphere: a slot; an agent in it is in place. Faint line: a queue."
+FORMATION_SYMBOLS = "Wire sphere: a slot; an agent in it is in place. Thin line: a queue."
 UNJUDGED = "The verdict comes when the run has ended: this recording has not, or was cut off."
 
 
 def panel(question: str, scenario: Scenario, colours: str) -> str:
     """Return the panel of a tab as Markdown; colours: what they mean at present."""
-    forms = question == MOTION and scenario.control.controller == FORMING
+    slots = question != NETWORK and scenario.control.controller == FORMING
     return "\n\n".join(
         [
             f"**{QUESTIONS[question]}**",
             f"{flown(scenario)} {radio(scenario)}",
-            f"{SYMBOLS[question]} {FORMATION_SYMBOLS if forms else ''}".strip(),
+            f"{SYMBOLS[question]} {FORMATION_SYMBOLS if slots else ''}".strip(),
             colours,
         ]
     )
@@ -56,7 +59,7 @@ def flown(scenario: Scenario) -> str:
     fleet, control = scenario.fleet, scenario.control
     moves = ", in a frame that moves" if len(path_of(scenario.frame).waypoints) > 1 else ""
     known = control.controller == FORMING
-    formation = f", with the formation {scenario.formation.name}" if known else ""
+    formation = f", from the formation {scenario.formation.name} on" if known else ""
     return (
         f"Scenario {scenario.name}: {fleet.agents} agents fly {scenario.duration_s:g} s under"
         f" {control.controller}{formation}{moves}."
@@ -82,8 +85,8 @@ def queue_colours(formation: str, queues: Sequence[str]) -> str:
     more = [f"{len(names) - MAX_QUEUES} more"] if len(names) > MAX_QUEUES else []
     listed = ", ".join([*names[:MAX_QUEUES], *more])
     return (
-        f"Colours are queues of {formation}: {listed}; gold: the vertex that queues share; pale: no"
-        " place yet; red: in distress, without a place."
+        f"**Now: {formation}.** Colours are its queues: {listed}; gold: the vertex that queues"
+        " share; pale: no place yet; red: a vehicle in distress, without a place."
     )
 
 

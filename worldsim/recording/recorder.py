@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from agent.messages import Observation
+from agent.messages import ROLES, VERTEX, Observation
 from agent.qstructure.formation import Formation, FormationSpec
 from worldsim.judge.event_text import WARNINGS, sentence
 from worldsim.judge.run_events import (
@@ -342,11 +342,13 @@ def _level(event: RunEvent) -> str:
     """Return the level at which an event is listed.
 
     A change of queue comes with the slot in it, and roles have a timeline of their own: both are
-    hidden until asked for.
+    hidden until asked for, but for an agent that begins to lead.
     """
     if isinstance(event, WARNINGS):
         return "WARN"
-    return "DEBUG" if isinstance(event, QueueChanged | RoleChanged) else "INFO"
+    if isinstance(event, RoleChanged):
+        return "INFO" if event.role == ROLES[VERTEX] else "DEBUG"
+    return "DEBUG" if isinstance(event, QueueChanged) else "INFO"
 
 
 def _document(text: str) -> rr.TextDocument:

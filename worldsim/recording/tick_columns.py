@@ -144,9 +144,15 @@ def _trails(ticks: Sequence[Tick], colours: palette.Colours) -> Iterator[ColumnB
         position = np.stack([ticks[row].position for row in rows])
         columns = [
             components.POINTS.rows(position),
-            components.POINT_COLOURS.rows(colours[rows]),
+            components.POINT_COLOURS.rows(_of_trails(colours[rows])),
         ]
         yield ColumnBlock(layout.AGENTS, rows, columns)
+
+
+def _of_trails(colours: palette.Colours) -> palette.Colours:
+    """Return the colours of trails: the red of distress is for vehicles, not for a way flown."""
+    shown: palette.Colours = np.where(colours == palette.IN_DISTRESS, palette.UNPLACED, colours)
+    return shown
 
 
 def _poses(ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
