@@ -10,7 +10,7 @@ from math import hypot
 from typing import Final
 
 from agent.heard_beacon import HeardBeacon
-from agent.messages import Observation, Vector
+from agent.messages import PROXIMITY_RANGE_M, Observation, Vector
 from agent.sensing.own_pose import JUMP_M
 from agent.sensing.ray_pattern import Pattern
 from agent.sensing.scan_jumps import ScanJumps, VehicleJumps
@@ -64,6 +64,8 @@ class SensorHealth:
         self._accusers: dict[int, HeardBeacon] = {}
         """The last reports of those that were missed where they reported themselves."""
         self._blind = False
+        self._has_jumped = False
+        """Whether the proximity sensor has jumped since it was last trusted."""
 
     def update(self, observation: Observation) -> bool:
         """Take a new observation; return whether the sensors may be trusted."""
@@ -77,6 +79,8 @@ class SensorHealth:
             return
         here = observation.position
         self._discredit(neighbours)
+        if self._has_jumped and any(self._is_unread(observation, each) for each in neighbours):
+            self._vehicle_jumps.interrupt()
         near = [beacon for beacon in neighbours if apart(here, beacon.position) <= NEAR_M]
         looks = [(beacon, self._is_missed(observation, beacon)) for beacon in near]
         missed = {beacon.id: beacon.stamp_s for beacon, missed in looks if missed}
@@ -163,15 +167,24 @@ class SensorHealth:
         """Whether a scanning sensor jumps."""
         for scan in observation.scans:
             if scan.kind in self._jumps:
-                self._jumps[scan.kind].add(scan)
+                self._jumps[scan.kind].add(observation.time_s, scan)
         return any(jumps.wrong for jumps in self._jumps.values())
 
     def _vehicles_jumped(self, observation: Observation) -> bool:
         """Whether the proximity sensor jumps."""
         if self._vehicle_jumps is None:
             return False
-        self._vehicle_jumps.add(observation.time_s, observation.vehicles)
-        return self._vehicle_jumps.wrong
+        if self._vehicle_jumps.add(observation.time_s, observation.vehicles) and self._has_jumped:
+            self._accusers.clear()
+            self._missed, self._blind = 0, False
+        wrong = self._vehicle_jumps.wrong
+        self._has_jumped = wrong or (self._has_jumped and self._blind)
+        return wrong
+
+    def _is_unread(self, observation: Observation, beacon: HeardBeacon) -> bool:
+        """Whether a neighbour reports itself within the sensor's range and is not sensed."""
+        away_m = apart(observation.position, beacon.position)
+        return away_m <= PROXIMITY_RANGE_M - SLACK_M and bool(self._is_missed(observation, beacon))
 
     def _is_missed(self, observation: Observation, beacon: HeardBeacon) -> bool | None:
         """Whether a near neighbour is not sensed; None where its beacon is too old to tell."""

@@ -8,7 +8,7 @@ import pytest
 from agent.config import Sensors
 from agent.messages import NO_ECHO_MM, Observation, Scan
 from agent.sensing.ray_pattern import pattern_of
-from agent.sensing.scan_jumps import READINGS, VehicleJumps
+from agent.sensing.scan_jumps import EMPTY_S, READINGS, VehicleJumps
 from agent.sensing.sensor_health import LOOKS, PROXIMITY, SensorHealth
 from tests.agent.comms.builders import heard_beacon
 
@@ -103,6 +103,73 @@ def test_vehicles_that_appear_and_vanish_are_trusted():
     for tick in range(80):
         there = ((1.0, 0.001 * tick, 0.0),) if tick // 10 % 2 else ()
         assert watch.update(observation(tick, 0.0, there))
+
+
+def leaping(watch, ticks, reports=()):
+    """Let the sensor of a standing vehicle jump, beside neighbours that report themselves."""
+    random = Random(7)
+    for tick in range(ticks):
+        seen = observation(tick, 0.0, anywhere(random, 2))
+        watch.update(seen)
+        watch.compare(
+            seen, [heard_beacon(k, tick, 0.05 * tick, at=at) for k, at in enumerate(reports)]
+        )
+    assert not watch.update(observation(ticks, 0.0, anywhere(random, 2)))
+
+
+@pytest.mark.parametrize("edge", [(), ((1.97, 0.0, 0.0),)])
+@pytest.mark.parametrize("reports", [(), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))])
+def test_a_sensor_that_has_jumped_is_trusted_after_a_time_with_nobody_within_its_range(
+    edge, reports
+):
+    """Also where it has missed neighbours meanwhile: all have left, and nobody comes near."""
+    watch, waits = sensor_health(), round(20.0 * EMPTY_S)
+    leaping(watch, 20, reports)
+    trusted = []
+    for tick in range(21, 21 + waits + 2):
+        now = observation(tick, 0.0, edge)
+        trusted.append(watch.update(now))
+        watch.compare(now, [heard_beacon(9, tick, 0.05 * tick, at=(5.0, 0.0, 0.0))])
+    assert trusted == [False] * waits + [True] * 2
+
+
+def test_a_sensor_that_has_jumped_and_reads_nobody_beside_a_neighbour_stays_distrusted():
+    watch = sensor_health()
+    leaping(watch, 20)
+    for tick in range(21, 121):
+        now = observation(tick)
+        assert not watch.update(now)
+        watch.compare(now, [heard_beacon(1, tick, 0.05 * tick, at=(1.6, 0.0, 0.0))])
+
+
+def test_a_sensor_that_still_jumps_is_distrusted_as_soon_as_somebody_comes_near():
+    watch, random = sensor_health(), Random(3)
+    leaping(watch, 20)
+    assert [watch.update(observation(tick)) for tick in (21, 21 + round(20.0 * EMPTY_S))][1]
+    jumping = [watch.update(observation(70 + k, 0.0, anywhere(random, 1))) for k in range(3)]
+    assert jumping == [True, True, False]
+
+
+def test_a_blind_sensor_that_never_jumped_is_not_trusted_for_reading_nothing():
+    """A silent sensor reads nothing either."""
+    watch = sensor_health()
+    for look in range(LOOKS):
+        watch.compare(observation(0), [heard_beacon(1, look, 0.01 * look, at=(1.0, 0.0, 0.0))])
+    for tick in range(200):
+        assert not watch.update(observation(tick))
+        watch.compare(observation(tick), [heard_beacon(2, tick, 0.05 * tick, at=(5.0, 0.0, 0.0))])
+
+
+def test_a_scanner_that_has_jumped_is_trusted_after_a_time_without_echoes():
+    watch, random = sensor_health((LASER,), ranging=False), Random(5)
+    for k in range(8):
+        wild = scan_of([random.randrange(NO_ECHO_MM) for _ in range(61)])
+        trusted = watch.update(observation(2 * k, 0.1 * k, scans=(wild,)))
+    assert not trusted
+    ticks = range(16, 60, 2)
+    after = [watch.update(observation(tick, 0.8, scans=(NONE,))) for tick in ticks]
+    waits = round(10.0 * EMPTY_S)
+    assert after == [False] * waits + [True] * (len(ticks) - waits)
 
 
 def test_missing_scans_are_noticed():
