@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from agent.config import AgentSetup
 from agent.controller import Controller, FaultyControllerError, Intent, Senses, load
 from agent.messages import MAX_ANGLE_RAD, MAX_FORCE, MAX_M, MAX_SPEED_MPS, Vector
+from agent.parameters import made
 from netem.compiled import UnloadableError
 
 NUMBERS: Final = 13
@@ -34,7 +35,7 @@ class CheckedController:
         self._label = f"controller {setup.control.controller!r} of agent {setup.id}"
         controller_class = load(setup.control.controller)
         try:
-            self._controller: Controller = controller_class(setup)
+            self._controller: Controller = made(controller_class, setup, setup.control.parameters)
         except BaseException as error:
             raise self._fault("in its constructor", error) from error
 

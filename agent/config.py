@@ -1,6 +1,6 @@
 """Configuration of one agent: the scenario's tables, as they stand there."""
 
-from typing import Annotated, Literal, assert_never, get_args
+from typing import Annotated, Any, Literal, assert_never, get_args
 
 import msgspec
 from msgspec import Meta
@@ -165,6 +165,7 @@ class Control(Table, frozen=True):
     keeps. ``cast_far_m`` left out follows from the range heard (E20).
     gather: whether the members of a queue form its line where they are, before it flies to its
     vertex; for the controller "q_structure" under the allocation "structure".
+    parameters: those of a controller of one's own; see ``agent.parameters``.
     """
 
     controller: Annotated[str, Meta(min_length=1, max_length=200)] = "q_structure"
@@ -177,6 +178,7 @@ class Control(Table, frozen=True):
     avoidance: AvoidanceKind = "constellation"
     allocation: AllocationKind = "structure"
     gather: bool = False
+    parameters: dict[str, Any] = {}
 
 
 class Comms(Table, frozen=True):

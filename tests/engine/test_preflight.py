@@ -1,15 +1,19 @@
-"""Checks before a run starts: room for those who join, found in bounded work."""
+"""Checks before a run starts: room for those who join, and the controller's parameters."""
 
 import sys
 from pathlib import Path
 from time import process_time
+from typing import Annotated
 
+import msgspec
 import pytest
 
+from agent.parameters import made
 from netem.compiled import Finder, UnloadableError
 from tests.small_scenario import SMALL
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS, admit
-from worldsim.scenario.file import parse
+from worldsim.scenario.file import dump, parse
+from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
 
 FULL = "{ kind = 'box', size_m = [0.1, 0.1, 0.1], spacing_m = 0.6 }"
@@ -51,3 +55,83 @@ def test_a_compiled_module_that_cannot_be_loaded_is_told_of_in_one_line(
     assert ended.value.code == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "broken.so" in line
+
+
+class Tuned:
+    """A controller with parameters."""
+
+    class Parameters(msgspec.Struct, frozen=True):
+        """How it flies."""
+
+        radius_m: Annotated[float, msgspec.Meta(gt=0)]
+        ways: tuple[str, ...] = ("left",)
+        gain: float = 0.5
+
+        def __post_init__(self) -> None:
+            if self.gain > 9.0:
+                raise ValueError("a gain over 9 shakes the vehicle")
+
+    def __init__(self, setup: object, parameters: Parameters) -> None:
+        self.parameters = parameters
+
+    def decide(self, senses: object) -> None:
+        """Decide nothing."""
+
+
+class Mistaken(Tuned):
+    """A controller whose parameters are no structure."""
+
+    Parameters = dict  # type: ignore[assignment]
+
+
+def tuned(controller: str = "Tuned", **parameters: str) -> Scenario:
+    """A scenario under a controller of this module."""
+    given = {f"control.parameters.{name}": value for name, value in parameters.items()}
+    return parse(SMALL, overrides={"control.controller": f"{__name__}:{controller}", **given})
+
+
+def test_parameters_are_checked_and_their_defaults_filled_in() -> None:
+    flown = admit(tuned(radius_m="2"), "small.toml", VIRTUAL_COMMAND_TICKS)
+    assert flown.control.parameters == {"radius_m": 2.0, "ways": ["left"], "gain": 0.5}
+    assert parse(dump(flown)).control.parameters == flown.control.parameters
+    setup = flown.agent_setup(0, 0, VIRTUAL_COMMAND_TICKS)
+    assert made(Tuned, setup, setup.control.parameters).parameters == Tuned.Parameters(2.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, "control.parameters.radius_m: is missing; allowed: a number above 0"),
+        ({"radius_m": "-1"}, "control.parameters.radius_m: got -1; allowed: a number above 0"),
+        ({"radius_m": "far"}, "control.parameters.radius_m: got the text 'far'; allowed: a number"),
+        (
+            {"radius_m": "1", "ways": "['left', 3]"},
+            "control.parameters.ways[1]: got 3; allowed: text",
+        ),
+        (
+            {"radius_m": "1", "gian": "2"},
+            "control.parameters.gian: unknown key; did you mean 'gain'? allowed: radius_m, ways",
+        ),
+        ({"radius_m": "1", "gain": "10"}, "control.parameters: a gain over 9 shakes the vehicle"),
+    ],
+)
+def test_wrong_parameters_are_refused_by_name(given: dict[str, str], said: str) -> None:
+    with pytest.raises(ScenarioError) as refused:
+        admit(tuned(**given), "small.toml", VIRTUAL_COMMAND_TICKS)
+    assert str(refused.value).startswith(f"small.toml: {said}")
+
+
+@pytest.mark.parametrize(
+    ("scenario", "said"),
+    [
+        (
+            parse(SMALL, overrides={"control.parameters.gain": "1"}),
+            "control.parameters: the controller 'q_structure' takes no parameters",
+        ),
+        (tuned("Mistaken"), "control.controller: Mistaken.Parameters is not a msgspec.Struct"),
+    ],
+)
+def test_parameters_that_nobody_takes_are_refused(scenario: Scenario, said: str) -> None:
+    with pytest.raises(ScenarioError) as refused:
+        admit(scenario, "small.toml", VIRTUAL_COMMAND_TICKS)
+    assert str(refused.value) == f"small.toml: {said}"

@@ -156,8 +156,7 @@ def load_scenario(given: str, overrides: Mapping[str, str], command_ticks: int) 
     if problem is not None:
         name = scenario.control.controller
         raise ScenarioError(file, "control.controller", f"{name!r}: {problem}")
-    admit(scenario, file, command_ticks)
-    return scenario
+    return admit(scenario, file, command_ticks)
 
 
 def warn(given: str, scenario: "Scenario") -> None:

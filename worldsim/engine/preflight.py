@@ -7,11 +7,16 @@ the vehicles apart under the run's clock.
 from pathlib import Path
 from typing import Final
 
+import msgspec
+from msgspec.structs import replace
+
 from agent.checked_controller import described
 from agent.controller import ControllerError
 from agent.controller import load as load_controller
+from agent.parameters import ParametersError, parameters_type, unknown_parameters
 from netem.compiled import UnloadableError
 from netem.faults import Outage
+from worldsim.scenario.decoding import decode, unknown_key
 from worldsim.scenario.faults import Join, ProcessFault, StopWorld
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.rules import speed_problem
@@ -21,17 +26,21 @@ from worldsim.scenario.toml import ScenarioError
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.start_positions import StartError, clearance_of, start_poses, start_poses_of
 
+PARAMETERS: Final = "control.parameters"
 VIRTUAL_COMMAND_TICKS: Final = 1
 """Lifetime of a command in virtual time and in lockstep, where none is late [ticks]."""
 PROCESS_COMMAND_TICKS: Final = 2
 """Lifetime of a command of free-running processes [ticks]; H of docs/method.md."""
 
 
-def admit(scenario: Scenario, file: str | Path, command_ticks: int, by_hand: bool = False) -> None:
-    """Raise ScenarioError where a scenario cannot be flown.
+def admit(
+    scenario: Scenario, file: str | Path, command_ticks: int, by_hand: bool = False
+) -> Scenario:
+    """Return a scenario as it is flown: with all parameters of its controller.
 
     command_ticks: lifetime of a command under the run's clock. by_hand: the processes are started
-    by hand, so that events on processes cannot be carried out.
+    by hand, so that events on processes cannot be carried out. Raises ScenarioError where the
+    scenario cannot be flown.
     """
     problem = (
         speed_problem(scenario, command_ticks)
@@ -42,6 +51,7 @@ def admit(scenario: Scenario, file: str | Path, command_ticks: int, by_hand: boo
     )
     if problem is not None:
         raise ScenarioError(file, *problem)
+    return _with_parameters(scenario, file)
 
 
 def _launcher(scenario: Scenario) -> Problem | None:
@@ -69,6 +79,27 @@ def _controller(scenario: Scenario) -> Problem | None:
             f"{name!r} cannot be imported: {described(error)}",
         )
     return None
+
+
+def _with_parameters(scenario: Scenario, file: str | Path) -> Scenario:
+    """Return a scenario with its controller's parameters checked and their defaults filled in."""
+    given = scenario.control.parameters
+    controller = load_controller(scenario.control.controller)
+    try:
+        kind = parameters_type(controller)
+    except ParametersError as error:
+        raise ScenarioError(file, "control.controller", str(error)) from error
+    if kind is None:
+        if given:
+            detail = f"the controller {scenario.control.controller!r} takes no parameters"
+            raise ScenarioError(file, PARAMETERS, detail)
+        return scenario
+    for name in unknown_parameters(kind, given):
+        known = [field.encode_name for field in msgspec.structs.fields(kind)]
+        raise ScenarioError(file, f"{PARAMETERS}.{name}", unknown_key(name, known))
+    plain = msgspec.json.decode(msgspec.json.encode(decode(given, kind, file, PARAMETERS)))
+    control = replace(scenario.control, parameters=plain)
+    return replace(scenario, control=control)
 
 
 def _room(scenario: Scenario) -> Problem | None:

@@ -72,6 +72,8 @@ def _nested(info: inspect.Type) -> str:
         case inspect.VarTupleType():
             count = _count(info.min_length, info.max_length)
             return f"a list{count}, each {allowed_by(info.item_type)}"
+        case inspect.DictType(value_type=inspect.AnyType()):
+            return "a table"
         case inspect.DictType():
             count = _count(info.min_length, info.max_length)
             return f"a table{count}, each {allowed_by(info.value_type)}"

@@ -20,6 +20,8 @@ T = TypeVar("T")
 
 _WHERE = re.compile(r" - at (?P<key>`key` in )?`\$(?P<path>[^`]*)`$")
 _STEP = re.compile(r"\.(?P<field>[^.\[]+)|\[(?P<index>\d+|\.\.\.)\]")
+_OWN_WORDS = ("Expected ", "Invalid ")
+"""Messages begin so where msgspec finds the error; others are of a structure's own checks."""
 _FIELD = re.compile(
     r"Object (?P<what>contains unknown|missing required) field `(?P<field>.*)`$", re.DOTALL
 )
@@ -33,15 +35,15 @@ class Spot(NamedTuple):
     kind: Any  # the type required there
 
 
-def decode(data: Any, kind: type[T], file: str | Path) -> T:
-    """Return ``data`` as the tables of ``kind``, or raise ScenarioError."""
-    for key, number in _numbers(data, ""):
+def decode(data: Any, kind: type[T], file: str | Path, at: str = "") -> T:
+    """Return ``data`` as the tables of ``kind``, or raise ScenarioError. at: the data's own key."""
+    for key, number in _numbers(data, at):
         if not isfinite(number):
             raise ScenarioError(file, key, f"got {number}; must be a finite number")
     try:
         return msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
-        key, detail = _explained(str(error), Spot("", data, kind))
+        key, detail = _explained(str(error), Spot(at, data, kind))
         raise ScenarioError(file, key, detail) from error
 
 
@@ -62,16 +64,20 @@ def _explained(message: str, root: Spot) -> tuple[str, str]:
     spot = _follow(where["path"] if where else "", root)
     if where and where["key"]:
         return spot.key, "a name is empty or too long; allowed: 1 to 64 characters"
-    field = _FIELD.match(message[: where.start()] if where else message)
+    said = message[: where.start()] if where else message
+    field = _FIELD.match(said)
+    if field is None and not said.startswith(_OWN_WORDS):
+        return spot.key, said
     if field is None:
         return spot.key, f"{got(spot.value)}; allowed: {allowed(spot.kind)}"
     key = _joined(spot.key, field["field"])
     if field["what"] == "missing required":
         return key, f"is missing; allowed: {_allowed_at(spot, field['field'])}"
-    return key, _unknown(field["field"], [name.encode_name for name in _fields(spot)])
+    return key, unknown_key(field["field"], [name.encode_name for name in _fields(spot)])
 
 
-def _unknown(name: str, known: list[str]) -> str:
+def unknown_key(name: str, known: list[str]) -> str:
+    """Return what is wrong with a key that is none of those known."""
     begun = [key for key in known if key.startswith(f"{name}_")]
     close = begun or get_close_matches(name, known, n=1)
     hint = f"did you mean {close[0]!r}? " if close else ""

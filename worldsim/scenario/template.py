@@ -216,6 +216,8 @@ def _example(field: inspect.Field, name: str) -> Any:
         return EXAMPLES[name]
     if field.default is not NODEFAULT and field.default is not None:
         return msgspec.to_builtins(field.default)
+    if field.default_factory is not NODEFAULT:
+        return msgspec.to_builtins(field.default_factory())
     raise LookupError(f"{name} has no default: the template needs an example")
 
 
