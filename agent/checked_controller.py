@@ -32,7 +32,9 @@ class CheckedController:
     """
 
     def __init__(self, setup: AgentSetup) -> None:
-        self._label = f"controller {setup.control.controller!r} of agent {setup.id}"
+        control = setup.control
+        name = control.command[0] if control.command else control.controller
+        self._label = f"controller {name!r} of agent {setup.id}"
         controller_class = load(setup.control.controller)
         try:
             self._controller: Controller = made(controller_class, setup, setup.control.parameters)

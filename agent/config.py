@@ -154,6 +154,9 @@ DEFAULT_CAST_FAR_M = 0.5
 """d_c2 [m] where neither the scenario nor the range heard sets another (Lemma 7, E20)."""
 
 
+Argument = Annotated[str, Meta(min_length=1, max_length=4096)]
+
+
 class Control(Table, frozen=True):
     """The controller and the paper's distances [m]: d_ir, d_ob, d_s, d_c1, d_c2.
 
@@ -166,6 +169,8 @@ class Control(Table, frozen=True):
     gather: whether the members of a queue form its line where they are, before it flies to its
     vertex; for the controller "q_structure" under the allocation "structure".
     parameters: those of a controller of one's own; see ``agent.parameters``.
+    command: a program and its arguments that decides instead, in any language (docs/lines.md);
+    ``controller`` is then "command".
     """
 
     controller: Annotated[str, Meta(min_length=1, max_length=200)] = "q_structure"
@@ -179,6 +184,7 @@ class Control(Table, frozen=True):
     allocation: AllocationKind = "structure"
     gather: bool = False
     parameters: dict[str, Any] = {}
+    command: Annotated[tuple[Argument, ...], Meta(min_length=1, max_length=64)] | None = None
 
 
 class Comms(Table, frozen=True):
@@ -213,3 +219,4 @@ class AgentSetup(Table, frozen=True):
     """Whether it passes on a table of all members: for the assignment, and where vehicles cannot
     sense each other."""
     lockstep: bool = False  # whether the process waits for the inbox of each of its slots
+    real_time: bool = False  # whether time goes on while the agent computes

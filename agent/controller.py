@@ -49,6 +49,9 @@ BUILT_IN = {
     "q_structure": "agent.guidance.q_structure:QStructure",
     "flocking": "agent.guidance.flocking:Flocking",
 }
+COMMAND = "command"
+"""The name of a controller that is a program of its own; see agent.command_controller."""
+_COMMAND_CLASS = "agent.command_controller:CommandController"
 ENTRY_POINTS = "qswarm.controllers"
 """The entry-point group in which an installed package names its controllers."""
 
@@ -127,4 +130,6 @@ def _import_path(name: str) -> str:
     """Return ``package.module:Class`` of a known name; any other name stays as it is."""
     if name in BUILT_IN:
         return BUILT_IN[name]
+    if name == COMMAND:
+        return _COMMAND_CLASS
     return next((each.value for each in entry_points(group=ENTRY_POINTS, name=name)), name)

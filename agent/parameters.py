@@ -1,8 +1,8 @@
 """Parameters of a user's own controller: its scenario's [control.parameters], checked and typed.
 
 A controller declares them as a msgspec structure, the class attribute ``Parameters``, with their
-types, bounds and defaults. Its constructor then takes them beside the setup. A controller without
-this attribute takes none.
+types, bounds and defaults. Its constructor then takes them beside the setup. ``Parameters = dict``
+takes any, unchecked. A controller without this attribute takes none.
 """
 
 from collections.abc import Mapping
@@ -18,16 +18,21 @@ class ParametersError(ValueError):
 
 
 def parameters_type(controller: type) -> type[msgspec.Struct] | None:
-    """Return the structure of a controller's parameters; None where it takes none.
+    """Return the structure of a controller's parameters; None where it takes none, or any.
 
     Raises ParametersError where ``Parameters`` is something else.
     """
     kind = getattr(controller, ATTRIBUTE, None)
-    if kind is None:
+    if kind is None or kind is dict:
         return None
     if not (isinstance(kind, type) and issubclass(kind, msgspec.Struct)):
         raise ParametersError(f"{controller.__name__}.{ATTRIBUTE} is not a msgspec.Struct")
     return kind
+
+
+def takes_any(controller: type) -> bool:
+    """Return whether a controller takes any parameters, unchecked."""
+    return getattr(controller, ATTRIBUTE, None) is dict
 
 
 def unknown_parameters(kind: type[msgspec.Struct], given: Mapping[str, Any]) -> list[str]:
@@ -41,6 +46,8 @@ def made(controller: type, setup: Any, given: Mapping[str, Any]) -> Any:
 
     Raises ParametersError, and what the constructor raises.
     """
+    if takes_any(controller):
+        return controller(setup, dict(given))
     kind = parameters_type(controller)
     if kind is None:
         if given:

@@ -45,6 +45,16 @@ def _print_schema(requested: bool) -> None:
         raise typer.Exit
 
 
+def _print_line_schema(requested: bool) -> None:
+    if requested:
+        import json
+
+        from agent.lines import line_schema
+
+        print(json.dumps(line_schema(), indent=2))
+        raise typer.Exit
+
+
 ScenarioFile = Annotated[
     str,
     typer.Argument(
@@ -71,6 +81,15 @@ Schema = Annotated[
         is_eager=True,
         callback=_print_schema,
         help="Print the JSON Schema of scenario files and exit.",
+    ),
+]
+LineSchema = Annotated[
+    bool,
+    typer.Option(
+        "--line-schema",
+        is_eager=True,
+        callback=_print_line_schema,
+        help="Print the JSON Schema of the lines of [control] command and exit.",
     ),
 ]
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="The output directory of a run.")]

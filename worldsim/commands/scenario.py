@@ -8,6 +8,7 @@ import typer
 from worldsim.commands.options import (
     Agents,
     Duration,
+    LineSchema,
     ScenarioFile,
     Schema,
     Seed,
@@ -52,6 +53,7 @@ def check(
     duration: Duration = None,
     settings: Settings = None,
     schema: Schema = False,
+    line_schema: LineSchema = False,
 ) -> int:
     """Validate a scenario and print it with all defaults.
 

@@ -4,6 +4,7 @@ The start has room for all vehicles, the controller can be loaded, and the safet
 the vehicles apart under the run's clock.
 """
 
+import shutil
 from pathlib import Path
 from typing import Final
 
@@ -13,7 +14,7 @@ from msgspec.structs import replace
 from agent.checked_controller import described
 from agent.controller import ControllerError
 from agent.controller import load as load_controller
-from agent.parameters import ParametersError, parameters_type, unknown_parameters
+from agent.parameters import ParametersError, parameters_type, takes_any, unknown_parameters
 from netem.compiled import UnloadableError
 from netem.faults import Outage
 from worldsim.scenario.decoding import decode, unknown_key
@@ -51,7 +52,7 @@ def admit(
     )
     if problem is not None:
         raise ScenarioError(file, *problem)
-    return _with_parameters(scenario, file)
+    return _with_parameters(_with_command(scenario, Path(file)), file)
 
 
 def _launcher(scenario: Scenario) -> Problem | None:
@@ -90,7 +91,7 @@ def _with_parameters(scenario: Scenario, file: str | Path) -> Scenario:
     except ParametersError as error:
         raise ScenarioError(file, "control.controller", str(error)) from error
     if kind is None:
-        if given:
+        if given and not takes_any(controller):
             detail = f"the controller {scenario.control.controller!r} takes no parameters"
             raise ScenarioError(file, PARAMETERS, detail)
         return scenario
@@ -100,6 +101,28 @@ def _with_parameters(scenario: Scenario, file: str | Path) -> Scenario:
     plain = msgspec.json.decode(msgspec.json.encode(decode(given, kind, file, PARAMETERS)))
     control = replace(scenario.control, parameters=plain)
     return replace(scenario, control=control)
+
+
+def _with_command(scenario: Scenario, file: Path) -> Scenario:
+    """Return a scenario whose command names a program by its whole path.
+
+    A program with a slash in its name, and an argument that names a file, are relative to the
+    scenario's folder.
+    """
+    if scenario.control.command is None:
+        return scenario
+    program, *arguments = scenario.control.command
+    beside = str((file.parent / program).resolve())
+    found = shutil.which(beside if "/" in program else program)
+    if found is None:
+        exists = "/" in program and Path(beside).exists()
+        detail = f"{program!r} {'is not executable' if exists else 'does not exist'}"
+        raise ScenarioError(file, "control.command[0]", detail)
+    placed = [
+        str((file.parent / each).resolve()) if (file.parent / each).is_file() else each
+        for each in arguments
+    ]
+    return replace(scenario, control=replace(scenario.control, command=(found, *placed)))
 
 
 def _room(scenario: Scenario) -> Problem | None:

@@ -112,7 +112,9 @@ class Startup:
             return
         ticks = VIRTUAL_COMMAND_TICKS if self._lockstep else PROCESS_COMMAND_TICKS
         setup: AgentSetup = msgspec.structs.replace(
-            self._scenario.agent_setup(int(agent), incarnation, ticks), lockstep=self._lockstep
+            self._scenario.agent_setup(int(agent), incarnation, ticks),
+            lockstep=self._lockstep,
+            real_time=not self._lockstep,
         )
         query.reply(query.key_expr, msgspec.json.encode(setup))
 

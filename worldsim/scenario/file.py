@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 import tomli_w
 
+from agent.controller import COMMAND
 from agent.qstructure.formation import FormationError, FormationSpec, formation_of
 from agent.qstructure.mission_check import MissionError, check_mission
 from worldsim.scenario.decoding import decode
@@ -42,6 +43,7 @@ def parse(
     try:
         data = tables(text, name)
         override(data, overrides, name)
+        _name_command(data)
         source = _place_formation(data, Path(name))
         later = _place_events(data, Path(name))
         scenario = _with_field(decode(data, Scenario, name), name)
@@ -68,6 +70,13 @@ def formation_tables(path: Path) -> Data:
     formation = tables(read(path), path)
     decode(formation, FormationSpec, path)
     return formation
+
+
+def _name_command(data: Data) -> None:
+    """Let a command be the controller, where no other is named."""
+    control = data.get("control")
+    if isinstance(control, dict) and control.get("command"):
+        control.setdefault("controller", COMMAND)
 
 
 def _place_formation(data: Data, file: Path) -> FormationSource:

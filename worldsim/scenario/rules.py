@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import assert_never
 
 from agent.config import LEAST
+from agent.controller import COMMAND
 from agent.guidance.bobber import MIN_CAST_RATIO
 from agent.messages import FLIGHT_M, MAX_SCAN_B, Position
 from agent.qstructure.formation import Formation, formation_of
@@ -233,6 +234,16 @@ def _gathers_in_the_structure(scenario: Scenario) -> Problem | None:
     return None
 
 
+def _command_or_controller(scenario: Scenario) -> Problem | None:
+    control = scenario.control
+    if bool(control.command) == (control.controller == COMMAND):
+        return None
+    if control.command:
+        detail = f"cannot be combined with control.controller = {control.controller!r}"
+        return Problem("control.command", detail)
+    return Problem("control.controller", f"{COMMAND!r} needs control.command: a program")
+
+
 def _rates_up_to_tick_rate(scenario: Scenario) -> Problem | None:
     comms, tick_hz = scenario.comms, scenario.fleet.tick_hz
     for name, rate in (("local_hz", comms.local_hz), ("multihop_hz", comms.multihop_hz)):
@@ -396,6 +407,7 @@ RULES = (
     _known_links,
     _cast_zone_not_empty,
     _gathers_in_the_structure,
+    _command_or_controller,
     _rates_up_to_tick_rate,
     _laser_rings_apart,
     _laser_fits_a_scan,

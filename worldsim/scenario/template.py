@@ -49,6 +49,7 @@ EXAMPLES: Given = {
     "agent.ids": [0],
     "agent.vehicle.max_speed_mps": 0.3,
     "control.cast_far_m": 0.5,
+    "control.command": ["./my_controller", "--gain", "2"],
     "event.at_s": 10.0,
     "event.kill": [4],
     "expect.reform_within_s": 10.0,

@@ -1,0 +1,54 @@
+"""A controller in any language: one child process for each agent, asked by lines of JSON.
+
+In virtual time and in lockstep, time waits for its answers, and the same child gives the same
+flight. In a free-running fleet an answer that comes late stops the vehicle for that tick.
+"""
+
+import sys
+
+from agent.child import Child
+from agent.config import AgentSetup
+from agent.controller import Intent, Senses
+from agent.lines import SensesLines, hover, intent_of, setup_line
+
+START_WITHIN_S = 5.0
+"""A child reads its first line within this time."""
+ANSWER_WITHIN_S = 8.0
+"""Where time waits, an answer comes within this time."""
+SHARE_OF_TICK = 0.5
+"""Where time does not wait, an answer comes within this share of a tick."""
+
+
+class NoAnswerError(RuntimeError):
+    """A child that does not answer though time waits for it."""
+
+
+class CommandController:
+    """Asks a child for one agent's intents."""
+
+    Parameters = dict
+    """Any, unchecked: they are in the setup that the child is told."""
+
+    def __init__(self, setup: AgentSetup, parameters: dict[str, object]) -> None:
+        self._real_time = setup.real_time
+        self._within_s = SHARE_OF_TICK / setup.tick_hz if self._real_time else ANSWER_WITHIN_S
+        self._lines = SensesLines(setup.team)
+        self._late = 0
+        self._child = Child(setup.control.command or ())
+        self._child.tell(setup_line(setup), START_WITHIN_S)
+
+    def decide(self, senses: Senses) -> Intent:
+        """Return what the child wants; where it is late, to stop."""
+        answer = self._child.ask(self._lines.line(senses), self._within_s)
+        if answer is not None:
+            return intent_of(answer, senses)
+        if not self._real_time:
+            raise NoAnswerError(f"no answer within {self._within_s:g} s")
+        self._count_late(senses.now_s)
+        return hover(senses)
+
+    def _count_late(self, now_s: float) -> None:
+        """Count a late answer, and tell of the 1st, 10th, 100th ... in the agent's log."""
+        self._late += 1
+        if str(self._late).rstrip("0") == "1":
+            print(f"{now_s:.2f} s: {self._late} answers came late so far", file=sys.stderr)
