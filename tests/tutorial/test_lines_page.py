@@ -26,7 +26,7 @@ class Ring:
     Parameters = dict
 
     def __init__(self, setup: AgentSetup, parameters: dict[str, float]) -> None:
-        self._radius = parameters["radius_m"]
+        self._radius = parameters["ring_m"]
 
     def decide(self, senses: Senses) -> Intent:
         """Return what the programs of the page say."""
@@ -64,7 +64,7 @@ def trace_of(folder: Path, control: str, radius_m: float = 3.0) -> str:
     text = (folder / "ring.toml").read_text()
     assert 'command = ["./ring"]' in text
     file.write_text(text.replace('command = ["./ring"]', control))
-    overrides = {"duration_s": "4", "control.parameters.radius_m": str(radius_m)}
+    overrides = {"duration_s": "4", "control.parameters.ring_m": str(radius_m)}
     flight = fly(admit(load(file, overrides), file, VIRTUAL_COMMAND_TICKS))
     assert (flight.loop.judge.min_separation_m or 0.0) > 0.25
     return flight.loop.trace.sha256
