@@ -168,6 +168,9 @@ def test_an_exit_with_a_status_quotes_the_end_of_the_log(launched: Launched) -> 
         f"{log} ends with:",
         *(f"  line {number}" for number in range(4, 9)),
     ]
+    (relayed,) = launched.world.receive()
+    assert isinstance(relayed, AgentExited)
+    assert relayed.log_end == f": line 8 ({log.parent.name}/agent-2.log)"
 
 
 def test_an_exit_before_the_run_has_begun_is_a_start_error(launched: Launched) -> None:
@@ -187,6 +190,18 @@ def test_the_exit_of_a_child_ends_the_run_once(launched: Launched) -> None:
     assert launched.monitor.failed
     assert launched.lines == ["netem was killed by signal 9 at about 3.2 s; the run ends"]
     assert launched.world.receive() == [RunFailed("netem was killed by signal 9")]
+
+
+def test_a_child_that_ends_by_an_error_is_quoted(launched: Launched) -> None:
+    launched.begin()
+    log = launched.folder / "netem.log"
+    log.write_text("Traceback (most recent call last):\nZeroDivisionError: division by zero\n\n")
+    launched.monitor.child_exited("netem", FAILED)
+    quoted = f": ZeroDivisionError: division by zero ({log.parent.name}/netem.log)"
+    assert launched.lines == [
+        f"netem ended with status 1 at about 3.2 s; the run ends{quoted}",
+    ]
+    assert launched.world.receive() == [RunFailed(f"netem ended with status 1{quoted}")]
 
 
 def test_exits_are_expected_once_the_run_is_over(launched: Launched) -> None:

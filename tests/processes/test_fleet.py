@@ -57,6 +57,24 @@ def send_garbage(link, argument):
 launcher_link.LaunchedLink.{report} = send_garbage
 main()
 """
+FAILING = """
+from netem.free_running import FreeRunningMedium
+from worldsim.commands.app import main
+from worldsim.engine.step import SlotLoop
+
+def fail(self, *given):
+    raise LookupError("no such slot")
+
+def play(self, truth, *given):
+    return fail(self) if truth.slot >= 100 else netem(self, truth, *given)
+
+def close(self, *given):
+    return fail(self) if self.world.slot >= 100 else world(self, *given)
+
+netem, world = FreeRunningMedium._play, SlotLoop.close
+{patch}
+main()
+"""
 FULL_FROM_THE_START = """
 from pathlib import Path
 from worldsim.commands.app import main
@@ -273,6 +291,25 @@ def test_the_death_of_netem_ends_the_run_with_a_message(
 
     verification = verify(run)
     assert (verification.exit_status, verification.finished) == (3, True)
+
+
+@pytest.mark.parametrize(
+    ("patch", "reason"),
+    [
+        ("FreeRunningMedium._play = play", "netem ended with status 1: {} (logs/netem.log)"),
+        ("SlotLoop.close = close", "the world failed: {} (logs/world.log)"),
+    ],
+)
+def test_a_process_that_ends_by_its_own_error_is_named_with_the_error(
+    start: Start, scenario: Write, run: Path, patch: str, reason: str
+) -> None:
+    program = [sys.executable, "-c", FAILING.format(patch=patch)]
+    fleet = start(*program, "run", scenario(60.0), "--no-recording", "--out", str(run))
+    assert fleet.status(20.0) == 3, fleet.text
+    told = reason.format("LookupError: no such slot")
+    assert summary_of(run)["reason"].startswith(f"{told} after ")
+    assert told in " ".join(fleet.text.split())
+    none_left(pids(run))
 
 
 @pytest.mark.parametrize(

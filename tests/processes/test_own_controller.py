@@ -1,6 +1,7 @@
 """Controllers other than the Q-structure, in fleets of real processes."""
 
 import json
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -54,7 +55,10 @@ def test_a_failing_controller_is_named_and_its_vehicle_hovers(start: Start, tmp_
     run = tmp_path / "run"
     fleet = launched(start, run, "--duration", "3", "--set", "control.controller=weak:Fails")
     assert fleet.status(40.0) == 1, fleet.text
-    assert "fail (agent-2 ended with status 1 at 1." in fleet.text
+    assert re.search(
+        r"fail \(agent-2 ended with status 1 at 1\.\d s: .*no wind \(logs/agent-2\.log\)\)",
+        " ".join(fleet.text.split()),
+    )
     assert "controller 'weak:Fails' of agent 2 failed at 1.0" in fleet.text
     assert "LookupError: no wind" in fleet.text
     assert "(not scheduled); its vehicle stops and hovers" in fleet.text

@@ -84,13 +84,16 @@ class Culprits:
             if process is not None and not process.stopped:
                 self._note_hang(agent, times, process, time_s)
 
-    def note_exit(self, agent: int, process_exit: ProcessExit, time_s: float) -> None:
+    def note_exit(
+        self, agent: int, process_exit: ProcessExit, time_s: float, log_end: str = ""
+    ) -> None:
         """Note that an agent's process ended unplanned at ``time_s`` [s; simulated time].
 
-        It is the agent's own failure unless another process may have killed it.
+        It is the agent's own failure unless another process may have killed it. log_end: the end of
+        its log, to quote.
         """
         if process_exit.status is not None or process_exit.signal in CRASH_SIGNALS:
-            self._ends.append(f"{agent_name(agent)} {process_exit} at {time_s:.1f} s")
+            self._ends.append(f"{agent_name(agent)} {process_exit} at {time_s:.1f} s{log_end}")
 
     def named(self, agent: int) -> bool:
         """Return whether an agent itself is at fault: it hangs, or was stopped."""

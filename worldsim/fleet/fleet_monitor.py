@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple, TypeVar, assert_never
 
+import msgspec
+
 from worldsim.fleet.fork import ProcessExit
 from worldsim.fleet.ipc import (
     ActionDone,
@@ -40,6 +42,8 @@ from worldsim.fleet.terminal import Terminal
 REPORT_MISSING_EVERY_S = 5.0
 TAIL_LINES = 5
 MAX_TAIL_B = 4096
+MAX_QUOTED = 300
+"""[characters]"""
 
 _T = TypeVar("_T")
 
@@ -131,7 +135,7 @@ class FleetMonitor:
             text = f"{name} {process_exit} at about {self._time_s:.1f} s (scheduled){ends}"
             self._terminal.print(text)
         else:
-            self._fail(f"{name} {process_exit}")
+            self._fail(f"{name} {process_exit}", self._log_end(name, process_exit))
 
     def report_missing(self) -> None:
         """Print now and then which processes are still missing."""
@@ -157,12 +161,23 @@ class FleetMonitor:
             self._fail(str(error))
             return []
 
-    def _fail(self, reason: str) -> None:
+    def _log_end(self, name: str, process_exit: ProcessExit) -> str:
+        """Return the last line of the log of a process that ended by an error, to be appended."""
+        log = self._logs / f"{name}.log"
+        if not process_exit.status or not log.exists():
+            return ""
+        lines = log.read_bytes()[-MAX_TAIL_B:].decode("utf-8", "replace").split("\n")
+        last = next((line.strip() for line in reversed(lines) if line.strip()), "")
+        return f": {last[:MAX_QUOTED]} ({log.parent.name}/{log.name})" if last else ""
+
+    def _fail(self, reason: str, log_end: str = "") -> None:
+        """End the run. log_end: the end of a log, to quote."""
         if self.run_over or self.failed:
             return
         self.failed = True
-        self._terminal.print_error(f"{reason} at about {self._time_s:.1f} s; the run ends")
-        self._world.send(RunFailed(reason))
+        when = f" at about {self._time_s:.1f} s"
+        self._terminal.print_error(f"{reason}{when}; the run ends{log_end}")
+        self._world.send(RunFailed(f"{reason}{log_end}"))
 
     def _handle_zygote(self, message: FromZygote) -> None:
         match message:
@@ -224,7 +239,8 @@ class FleetMonitor:
         name, process_exit = f"agent-{message.process.agent}", message.exit
         if not self.all_present:
             raise self._start_error(name, process_exit)
-        self._world.send(message)
+        log_end = self._log_end(name, process_exit)
+        self._world.send(msgspec.structs.replace(message, log_end=log_end))
         expected = message.process in self._expected_exits
         show = self._terminal.print if expected else self._terminal.print_error
         show(

@@ -403,10 +403,11 @@ class FreeRunningFleet:
                 self._rejected["arrivals"] += 1
 
     def _handle_exits(self) -> None:
-        for agent, incarnation, process_exit in self._launcher.agent_exits():
-            if self.loop.members.has_process(agent, incarnation):
-                self.loop.effects.record_exit(agent, *process_exit)
-                self._culprits.note_exit(agent, process_exit, self.loop.world.time_s)
+        for ended in self._launcher.agent_exits():
+            if self.loop.members.has_process(ended.agent, ended.incarnation):
+                self.loop.effects.record_exit(ended.agent, *ended.exit)
+                time_s = self.loop.world.time_s
+                self._culprits.note_exit(ended.agent, ended.exit, time_s, ended.log_end)
 
     def _packets(self) -> Packets:
         return self.medium_counters.packets() if self.medium_counters is not None else {}

@@ -104,6 +104,7 @@ class AgentExited(Message, frozen=True):
     process: AgentProcess
     pid: Pid
     exit: ProcessExit
+    log_end: str = ""  # the last line of its log, and which log; "" where it reported no error
 
 
 class IntruderStarted(Message, frozen=True):

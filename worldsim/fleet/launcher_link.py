@@ -45,9 +45,10 @@ class AgentExit(NamedTuple):
     agent: int
     incarnation: int | None = None  # None: unknown, for processes started by hand
     exit: ProcessExit = ProcessExit(None, None)  # unknown, for processes started by hand
+    log_end: str = ""  # see AgentExited
 
     def __str__(self) -> str:
-        return f"agent-{self.agent} {self.exit}"
+        return f"agent-{self.agent} {self.exit}{self.log_end}"
 
 
 class LauncherLink(Protocol):
@@ -229,8 +230,10 @@ class LaunchedLink:
 
     def _handle(self, message: ToWorld) -> None:
         match message:
-            case AgentExited(process=process, exit=process_exit):
-                self._exits.append(AgentExit(process.agent, process.incarnation, process_exit))
+            case AgentExited(process=process, exit=process_exit, log_end=log_end):
+                self._exits.append(
+                    AgentExit(process.agent, process.incarnation, process_exit, log_end)
+                )
             case ActionDone():
                 self._done.append(message)
             case WorldWoken():

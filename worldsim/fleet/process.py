@@ -9,6 +9,7 @@ from typing import NamedTuple
 import msgspec
 import zenoh
 
+from agent.checked_controller import described
 from netem.messages import MediumCounters
 from netem.wire.access import AccessError, login_of
 from netem.wire.bus import Bus
@@ -86,7 +87,7 @@ def conduct(
     directory.on_loss = launcher.report_notice
     sinks = open_sinks(directory, scenario, directory.path.name, options.mode, options.recording)
     fleet = _fleet(scenario, bus, sinks, launcher, startup, options)
-    complete, up_s = False, None
+    complete, up_s, failure = False, None, ""
 
     def should_stop() -> bool:
         return stop.requested or launcher.stop_reason is not None
@@ -95,13 +96,16 @@ def conduct(
         present = assemble(startup, options.speed, should_stop, launcher)
         up_s = time.monotonic()
         complete = present and fleet.fly(should_stop)
+    except Exception as error:
+        failure = _failure(error, directory)
+        raise
     finally:
         fleet.land()
-        judge = fleet.loop.judge if complete else None
-        sinks.close(judge, fleet.loop.world.time_s)
+        sinks.close(fleet.loop.judge if complete else None, fleet.loop.world.time_s)
         fleet.loop.note_writes()
         launcher.wait(0.0)  # reads the reason that the launcher sends before its SIGTERM
-        ended_by = None if complete else launcher.stop_reason or fleet.ended_by or "interrupted"
+        cause = launcher.stop_reason or failure or fleet.ended_by or "interrupted"
+        ended_by = None if complete else cause
         summary = summarise(scenario, _finished(fleet, options, ended_by, up_s))
         if fleet.begun:
             summary = directory.write_summary(summary)
@@ -112,6 +116,13 @@ def conduct(
     outcome = summary["outcome"] if fleet.begun else f"{ended_by} before take-off"
     print(f"world: {outcome}{_lateness(fleet.medium_counters)}", flush=True)
     return EXIT_STATUS[summary["outcome"]]
+
+
+def _failure(error: Exception, directory: RunDirectory) -> str:
+    """Return what a summary says of an error that ends the world."""
+    log = directory.logs / "world.log"
+    where = f" ({log.relative_to(directory.path)})" if log.exists() else ""
+    return f"the world failed: {described(error)}{where}"
 
 
 def _fleet(
