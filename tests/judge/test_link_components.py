@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import product
+from math import inf
 
 import msgspec
 import numpy as np
@@ -9,10 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from agent.codec import add_checksum, encode
+from agent.comms.neighbours import MAX_AGE_S
+from agent.messages import Gossip
 from netem.link_parameters import Conditions, DirectedLink, LinkKeys, PathLoss
+from netem.rate_queue import RateQueue
+from tests.agent.comms.builders import beacon, record
+from tests.judge.test_held_formation import radio
 from tests.recording.flights import straight_flight, wedge
 from worldsim.engine.virtual import fly
-from worldsim.judge.connectivity import Components, Connectivity
+from worldsim.judge.connectivity import LEAST_FRAME_B, Components, Connectivity
 from worldsim.judge.radio_events import ConditionsChanged
 from worldsim.judge.tick import Tick
 from worldsim.scenario.file import parse
@@ -152,3 +159,32 @@ def test_a_team_that_is_cut_by_an_event_is_judged_by_its_parts() -> None:
     tables = ", ".join(f"{{ from = {a}, to = 3, loss_percent = 100 }}" for a in range(3))
     event = f"[[event]]\nat_s = 8.0\nfor_s = 10.0\nnetem = {{ link = [{tables}] }}"
     assert violations(DEAF.format(seed=7, links=event)) == {}
+
+
+def test_the_shortest_frames_are_as_short_as_agents_can_send() -> None:
+    empty = Gossip(id=0, stamp_s=0.0, records=(record(0, 0),), piece=None)
+    shortest = [len(add_checksum(encode(each))) for each in (beacon(0, 0, 0.0), empty)]
+    assert shortest == list(LEAST_FRAME_B)
+
+
+@pytest.mark.parametrize(
+    ("rate_kbit", "limit", "ends_s"),
+    [(0.2, 1000, 0.0), (1.0, 1000, 5.206), (1.0, 3, inf), (20.0, 1000, 23.9), (26.0, 1000, inf)],
+)
+def test_a_queue_that_grows_ends_the_spread_of_news_when_its_frames_are_too_old(
+    rate_kbit: float, limit: int, ends_s: float
+) -> None:
+    """Played back: beacons that enter a sender's queue at 20 Hz, and their age as they leave."""
+    scenario = wedge(AGENTS)
+    network = Connectivity(scenario)
+    slow = Conditions(rate_kbit=rate_kbit, limit=limit)
+    network.handle_event(radio((7.0, 0, slow))[0])
+    tick = next(straight_flight(scenario))
+    for at_s in (6.9, 7.0 + 0.99 * min(ends_s, 1e3), 7.0 + 1.01 * min(ends_s, 1e3)):
+        passes = at_s < 7.0 + ends_s
+        assert network.spreads(replace(tick, time_s=at_s)).local is passes
+    queue, sent = RateQueue(), [0.05 * k for k in range(1200)]
+    waits = {at_s: queue.enter(at_s, LEAST_FRAME_B[0], rate_kbit, limit) for at_s in sent}
+    leaves = {at_s + wait: wait for at_s, wait in waits.items() if wait is not None}
+    assert all(wait <= MAX_AGE_S for at_s, wait in leaves.items() if at_s < 0.95 * ends_s)
+    assert all(wait > MAX_AGE_S for at_s, wait in leaves.items() if at_s > 1.05 * ends_s)

@@ -44,6 +44,9 @@ LONGEST_STEP_S: Final = 0.5
 """Where a step takes longer, beacons come so rarely that others may take their sender for lost."""
 LONGEST_STOP_S: Final = 1.0
 """Where processes stop for longer, others may take their agents for lost (LEAST_SILENCE_S)."""
+LEAST_FRAME_B: Final = (158, 64)
+"""The shortest frame that an agent sends on each channel [B]: a beacon that echoes nobody, and
+gossip of one record."""
 MAX_ROUNDS: Final = 2000
 """More rounds count as infinitely many."""
 
@@ -97,6 +100,11 @@ class Connectivity:
         self._slack_s = 2.0 / scenario.fleet.tick_hz
         """Within this time of being due, a frame is received [s]."""
         self._round_s = 1.0 / scenario.comms.multihop_hz if scenario.comms.multihop_hz else inf
+        self._frames_hz = scenario.comms.local_hz, scenario.comms.multihop_hz
+        self._stale_after_s: list[float] = []
+        """Of each channel, see _stale_after_s, since the conditions last changed that."""
+        self._stale_from_s: list[float] = []
+        """Of each channel, when that is [s]."""
         self._rows = range(scenario.rows)
         self._network = NetworkConditions(scenario.netem)
         self._clocks = ClockLinks(scenario.rows, self._slack_s)
@@ -114,7 +122,7 @@ class Connectivity:
     def handle_event(self, event: RadioRunEvent) -> None:
         """Apply the radio fault that an event reports."""
         self._network.apply(order_of(event))
-        self._refresh()
+        self._refresh(event.t_s)
 
     def handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
         """Take the beginning or the end of a fault of an agent."""
@@ -181,9 +189,11 @@ class Connectivity:
         bounded = self.dissemination_s(agents, found.hops, found.loss) < inf
         groups = self.groups(tick.position, tick.alive)
         return Spreads(
-            local=not self._too_old[LOCAL] and int(groups.max(initial=0)) == 0,
+            local=tick.time_s < self._stale_from_s[LOCAL] and int(groups.max(initial=0)) == 0,
             multihop=(
-                not self._too_old[MULTIHOP] and bounded and int(found.label.max(initial=0)) == 0
+                tick.time_s < self._stale_from_s[MULTIHOP]
+                and bounded
+                and int(found.label.max(initial=0)) == 0
             ),
         )
 
@@ -208,17 +218,24 @@ class Connectivity:
         round_s = self._round_s + self._held_up_s
         return max(LEAST_DETECTION_S, rounds * round_s + hops * (self._delay_s + self._held_up_s))
 
-    def _refresh(self) -> None:
-        """Derive loss, delay and cuts from the conditions and partitions in force."""
+    def _refresh(self, now_s: float = 0.0) -> None:
+        """Derive loss, delay and cuts from the conditions and partitions in force.
+
+        now_s: since when they hold [s].
+        """
         models = self._network.models
         self.loss = unusable_share(models.of_channel(MULTIHOP), 0.0)
         """Share of multihop frames that a link loses within range."""
         multihop = models.of_any_link(MULTIHOP)
         self._burst_factor = max(1.0, *map(burst_variance_factor, multihop))
         self._delay_s = max(map(_longest_delay_s, multihop))
-        least_s = [min(map(_least_delay_s, models.of_any_link(at))) for at in range(len(CHANNELS))]
-        self._too_old = [delay_s > MAX_AGE_S for delay_s in least_s]
-        """Of each channel, whether every frame is too old to be accepted when it comes."""
+        stale_s = [
+            max(_stale_after_s(link, hz, size_b) for link in models.of_any_link(at))
+            for at, (hz, size_b) in enumerate(zip(self._frames_hz, LEAST_FRAME_B, strict=True))
+        ]
+        if stale_s != self._stale_after_s:
+            self._stale_after_s = stale_s
+            self._stale_from_s = [now_s + each_s for each_s in stale_s]
         links = [link for at in range(len(CHANNELS)) for link in models.of_any_link(at)]
         queued_s = max(map(_longest_queued_s, links))
         self._in_flight_s = max(map(_longest_delay_s, links)) + queued_s + self._slack_s
@@ -291,6 +308,23 @@ def _least_delay_s(model: LinkModel) -> float:
     """Return the least delay on a link [s]."""
     widest = 1.0 if model.distribution == "uniform" else MAX_QUANTILE
     return (model.delay_ms - widest * model.jitter_ms) / 1000.0
+
+
+def _stale_after_s(model: LinkModel, frames_hz: float, size_b: int) -> float:
+    """Return after which time every frame that comes over a link is too old to be accepted [s].
+
+    0: at once, for its delay or its time on the air; infinite: never. Where frames_hz frames of
+    size_b [B] a second are more than the rate carries, the queue grows, up to its limit: a frame
+    that leaves it at t was sent at t / load.
+    """
+    left_s = MAX_AGE_S - max(0.0, _least_delay_s(model))
+    on_air_s = 8.0 * (size_b + model.rate_overhead_b) / (1000.0 * model.rate_kbit)
+    if on_air_s > left_s:
+        return 0.0
+    load = frames_hz * on_air_s
+    if load <= 1.0 or model.limit * on_air_s <= left_s:
+        return inf
+    return left_s / (1.0 - 1.0 / load)
 
 
 def _longest_queued_s(model: LinkModel) -> float:
