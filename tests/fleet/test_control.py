@@ -399,3 +399,15 @@ def test_a_malformed_request_is_rejected(data: bytes) -> None:
     fleet = OperatedFleet(0.0)
     with pytest.raises(RequestError):
         fleet.control.answer(data, fleet.carry_out)
+
+
+@pytest.mark.parametrize(("strike", "undo"), [("kill", "restart"), ("pause", "resume")])
+def test_an_operator_ends_every_outage_of_netem_of_one_kind(strike: str, undo: str) -> None:
+    fleet = OperatedFleet()
+    other = {"kill": "pause", "pause": "kill"}[strike]
+    for action in (strike, other, strike):
+        fleet.ask(**{action: ["netem"]})
+    fleet.ask(**{undo: ["netem"]})
+    assert list(fleet.loop.network.outages.values()) == [other]
+    with pytest.raises(RequestError, match=f"^netem: no {strike} of it is in force$"):
+        fleet.ask(**{undo: ["netem"]})

@@ -67,7 +67,8 @@ def test_a_running_fleet_carries_out_commands_and_refuses_impossible_ones(
     status, output = command("fault", "pause", "1")
     assert (status, "its name, to end it early: pause-" in output) == (0, True)
     eventually(lambda: state(paused) == "T", 5.0, lambda: state(paused))
-    assert command("fault", "resume", "all")[0] == 0
+    status, output = command("fault", "resume", "all")
+    assert status == 0, output
     eventually(lambda: state(paused) in "RS", 5.0, lambda: state(paused))
 
     def converged() -> bool:

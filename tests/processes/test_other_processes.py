@@ -103,6 +103,32 @@ def test_a_fleet_without_netem_hovers_to_the_end(
 
 
 @pytest.mark.real_time
+def test_an_operator_reaches_a_fleet_whose_netem_is_down(
+    start: Start, scenario: Write, run: Path
+) -> None:
+    fleet = launched(start, scenario(60.0), run, "--no-recording", "--speed", "2")
+    fleet.wait_for_output("minimum separation")
+
+    def command(*words: str) -> str:
+        operator = start(*QSWARM, "fault", str(run), *words)
+        assert operator.status(10.0) == 0, operator.text
+        return operator.text
+
+    assert "its name, to end it early: kill-" in command("kill", "netem")
+    before = pids(run)["netem"]
+    eventually(lambda: not running(before), 5.0)
+    command("restart", "netem")
+    eventually(lambda: len(outages(run)) == 3, 10.0, lambda: fleet.text)
+    assert outages(run)[-1] == ("reconnect", False)
+    refused = start(*QSWARM, "fault", str(run), "restart", "netem")
+    assert refused.status(10.0) == 2
+    assert refused.text == f"{run}: refused: netem: no kill of it is in force\n"
+    fleet.kill_group(signal.SIGINT)
+    assert fleet.status(10.0) == 130, fleet.text
+    none_left(pids(run))
+
+
+@pytest.mark.real_time
 def test_the_world_is_paused_and_woken(
     start: Start, with_event: Callable[..., str], run: Path
 ) -> None:

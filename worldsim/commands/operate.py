@@ -117,7 +117,8 @@ def fault(
         typer.Argument(
             metavar="SELECTOR",
             help="Agents: ids, vertex:V1, queue:Q1, random:2 or all."
-            " With kill or pause: netem or world too, alone. With join: how many."
+            " With kill or pause: netem or world too, alone; with restart or resume: netem."
+            " With join: how many."
             f" With end: a fault's name. With {', '.join(AGENT_FAULTS)}: KEY=VALUE too."
             " With disk_full: none.",
             show_default=False,

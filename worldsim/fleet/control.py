@@ -12,7 +12,7 @@ import numpy as np
 import zenoh
 
 from agent.comms.mission import last_version
-from netem.faults import FaultOrder, Outage, RadioEvent, Sabotage
+from netem.faults import FaultOrder, Outage, OutageCause, RadioEvent, Sabotage
 from netem.link_parameters import Conditions
 from netem.wire.bus import Bus, Handler, drain
 from worldsim.engine.operations import (
@@ -31,6 +31,7 @@ from worldsim.engine.operations import (
 )
 from worldsim.engine.step import SlotLoop
 from worldsim.fleet.active_fault import ActiveFault, active_faults
+from worldsim.fleet.local_socket import LocalServer
 from worldsim.judge.event import By
 from worldsim.judge.run_events import RunEvent
 from worldsim.scenario.clock_checks import ClockErrorNow, ForeseenClocks
@@ -96,7 +97,10 @@ class Control:
         request = _request(data)
         first = len(self._loop.events)
         name = None
-        if request.event is not None:
+        cause = _netem_outage_to_end(request.event)
+        if cause is not None:
+            self._end_outages(cause, carry_out)
+        elif request.event is not None:
             event = self._event(request.event)
             if event.end is not None:
                 for operation in self._ends(event.end):
@@ -161,6 +165,16 @@ class Control:
                 operation = effects.operation(self._timeline.end_now(number, now_s))
                 if operation is not None:
                     yield operation
+
+    def _end_outages(self, cause: OutageCause, carry_out: CarryOut) -> None:
+        """End every kill or pause of netem that is in force. Raises RequestError without any."""
+        outages = self._loop.network.outages
+        numbers = [number for number, each in outages.items() if each == cause]
+        if not numbers:
+            raise RequestError(f"netem: no {cause} of it is in force")
+        for number in numbers:
+            for operation in self._ends(self._timeline.name_of(number)):
+                carry_out(operation, "operator")
 
     def _names_to_end(self) -> list[str]:
         """Return the names of the faults that are in force, or have begun and will happen again."""
@@ -237,6 +251,13 @@ class Control:
         return Answer(t_s, tuple(events), network.conditions, faults, name)
 
 
+def _netem_outage_to_end(event: dict[str, Any] | None) -> OutageCause | None:
+    """Return which outages of netem an event ends: a restart ends kills, a resume pauses."""
+    if event == {"restart": ["netem"]}:
+        return "kill"
+    return "pause" if event == {"resume": ["netem"]} else None
+
+
 def _request(data: bytes) -> Request:
     if len(data) > MAX_REQUEST_B:
         raise RequestError(f"{len(data)} B; a request has at most {MAX_REQUEST_B} B")
@@ -260,20 +281,26 @@ def _null_key(keys: dict[str, Any]) -> str | None:
 
 
 class ControlServer:
-    """Answers requests over Zenoh, between slots."""
+    """Answers requests between slots, over Zenoh and, as netem may be down, over a local socket."""
 
     def __init__(self, bus: Bus, control: Control) -> None:
         self._control = control
+        self._local = LocalServer(MAX_REQUEST_B)
         self._queries: Handler[zenoh.Query] = bus.queryable("control")
 
     def answer_waiting(self, carry_out: CarryOut) -> None:
-        """Answer up to REQUESTS_PER_SLOT requests that have arrived."""
+        """Answer up to REQUESTS_PER_SLOT requests that have arrived in each of the two ways."""
+
+        def answer(data: bytes) -> bytes:
+            return msgspec.json.encode(self._control.answer(data, carry_out))
+
+        self._local.answer_waiting(answer, REQUESTS_PER_SLOT)
         for query in drain(self._queries, REQUESTS_PER_SLOT):
             with query:
                 data = query.payload.to_bytes() if query.payload is not None else b""
                 try:
-                    answer = self._control.answer(data, carry_out)
+                    encoded = answer(data)
                 except RequestError as error:
                     query.reply_err(str(error))
                 else:
-                    query.reply(query.key_expr, msgspec.json.encode(answer))
+                    query.reply(query.key_expr, encoded)
