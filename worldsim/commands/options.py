@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 if TYPE_CHECKING:
+    from worldsim.live.live_view import LiveView
     from worldsim.scenario.tables import Scenario
 
 MAX_RUNS = 1_000_000
@@ -136,7 +137,17 @@ Out = Annotated[
 NoRecording = Annotated[
     bool, typer.Option("--no-recording", help="Do not write the recording, run.rrd.")
 ]
-
+Live = Annotated[
+    bool,
+    typer.Option("--live", help="Show the run in a window of the rerun viewer while it flies."),
+]
+LiveWeb = Annotated[
+    bool,
+    typer.Option(
+        "--live-web",
+        help="Show it in a browser on this host; prints the address, and one for viewers.",
+    ),
+]
 Quiet = Annotated[
     bool, typer.Option("--quiet", help="Print the outcome and errors only, no progress.")
 ]
@@ -218,6 +229,21 @@ def check_lockstep(lockstep: bool, speed: float, shards: int, on_overload: str) 
         )
     if shards > 1 and not lockstep:
         raise typer.BadParameter("needs --lockstep", param_hint="--shards")
+
+
+def live_view_of(window: bool, browser: bool, no_recording: bool) -> "LiveView":
+    """Return where a run is shown while it flies.
+
+    Raises typer.BadParameter without a recording to show, and ViewerError without a viewer.
+    """
+    from worldsim.live.live_view import LiveView
+
+    live = LiveView(window, browser)
+    if live.wanted and no_recording:
+        option = "--live" if window else "--live-web"
+        raise typer.BadParameter("needs the recording", param_hint=option)
+    live.check()
+    return live
 
 
 def seeds_of(text: str) -> range:

@@ -12,6 +12,8 @@ from worldsim.commands.options import (
     Json,
     JUnit,
     List,
+    Live,
+    LiveWeb,
     Lockstep,
     NoRecording,
     OnOverload,
@@ -24,6 +26,7 @@ from worldsim.commands.options import (
     Shards,
     check_lockstep,
     examples,
+    live_view_of,
     load_scenario,
     overrides_of,
     seeds_of,
@@ -40,6 +43,7 @@ commands = typer.Typer()
         "qswarm run my.toml --agents 20 --duration 40 --speed 2",
         "qswarm run wedge-9 --agents 80 --on-overload slow",
         "qswarm run wedge-9 --lockstep",
+        "qswarm run wedge-9 --live",
         "qswarm run wedge-9 --json | jq .outcome",
         "qswarm run --list",
     )
@@ -59,6 +63,8 @@ def run(
     settings: Settings = None,
     out: Out = None,
     no_recording: NoRecording = False,
+    live: Live = False,
+    live_web: LiveWeb = False,
     quiet: Quiet = False,
     json: Json = False,
     junit: JUnit = None,
@@ -83,11 +89,12 @@ def run(
     warn(scenario, loaded)
     output = Output(quiet, json, junit)
     output.check(out)
+    shown = live_view_of(live, live_web, no_recording)
     directory = RunDirectory.create(out, loaded)
     terms = RunOptions(
         loaded.name, speed, not no_recording, lockstep, shards, on_overload=on_overload
     )
-    return run_processes(loaded, directory, terms, output)
+    return shown.watch(directory.recording, lambda: run_processes(loaded, directory, terms, output))
 
 
 @commands.command(
@@ -95,6 +102,7 @@ def run(
         "qswarm sim wedge-9",
         "qswarm sim wedge-9 --seeds 0:20 --jobs 2 --out runs/twenty",
         "qswarm sim my.toml --set netem.delay_ms=200 --no-recording",
+        "qswarm sim wedge-100 --live-web",
         "qswarm sim wedge-9 --json | jq .min_separation_m",
         "qswarm sim wedge-9 --seeds 0:20 --quiet --junit wedge-9.xml",
     )
@@ -115,6 +123,8 @@ def sim(
     settings: Settings = None,
     out: Out = None,
     no_recording: NoRecording = False,
+    live: Live = False,
+    live_web: LiveWeb = False,
     quiet: Quiet = False,
     json: Json = False,
     junit: JUnit = None,
@@ -126,7 +136,9 @@ def sim(
     """
     from worldsim.campaign.virtual_runs import simulate_many, simulate_one
     from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
+    from worldsim.recording.layout import RECORDING_FILE
     from worldsim.results.closing import Output
+    from worldsim.results.run_folder import folder_named_after_now
 
     if seed is not None and seeds is not None:
         raise typer.BadParameter("cannot be combined with --seed", param_hint="--seeds")
@@ -138,7 +150,14 @@ def sim(
         warn(given, loaded[-1])
     output = Output(quiet, json, junit)
     output.check(out)
+    shown = live_view_of(live, live_web, no_recording)
     if seeds is None and len(scenarios) == 1:
-        return simulate_one(loaded[0], out, not no_recording, output)
+        folder = out or folder_named_after_now(loaded[0].name)
+        return shown.watch(
+            folder / RECORDING_FILE,
+            lambda: simulate_one(loaded[0], folder, not no_recording, output),
+        )
+    if shown.wanted:
+        raise typer.BadParameter("shows one run, and these are many", param_hint="--live")
     workers = jobs or len(os.sched_getaffinity(0))
     return simulate_many(loaded, out, not no_recording, workers, output)

@@ -17,7 +17,7 @@ from netem.wire.shutdown import ignore_signals, interrupt_on_signals
 from worldsim.fleet import process as world_process
 from worldsim.fleet.culprits import SharedSteps
 from worldsim.fleet.fleet_monitor import FleetMonitor, ProcessSockets, StartError
-from worldsim.fleet.fork import adopt_orphans, end_orphans
+from worldsim.fleet.fork import adopt_orphans, children, end_orphans
 from worldsim.fleet.intruder import IntruderCounts
 from worldsim.fleet.ipc import (
     ActionRequest,
@@ -92,6 +92,8 @@ class Launcher:
     ) -> None:
         self.terminal = Terminal(console_on(output.stream), quiet=output.quiet)
         self._output = output
+        self._others = children()
+        """Processes of whoever launches the fleet: a live view."""
         self._scenario = scenario
         self._directory = directory
         self._options = options
@@ -167,7 +169,7 @@ class Launcher:
         self._supervisor.end(["world", *self._mediums()], END_WITHIN_S, signal.SIGTERM)
         self._supervisor.end(["zygote"], END_WITHIN_S, None)
         self._supervisor.end(list(self._supervisor.pids), END_WITHIN_S, signal.SIGKILL)
-        end_orphans(())
+        end_orphans(self._others)
         self._directory.users.unlink(missing_ok=True)
 
     def _without_summary(self) -> str:

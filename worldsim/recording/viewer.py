@@ -1,7 +1,9 @@
 """The rerun viewer on recordings: its own program, bound to loopback, without usage reports.
 
-The viewer collects usage data unless its configuration forbids it, and it has no option to forbid
-it. It is therefore run with a temporary configuration; the user's configuration is not changed.
+Nothing may leave the machine. The viewer collects usage data unless its configuration forbids it,
+and it has no option to forbid it. It is therefore run with a temporary configuration; the user's
+configuration is not changed. It also asks the network for its newest version and for examples, and
+no option forbids that either: it gets a proxy where nobody listens.
 """
 
 import os
@@ -9,6 +11,8 @@ import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,7 +21,12 @@ from urllib.parse import quote
 from worldsim.recording.layout import RECORDING_FILE
 
 LOOPBACK = "127.0.0.1"
+DATA_PORT, PAGE_PORT = 9876, 9090
+"""The ports that rerun itself takes for data and for its page; others where these are taken."""
 DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY")
+_DISCARD = f"http://{LOOPBACK}:9"
+NOWHERE = dict.fromkeys(("HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"), _DISCARD)
+"""Environment of a viewer: connections to other hosts are refused on this one."""
 
 
 class ViewerError(Exception):
@@ -38,15 +47,59 @@ def view(found: list[Path], web: bool) -> int:
     web: serve them to a browser on this machine, instead of a window. Raises ViewerError where
     there is no viewer, or no display for its window.
     """
-    program = _viewer_program()
-    if not web and sys.platform == "linux" and not any(map(os.environ.get, DISPLAY_VARIABLES)):
+    program = viewer_program(window=not web)
+    with viewer_environment(program) as environment:
+        options = browser_options(*free_ports()) if web else _window_options()
+        return _run_until_closed([program, *options, *map(str, found)], environment)
+
+
+def viewer_program(*, window: bool) -> str:
+    """Return the viewer's binary: the script of the same name would leave it orphaned.
+
+    Raises ViewerError where there is no viewer, or, for a window, no display.
+    """
+    spec = find_spec("rerun_cli")
+    program = Path(spec.origin).with_name("rerun") if spec is not None and spec.origin else None
+    if program is None or not program.is_file():
+        raise ViewerError("the rerun viewer is not installed: pip install rerun-sdk")
+    if window and sys.platform == "linux" and not any(map(os.environ.get, DISPLAY_VARIABLES)):
         raise ViewerError("no display for a window here; --web shows it in a browser")
+    return str(program)
+
+
+@contextmanager
+def viewer_environment(program: str) -> Iterator[dict[str, str]]:
+    """Yield the environment of a viewer that sends nothing to other hosts. Raises ViewerError."""
     with TemporaryDirectory(prefix="qswarm-viewer-") as configuration:
         quiet = {"RUST_LOG": "warn", **os.environ}
-        environment = {**quiet, "XDG_CONFIG_HOME": configuration}
+        for name in NOWHERE:
+            quiet.pop(name.lower(), None)
+        environment = {**quiet, **NOWHERE, "XDG_CONFIG_HOME": configuration}
         _disable_usage_reports(program, environment)
-        command = [program, *(_web_options() if web else _window_options()), *map(str, found)]
-        return _run_until_closed(command, environment)
+        yield environment
+
+
+def free_ports() -> tuple[int, int]:
+    """Return a free port for data and one for the page: rerun's own where they are free."""
+    with socket.socket() as data, socket.socket() as page:
+        return _bound(data, DATA_PORT), _bound(page, PAGE_PORT)
+
+
+def data_address(data: int) -> str:
+    """Return the address that a viewer connects to for a server's data."""
+    return f"rerun+http://{LOOPBACK}:{data}/proxy"
+
+
+def page_address(data: int, page: int) -> str:
+    """Return the address to open in a browser."""
+    return f"http://{LOOPBACK}:{page}/?url={quote(data_address(data), safe='')}"
+
+
+def browser_options(data: int, page: int) -> list[str]:
+    """Return the options that serve a browser, and print the address to open."""
+    print(f"open {page_address(data, page)} ; Ctrl-C ends it", flush=True)
+    ports = ["--port", str(data), "--web-viewer-port", str(page)]
+    return ["--serve-web", "--bind", LOOPBACK, *ports]
 
 
 def _recordings_in(run: Path) -> list[Path]:
@@ -61,15 +114,6 @@ def _recordings_in(run: Path) -> list[Path]:
     return found
 
 
-def _viewer_program() -> str:
-    """Return the viewer's binary: the script of the same name would leave it orphaned."""
-    spec = find_spec("rerun_cli")
-    program = Path(spec.origin).with_name("rerun") if spec is not None and spec.origin else None
-    if program is None or not program.is_file():
-        raise ViewerError("the rerun viewer is not installed: pip install rerun-sdk")
-    return str(program)
-
-
 def _disable_usage_reports(program: str, environment: dict[str, str]) -> None:
     done = subprocess.run(
         [program, "analytics", "disable"], env=environment, capture_output=True, check=False
@@ -79,16 +123,7 @@ def _disable_usage_reports(program: str, environment: dict[str, str]) -> None:
 
 
 def _window_options() -> list[str]:
-    return ["--bind", LOOPBACK, "--port", "auto"]
-
-
-def _web_options() -> list[str]:
-    """Return the options that serve a browser, and print the address to open."""
-    data, page = _free_ports(2)
-    source = quote(f"rerun+http://{LOOPBACK}:{data}/proxy", safe="")
-    print(f"open http://{LOOPBACK}:{page}/?url={source} ; Ctrl-C ends it", flush=True)
-    ports = ["--port", str(data), "--web-viewer-port", str(page)]
-    return ["--serve-web", "--bind", LOOPBACK, *ports]
+    return ["--hide-welcome-screen", "--bind", LOOPBACK, "--port", "auto"]
 
 
 def _run_until_closed(command: list[str], environment: dict[str, str]) -> int:
@@ -102,12 +137,9 @@ def _run_until_closed(command: list[str], environment: dict[str, str]) -> int:
         signal.signal(signal.SIGTERM, before)
 
 
-def _free_ports(count: int) -> list[int]:
-    probes = [socket.socket() for _ in range(count)]
+def _bound(probe: socket.socket, wanted: int) -> int:
     try:
-        for probe in probes:
-            probe.bind((LOOPBACK, 0))
-        return [int(probe.getsockname()[1]) for probe in probes]
-    finally:
-        for probe in probes:
-            probe.close()
+        probe.bind((LOOPBACK, wanted))
+    except OSError:
+        probe.bind((LOOPBACK, 0))
+    return int(probe.getsockname()[1])

@@ -170,7 +170,7 @@ def _print_loss(text: str) -> None:
 
 def make_folder(path: Path | None, name: str) -> Path:
     """Create a new folder, ``runs/<name>-<UTC time>`` for None. Raises RunDirectoryError."""
-    chosen = path if path is not None else _named_after_now(name)
+    chosen = path if path is not None else folder_named_after_now(name)
     if chosen.exists():
         raise RunDirectoryError(chosen, "exists; a run is never overwritten")
     try:
@@ -197,7 +197,8 @@ def unwritable(path: Path, error: OSError) -> RunDirectoryError:
     return RunDirectoryError(path, _reason(error))
 
 
-def _named_after_now(name: str) -> Path:
+def folder_named_after_now(name: str) -> Path:
+    """Return a new folder's name, ``runs/<name>-<UTC time>``; it is not made."""
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     chosen, count = RUNS / f"{name}-{stamp}", 1
     while chosen.exists():
