@@ -13,6 +13,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +21,8 @@ from typing import NamedTuple
 import msgspec
 
 from worldsim.fleet.fork import request_death_signal
+from worldsim.recording.viewer import Ports
+from worldsim.recording.web_page import LOOPBACK, served_page
 
 LOWEST_PRIORITY = 19
 POLL_S = 0.1
@@ -33,8 +36,9 @@ class Feed(NamedTuple):
     parent: int  # pid of the process with which the feeder ends
     recording: str  # the file, which may not be there yet
     server: list[str]  # command of a server that takes a recording on its input
-    port: int  # where the server listens, on loopback
+    ports: Ports  # where the server listens
     window: list[str]  # command of a window that connects to the server; empty: none
+    browser: bool  # whether it serves a page, too
     printed: str  # file for what both print
 
 
@@ -46,7 +50,7 @@ def main() -> None:
     os.nice(LOWEST_PRIORITY)
     feeder = Feeder(feed)
     try:
-        print(f"live view: {feeder.serve()}", file=sys.stderr, flush=True)
+        _tell(feeder.serve())
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         feeder.end()
@@ -60,6 +64,8 @@ class Feeder:
         self._server: subprocess.Popen[bytes] | None = None
         self._window: subprocess.Popen[bytes] | None = None
         self._file: int | None = None
+        self._open = False
+        self._page = ExitStack()
         self._piece = b""
         """What was read and is not passed on yet."""
 
@@ -72,13 +78,27 @@ class Feeder:
         while server.poll() is None:
             if self._window is not None and self._window.poll() is not None:
                 return self._ended("the window", self._window.returncode)
-            if self._window is None and self._feed.window and _listens(self._feed.port):
-                self._window = self._start(self._feed.window, subprocess.DEVNULL)
+            if not self._open and _listens(self._feed.ports.data):
+                self._show()
             self._pass_on(server.stdin.fileno())
         return self._ended("the server", server.returncode)
 
+    def _show(self) -> None:
+        """Open the window, serve the page, and say where both are: the server is there."""
+        self._open, shown = True, []
+        if self._feed.window:
+            shown.append("in a window")
+            self._window = self._start(self._feed.window, subprocess.DEVNULL)
+        if self._feed.browser:
+            # Last: the page is served by threads, after which this process starts nothing more.
+            self._page.enter_context(served_page(self._feed.ports.page, self._feed.ports.source))
+            shown.append(f"open {self._feed.ports.page_address}")
+        shown.append(f"other viewers: rerun --connect {self._feed.ports.data_address}")
+        _tell("; ".join(shown))
+
     def end(self) -> None:
-        """End server and window, stopped ones too."""
+        """End page, window and server, stopped ones too."""
+        self._page.close()
         for child in (self._window, self._server):
             if child is not None:
                 child.kill()
@@ -130,10 +150,14 @@ class Feeder:
 
 def _listens(port: int) -> bool:
     try:
-        with socket.create_connection(("127.0.0.1", port), CONNECT_WITHIN_S):
+        with socket.create_connection((LOOPBACK, port), CONNECT_WITHIN_S):
             return True
     except OSError:
         return False
+
+
+def _tell(text: str) -> None:
+    print(f"live view: {text}", file=sys.stderr, flush=True)
 
 
 def _end(_number: int, _frame: object) -> None:

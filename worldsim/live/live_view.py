@@ -16,14 +16,14 @@ import msgspec
 
 from worldsim.live.feeder import Feed
 from worldsim.recording.viewer import (
-    LOOPBACK,
+    Ports,
     ViewerError,
-    data_address,
+    browser_options,
     free_ports,
-    page_address,
     viewer_environment,
     viewer_program,
 )
+from worldsim.recording.web_page import LOOPBACK
 from worldsim.results.exit_status import INTERRUPTED
 
 SERVER_MEMORY, WINDOW_MEMORY = "512MB", "2GB"
@@ -70,14 +70,14 @@ class LiveView(NamedTuple):
     def _fed(self, recording: Path) -> Iterator[subprocess.Popen[bytes]]:
         program = viewer_program(window=self.window)
         with viewer_environment(program) as environment:
-            data, page = free_ports()
-            _tell(f"live view: {self._where(data, page)}")
+            ports = free_ports()
             feed = Feed(
                 parent=os.getpid(),
                 recording=str(recording),
-                server=[program, *self._server_options(data, page), "-"],
-                port=data,
-                window=[program, *_window_options(data)] if self.window else [],
+                server=[program, *self._server_options(ports), "-"],
+                ports=ports,
+                window=[program, *_window_options(ports)] if self.window else [],
+                browser=self.browser,
                 printed=str(Path(environment["XDG_CONFIG_HOME"]) / "viewer.log"),
             )
             # A process group of its own: Ctrl-C is for the run, which then ends the feeder.
@@ -98,24 +98,16 @@ class LiveView(NamedTuple):
             finally:
                 _end(feeder)
 
-    def _where(self, data: int, page: int) -> str:
-        """Return where the run can be seen, in words."""
-        places = []
-        if self.window:
-            places.append("in a window")
-        if self.browser:
-            places.append(f"open {page_address(data, page)}")
-        return f"{'; '.join(places)}; another viewer: rerun --connect {data_address(data)}"
-
-    def _server_options(self, data: int, page: int) -> list[str]:
-        kind = ["--serve-web", "--web-viewer-port", str(page)] if self.browser else ["--serve-grpc"]
+    def _server_options(self, ports: Ports) -> list[str]:
         memory = ["--server-memory-limit", SERVER_MEMORY]
-        return [*kind, *memory, "--bind", LOOPBACK, "--port", str(data)]
+        if self.browser:
+            return [*browser_options(ports), *memory]
+        return ["--serve-grpc", "--bind", LOOPBACK, "--port", str(ports.data), *memory]
 
 
-def _window_options(data: int) -> list[str]:
+def _window_options(ports: Ports) -> list[str]:
     return [
-        *("--connect", data_address(data)),
+        *("--connect", ports.data_address),
         *("--bind", LOOPBACK, "--port", "auto"),
         *("--memory-limit", WINDOW_MEMORY, "--hide-welcome-screen"),
     ]

@@ -16,11 +16,12 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import NamedTuple
 from urllib.parse import quote
 
 from worldsim.recording.layout import RECORDING_FILE
+from worldsim.recording.web_page import LOOPBACK, served_page
 
-LOOPBACK = "127.0.0.1"
 DATA_PORT, PAGE_PORT = 9876, 9090
 """The ports that rerun itself takes for data and for its page; others where these are taken."""
 DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY")
@@ -49,8 +50,32 @@ def view(found: list[Path], web: bool) -> int:
     """
     program = viewer_program(window=not web)
     with viewer_environment(program) as environment:
-        options = browser_options(*free_ports()) if web else _window_options()
-        return _run_until_closed([program, *options, *map(str, found)], environment)
+        if not web:
+            return _run_until_closed([program, *_window_options(), *map(str, found)], environment)
+        ports = free_ports()
+        command = [program, *browser_options(ports), *map(str, found)]
+        with served_page(ports.page, ports.source):
+            print(f"open {ports.page_address} ; Ctrl-C ends it", flush=True)
+            return _run_until_closed(command, environment)
+
+
+class Ports(NamedTuple):
+    """Where a server for viewers and its page are found on loopback."""
+
+    data: int
+    page: int
+    source: int
+    """Where rerun serves its own page."""
+
+    @property
+    def data_address(self) -> str:
+        """What a viewer connects to."""
+        return f"rerun+http://{LOOPBACK}:{self.data}/proxy"
+
+    @property
+    def page_address(self) -> str:
+        """What to open in a browser."""
+        return f"http://{LOOPBACK}:{self.page}/?url={quote(self.data_address, safe='')}&theme=dark"
 
 
 def viewer_program(*, window: bool) -> str:
@@ -79,27 +104,16 @@ def viewer_environment(program: str) -> Iterator[dict[str, str]]:
         yield environment
 
 
-def free_ports() -> tuple[int, int]:
-    """Return a free port for data and one for the page: rerun's own where they are free."""
-    with socket.socket() as data, socket.socket() as page:
-        return _bound(data, DATA_PORT), _bound(page, PAGE_PORT)
+def free_ports() -> Ports:
+    """Return free ports: for data and page rerun's own, where they are free."""
+    with socket.socket() as data, socket.socket() as page, socket.socket() as source:
+        return Ports(_bound(data, DATA_PORT), _bound(page, PAGE_PORT), _bound(source, 0))
 
 
-def data_address(data: int) -> str:
-    """Return the address that a viewer connects to for a server's data."""
-    return f"rerun+http://{LOOPBACK}:{data}/proxy"
-
-
-def page_address(data: int, page: int) -> str:
-    """Return the address to open in a browser."""
-    return f"http://{LOOPBACK}:{page}/?url={quote(data_address(data), safe='')}"
-
-
-def browser_options(data: int, page: int) -> list[str]:
-    """Return the options that serve a browser, and print the address to open."""
-    print(f"open {page_address(data, page)} ; Ctrl-C ends it", flush=True)
-    ports = ["--port", str(data), "--web-viewer-port", str(page)]
-    return ["--serve-web", "--bind", LOOPBACK, *ports]
+def browser_options(ports: Ports) -> list[str]:
+    """Return the options of a server for a browser."""
+    numbers = ["--port", str(ports.data), "--web-viewer-port", str(ports.source)]
+    return ["--serve-web", "--bind", LOOPBACK, *numbers]
 
 
 def _recordings_in(run: Path) -> list[Path]:
