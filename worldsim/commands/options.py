@@ -231,17 +231,20 @@ def check_lockstep(lockstep: bool, speed: float, shards: int, on_overload: str) 
         raise typer.BadParameter("needs --lockstep", param_hint="--shards")
 
 
-def live_view_of(window: bool, browser: bool, no_recording: bool) -> "LiveView":
+def live_view_of(window: bool, browser: bool, no_recording: bool, runs: int = 1) -> "LiveView":
     """Return where a run is shown while it flies.
 
-    Raises typer.BadParameter without a recording to show, and ViewerError without a viewer.
+    Raises typer.BadParameter without a recording to show, or for several runs, and ViewerError
+    without a viewer.
     """
     from worldsim.live.live_view import LiveView
 
     live = LiveView(window, browser)
+    option = "--live" if window else "--live-web"
     if live.wanted and no_recording:
-        option = "--live" if window else "--live-web"
         raise typer.BadParameter("needs the recording", param_hint=option)
+    if live.wanted and runs > 1:
+        raise typer.BadParameter("shows one run, and these are many", param_hint=option)
     live.check()
     return live
 

@@ -150,14 +150,12 @@ def sim(
         warn(given, loaded[-1])
     output = Output(quiet, json, junit)
     output.check(out)
-    shown = live_view_of(live, live_web, no_recording)
+    shown = live_view_of(live, live_web, no_recording, len(loaded))
     if seeds is None and len(scenarios) == 1:
         folder = out or folder_named_after_now(loaded[0].name)
         return shown.watch(
             folder / RECORDING_FILE,
             lambda: simulate_one(loaded[0], folder, not no_recording, output),
         )
-    if shown.wanted:
-        raise typer.BadParameter("shows one run, and these are many", param_hint="--live")
     workers = jobs or len(os.sched_getaffinity(0))
     return simulate_many(loaded, out, not no_recording, workers, output)

@@ -104,10 +104,10 @@ def viewer_environment(program: str) -> Iterator[dict[str, str]]:
         yield environment
 
 
-def free_ports() -> Ports:
-    """Return free ports: for data and page rerun's own, where they are free."""
+def free_ports(wanted_data: int = DATA_PORT, wanted_page: int = PAGE_PORT) -> Ports:
+    """Return free ports: those that are wanted for data and page, where they are free."""
     with socket.socket() as data, socket.socket() as page, socket.socket() as source:
-        return Ports(_bound(data, DATA_PORT), _bound(page, PAGE_PORT), _bound(source, 0))
+        return Ports(_bound(data, wanted_data), _bound(page, wanted_page), _bound(source, 0))
 
 
 def browser_options(ports: Ports) -> list[str]:
@@ -152,6 +152,8 @@ def _run_until_closed(command: list[str], environment: dict[str, str]) -> int:
 
 
 def _bound(probe: socket.socket, wanted: int) -> int:
+    # As servers do: else a port that was used a moment ago would seem taken.
+    probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         probe.bind((LOOPBACK, wanted))
     except OSError:
