@@ -1,5 +1,6 @@
 """Stills and films: drawn without a display, of the times asked for, with the team in view."""
 
+import subprocess
 from pathlib import Path
 
 import matplotlib.image
@@ -114,6 +115,21 @@ def test_a_film_has_ten_frames_a_second(shown: Shown, tmp_path: Path) -> None:
     assert default_speed(shown) == 1.0
 
 
+def test_a_film_is_an_mp4_that_players_show(
+    shown: Shown, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(film.shutil, "which", lambda _: None)
+    assert film.film_suffix() == ".mp4"  # by the package alone
+    file = tmp_path / "film.mp4"
+    write_film(shown, file, 10.0, lambda _: None)
+    decoder = [film._ffmpeg(), "-i", file, "-f", "rawvideo", "-pix_fmt", "gray", "-"]
+    decoded = subprocess.run(decoder, check=True, capture_output=True)
+    assert b"Video: h264" in decoded.stderr
+    assert b"yuv420p" in decoded.stderr
+    frames = np.frombuffer(decoded.stdout, dtype=np.uint8).reshape(6, 720, 1280)
+    assert np.ptp(frames, axis=(1, 2)).min() > 100  # something is drawn
+
+
 def test_an_interrupted_film_leaves_nothing(shown: Shown, tmp_path: Path) -> None:
     def interrupt(text: str) -> None:
         if "frame 3" in text:
@@ -127,9 +143,9 @@ def test_an_interrupted_film_leaves_nothing(shown: Shown, tmp_path: Path) -> Non
 def test_a_film_that_cannot_be_written_says_why(
     shown: Shown, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(film.FFMpegWriter, "isAvailable", lambda: False)
+    monkeypatch.setattr(film, "_ffmpeg", lambda: None)
     assert film.film_suffix() == ".gif"
-    with pytest.raises(FilmError, match="ffmpeg is not installed"):
+    with pytest.raises(FilmError, match=r"needs ffmpeg: pip install"):
         write_film(shown, tmp_path / "film.mp4", 10.0, lambda _: None)
     with pytest.raises(FilmError, match=r"\.avi: a film is \.mp4 or \.gif"):
         write_film(shown, tmp_path / "film.avi", 10.0, lambda _: None)

@@ -44,11 +44,19 @@ def view(
         typer.Option("--web", help="Use a browser instead of a window; served on this host only."),
     ] = False,
 ) -> int:
-    """Open recordings in the rerun viewer."""
-    from worldsim.recording.viewer import recordings
+    """Open recordings in the rerun viewer.
+
+    Of several, one is shown at a time: choose in the viewer's left panel, whose button is at the
+    top right. Nothing is asked of other hosts, nor told to them. A run that is still going on is
+    shown as far as it was when the viewer started; see qswarm run --live.
+    """
+    from worldsim.recording.viewer import recordings, shortcomings
     from worldsim.recording.viewer import view as show
 
-    return PASS if show(recordings(runs), web) == 0 else FAIL
+    found = recordings(runs)
+    for line in shortcomings(found):
+        complain(line)
+    return PASS if show(found, web) == 0 else FAIL
 
 
 @commands.command(epilog=examples("qswarm ps runs/wedge-9-20260102T030405Z"))

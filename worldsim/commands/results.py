@@ -165,6 +165,7 @@ def picture(
     epilog=examples(
         "qswarm video runs/mine",
         "qswarm video runs/mine --speed 4 --out mine.gif",
+        "pip install 'qswarm[video]'    # for .mp4, where there is no ffmpeg",
     )
 )
 def video(
@@ -183,7 +184,7 @@ def video(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="The film, .mp4 (needs ffmpeg) or .gif.",
+            help="The film, .mp4 (needs ffmpeg, or qswarm[video]) or .gif.",
             show_default="RUN/video.mp4; .gif without ffmpeg",
         ),
     ] = None,

@@ -6,7 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-from worldsim.recording.readback import DamagedError, Readback, RecordingError, read_run
+from worldsim.recording.readback import (
+    DamagedError,
+    Readback,
+    RecordingError,
+    check_recording,
+    read_run,
+)
 
 
 def read_run_apart(path: Path) -> Readback:
@@ -14,6 +20,7 @@ def read_run_apart(path: Path) -> Readback:
 
     The file is read by a child process, so that a damaged one can only end the child.
     """
+    check_recording(path)
     command = [sys.executable, "-P", "-m", __name__, str(path)]
     child = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
     if child.returncode:

@@ -5,6 +5,7 @@ there.
 """
 
 import json
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -42,6 +43,7 @@ EVERY_TICK = (
 """Columns with a row for every tick; ``_ticks`` takes them in this order."""
 DRAWN_POSITION = (layout.AGENTS, layout.POSITIONS)
 """What the viewer draws, in single precision: all that an older recording has of positions."""
+RERUN_NAMES = re.compile(r"^Failed to read RRD file at .*?\.rrd: ")
 COMPONENTS = {component for _, component in EVERY_TICK} | {layout.HEARS, layout.MISSION}
 
 
@@ -71,15 +73,24 @@ class Readback:
     """Whether positions are those that were judged. An older recording has them only as drawn."""
 
 
+def check_recording(path: Path) -> None:
+    """Raise RecordingError where there is no file, or one that does not begin as a recording."""
+    if not path.is_file():
+        raise RecordingError(f"{path}: no such recording")
+    try:
+        begins = is_recording(path)
+    except OSError as error:
+        raise DamagedError(f"{path}: cannot be read: {error.strerror}") from error
+    if not begins:
+        raise RecordingError(f"{path}: not a recording")
+
+
 def read_run(path: Path) -> Readback:
     """Return the run that a recording holds. Raises RecordingError.
 
     A damaged file can end this process: rerun's reader aborts on some. See ``isolated_reader``.
     """
-    if not path.is_file():
-        raise RecordingError(f"{path}: no such recording")
-    if not is_recording(path):
-        raise RecordingError(f"{path}: not a recording")
+    check_recording(path)
     try:
         columns = _RecordedColumns(_chunks(path))
     except msgspec.ValidationError as error:
@@ -159,7 +170,9 @@ def _chunks(path: Path) -> list[Chunk]:
             simplefilter("ignore", RerunWarning)
             return list(RrdReader(file).stream())
     except (RuntimeError, ValueError, OSError) as error:
-        raise DamagedError(f"{path}: cannot be read: {error}") from error
+        # Rerun names the file that it read, which may be a copy.
+        why = RERUN_NAMES.sub("", str(error), count=1)
+        raise DamagedError(f"{path}: cannot be read: {why}") from error
 
 
 def _scenario(columns: _RecordedColumns, path: Path) -> Scenario:

@@ -32,7 +32,8 @@ class _Frame(NamedTuple):
 def is_recording(path: Path) -> bool:
     """Return whether a file begins as a recording does."""
     with path.open("rb") as file:
-        return file.read(len(MAGIC)) == MAGIC
+        head = file.read(HEADER_B)
+    return len(head) == HEADER_B and head.startswith(MAGIC)
 
 
 def is_finished(path: Path) -> bool:

@@ -20,6 +20,7 @@ from typing import NamedTuple
 from urllib.parse import quote
 
 from worldsim.recording.layout import RECORDING_FILE
+from worldsim.recording.rrd_file import is_finished, is_recording
 from worldsim.recording.web_page import LOOPBACK, served_page
 
 DATA_PORT, PAGE_PORT = 9876, 9090
@@ -40,6 +41,23 @@ def recordings(runs: list[Path]) -> list[Path]:
     Raises ViewerError where there is none.
     """
     return [recording for run in runs for recording in _recordings_in(run)]
+
+
+def shortcomings(found: list[Path]) -> list[str]:
+    """Return what is missing of recordings, a line for each one that is not whole.
+
+    Raises ViewerError for a file that is no recording, or cannot be read.
+    """
+    lines = []
+    for recording in found:
+        try:
+            if not is_recording(recording):
+                raise ViewerError(f"{recording}: not a recording")
+            if not is_finished(recording):
+                lines.append(f"{recording}: cut off, or still being written; shown as far as it is")
+        except OSError as error:
+            raise ViewerError(f"{recording}: cannot be read: {error.strerror}") from error
+    return lines
 
 
 def view(found: list[Path], web: bool) -> int:

@@ -1,8 +1,12 @@
-"""A film of a run: its stills one after the other, as MP4 where ffmpeg is installed, or as GIF."""
+"""A film of a run: its stills one after the other, as MP4 where there is an ffmpeg, or as GIF."""
 
+import shutil
 from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 
@@ -31,7 +35,20 @@ class FilmError(Exception):
 
 def film_suffix() -> str:
     """Return the best kind of film that this host can write."""
-    return MP4 if FFMpegWriter.isAvailable() else GIF
+    return MP4 if _ffmpeg() is not None else GIF
+
+
+def _ffmpeg() -> str | None:
+    """Return the ffmpeg of this host, or else that of the package imageio-ffmpeg; None: neither."""
+    if (installed := shutil.which("ffmpeg")) is not None:
+        return installed
+    if find_spec("imageio_ffmpeg") is None:
+        return None
+    try:
+        program: str = import_module("imageio_ffmpeg").get_ffmpeg_exe()
+    except RuntimeError:  # a package without a program for this host
+        return None
+    return program
 
 
 def default_speed(shown: Shown) -> float:
@@ -69,9 +86,13 @@ def _writer(suffix: str) -> AbstractMovieWriter:
         return PillowWriter(fps=FPS)
     if suffix != MP4:
         raise FilmError(f"{suffix or 'no suffix'}: a film is {MP4} or {GIF}")
-    if not FFMpegWriter.isAvailable():
-        raise FilmError(f"ffmpeg is not installed, which {MP4} needs; {GIF} needs nothing more")
-    return FFMpegWriter(fps=FPS, bitrate=2400)
+    program = _ffmpeg()
+    if program is None:
+        how = f"{MP4} needs ffmpeg: pip install 'qswarm[video]'; {GIF} needs nothing more"
+        raise FilmError(how)
+    matplotlib.rcParams["animation.ffmpeg_path"] = program
+    # H.264 in this form is what browsers and players show.
+    return FFMpegWriter(fps=FPS, codec="h264", bitrate=2400, extra_args=["-pix_fmt", "yuv420p"])
 
 
 def _view(shown: Shown) -> tuple[Floats, Floats]:
