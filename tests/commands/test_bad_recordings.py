@@ -2,17 +2,16 @@
 
 import re
 import shutil
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.commands.conftest import Command
+from tests.processes.harness import rrd_verify
 from tests.small_scenario import SMALL
 from worldsim.commands.app import command
 from worldsim.recording import viewer
-from worldsim.recording.viewer import viewer_program
 
 READERS = ("report", "picture", "video", "export", "verify")
 
@@ -150,9 +149,3 @@ def test_rerun_finds_a_whole_recording_valid(run: Path, kept: float, status: int
     content = (run / "run.rrd").read_bytes()
     (run / "run.rrd").write_bytes(content[: int(len(content) * kept)])
     assert rrd_verify(run / "run.rrd") == status
-
-
-def rrd_verify(recording: Path) -> int:
-    program = viewer_program(window=False)
-    verifier = [program, "rrd", "verify", recording]
-    return subprocess.run(verifier, check=False, capture_output=True).returncode

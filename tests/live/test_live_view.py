@@ -31,8 +31,16 @@ RECORDING_B = 32 * 1024 * 1024
 
 
 def feed_of(folder: Path, server: list[str]) -> Feed:
-    ports = Ports(0, 0, 0)
-    return Feed(os.getpid(), str(folder / "run.rrd"), server, ports, [], False, str(folder / "log"))
+    return Feed(
+        parent=os.getpid(),
+        recording=str(folder / "run.rrd"),
+        server=server,
+        ports=Ports(0, 0, 0),
+        window=[],
+        browser=False,
+        printed=str(folder / "log"),
+        memory_mb=100,
+    )
 
 
 @pytest.fixture
@@ -111,6 +119,7 @@ def test_a_server_gets_the_recording_as_it_grows(fed: list[Started], tmp_path: P
         ("raise SystemExit('no port is free')", "the server ended with status 1: no port is free"),
         ("import os; os.close(0); os.kill(os.getpid(), 9)", "ended with signal 9: it printed"),
         ("", "the server was closed"),
+        ("held = bytearray(200 << 20); input()", "is ended: it took more than 100 MB"),
     ],
 )
 def test_a_server_that_ends_is_reported(

@@ -11,6 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from worldsim.recording.viewer import viewer_program
+
 SCENARIO = """
 name = "four"
 seed = 3
@@ -86,3 +88,10 @@ def events_of(run: Path) -> list[dict[str, Any]]:
 def pids(run: Path) -> dict[str, int]:
     rows = json.loads((run / "fleet.json").read_text())["processes"]
     return {row["name"]: row["pid"] for row in rows}
+
+
+def rrd_verify(recording: Path) -> int:
+    """Return the exit status of ``rerun rrd verify``."""
+    program = viewer_program(window=False)
+    verifier = [program, "rrd", "verify", recording]
+    return subprocess.run(verifier, check=False, capture_output=True).returncode

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tests.processes.harness import QSWARM, Started, events_of, eventually, pids
+from tests.processes.harness import QSWARM, Started, events_of, eventually, pids, rrd_verify
 from worldsim.fleet.launcher import processes
 
 pytestmark = pytest.mark.processes
@@ -128,6 +128,7 @@ def test_a_run_passes_and_leaves_all_of_its_files(start: Start, scenario: Write,
 
     verification = verify(run)
     assert (verification.whole, verification.differences) == (True, ()), verification
+    assert rrd_verify(run / "run.rrd") == 0
     assert summary["invariants"]["I8"]["ticks"] > 6 * 20 / 2
     assert summary["delivery_late_ms"].keys() == {"median", "worst"}
     delivery = summary["delivery"]
@@ -178,6 +179,7 @@ def test_ctrl_c_ends_everything_and_leaves_summary_and_recording(
     assert "interrupted" in summary["reason"]
     assert 0.0 < summary["duration_s"] < 60.0
     assert recorded_ticks(run / "run.rrd") > 0
+    assert rrd_verify(run / "run.rrd") == 0
     none_left(pids(run))
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.processes.harness import QSWARM, Started, events_of, eventually, pids
+from tests.processes.harness import QSWARM, Started, events_of, eventually, pids, rrd_verify
 from worldsim.engine.virtual import fly
 from worldsim.scenario.file import load
 
@@ -134,6 +134,7 @@ def test_a_clean_run_equals_virtual_time_and_passes(
 
     verification = verify(run)
     assert (verification.whole, verification.differences) == (True, ()), verification
+    assert rrd_verify(run / "run.rrd") == 0
 
 
 @pytest.mark.parametrize("shards", [1, 3])

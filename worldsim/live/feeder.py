@@ -28,6 +28,7 @@ LOWEST_PRIORITY = 19
 POLL_S = 0.1
 PIECE_B = 256 * 1024
 CONNECT_WITHIN_S = 0.1
+PAGE_B = os.sysconf("SC_PAGE_SIZE")
 
 
 class Feed(NamedTuple):
@@ -40,6 +41,9 @@ class Feed(NamedTuple):
     window: list[str]  # command of a window that connects to the server; empty: none
     browser: bool  # whether it serves a page, too
     printed: str  # file for what both print
+    memory_mb: (
+        int  # what either may take: rerun's own limits leave out what a viewer has yet to read
+    )
 
 
 def main() -> None:
@@ -80,6 +84,9 @@ class Feeder:
                 return self._ended("the window", self._window.returncode)
             if not self._open and _listens(self._feed.ports.data):
                 self._show()
+            for name, child in (("the server", server), ("the window", self._window)):
+                if child is not None and _memory_mb(child.pid) > self._feed.memory_mb:
+                    return f"{name} is ended: it took more than {self._feed.memory_mb} MB"
             self._pass_on(server.stdin.fileno())
         return self._ended("the server", server.returncode)
 
@@ -146,6 +153,12 @@ class Feeder:
             (line.strip() for line in reversed(lines) if line.strip()), "it printed nothing"
         )
         return f"{what} ended with {how}: {last}"
+
+
+def _memory_mb(pid: int) -> float:
+    """Return the resident memory of a child; 0 once it has ended [MB]."""
+    pages = Path(f"/proc/{pid}/statm").read_text("ascii").split()[1]
+    return int(pages) * PAGE_B / 1e6
 
 
 def _listens(port: int) -> bool:

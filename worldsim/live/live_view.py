@@ -26,8 +26,10 @@ from worldsim.recording.viewer import (
 from worldsim.recording.web_page import LOOPBACK
 from worldsim.results.exit_status import INTERRUPTED
 
-SERVER_MEMORY, WINDOW_MEMORY = "512MB", "2GB"
+SERVER_MEMORY, WINDOW_MEMORY = "512MB", "1GB"
 """Beyond these, rerun drops the oldest data: of what late viewers get, and of what one shows."""
+MEMORY_MB = 2000
+"""What server and window may take each; one that takes more ends the live view."""
 END_WITHIN_S = 2.0
 
 
@@ -79,6 +81,7 @@ class LiveView(NamedTuple):
                 window=[program, *_window_options(ports)] if self.window else [],
                 browser=self.browser,
                 printed=str(Path(environment["XDG_CONFIG_HOME"]) / "viewer.log"),
+                memory_mb=MEMORY_MB,
             )
             # A process group of its own: Ctrl-C is for the run, which then ends the feeder.
             feeder = subprocess.Popen(
