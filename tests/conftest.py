@@ -4,6 +4,7 @@ import gc
 import signal
 
 import pytest
+from hypothesis import settings
 
 FLYING = (
     "campaign",
@@ -26,6 +27,10 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+# A busy host makes an example slow, not wrong: hypothesis would fail it after 200 ms.
+settings.register_profile("no deadline", deadline=None)
+settings.load_profile("no deadline")
 
 # As in a run (worldsim.commands.app), the collector looks for reference cycles less often.
 gc.set_threshold(200_000)
