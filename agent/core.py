@@ -33,6 +33,7 @@ from agent.messages import (
     CAUSES,
     MAX_COST_MM,
     MAX_HEARD,
+    MAX_M,
     MAX_PLACES,
     NO_MISSION,
     ZERO,
@@ -53,6 +54,10 @@ from netem.wire.channels import LOCAL, MULTIHOP, Channel
 MAX_SUMMARIES: Final = 8
 """Most summaries of one sender taken in one step: its latest."""
 HOUSEKEEPING_S: Final = 0.2
+BELIEF_S: Final = 0.5
+"""An agent tells so often where it takes its neighbours to be."""
+BELIEFS_OF: Final = 50
+"""In a larger fleet no agent does: they would say more of that than of anything else."""
 """Period of what need not be done every tick [s]."""
 IMPLAUSIBLE_SPEEDS: Final = 4.0
 """A reported speed of more than so many times the fleet's limit is rejected. Reported speeds may
@@ -93,6 +98,9 @@ class Agent:
         self._slack_s = 2.0 * tick_s
         self._implausible2 = (IMPLAUSIBLE_SPEEDS * setup.fleet_max_speed_mps) ** 2
         self._command_slots = setup.command_ticks * setup.slots_per_tick
+        self._slots_per_tick = setup.slots_per_tick
+        ticks = max(1, round(BELIEF_S * setup.tick_hz)) if setup.ids <= BELIEFS_OF else 0
+        self._slots_per_belief = ticks * setup.slots_per_tick  # 0: it tells nothing of them
         round_s = 1.0 / comms.multihop_hz if comms.multihop_hz > 0.0 else inf
         self._broadcast = Broadcast(
             setup.id, setup.incarnation, 1.0 / comms.local_hz, round_s, setup.relays
@@ -170,7 +178,7 @@ class Agent:
         wrong_clock = self._clock.is_behind(senses.now_s)
         if not self._perception.sensor_health.update(observation) or wrong_clock:
             velocity = ZERO
-        command = self._command(observation.slot, intent, velocity)
+        command = self._command(senses, observation.slot, intent, velocity)
         if wrong_clock:
             return Outbox(command, ())
         own = self._own_state(senses, velocity, intent)
@@ -333,7 +341,14 @@ class Agent:
 
         return reports_vehicle
 
-    def _command(self, slot: int, intent: Intent, velocity: Vector) -> Command:
+    def _believed(self, senses: Senses, slot: int) -> tuple[tuple[int, Vector], ...]:
+        """Return where the agent takes its neighbours to be, at the ticks at which it tells."""
+        if self._slots_per_belief == 0 or slot % self._slots_per_belief >= self._slots_per_tick:
+            return ()
+        near = [each for each in senses.neighbours[:MAX_HEARD] if _is_sendable(each.position)]
+        return tuple([(each.id, each.position) for each in near])
+
+    def _command(self, senses: Senses, slot: int, intent: Intent, velocity: Vector) -> Command:
         rejected: tuple[tuple[int, int], ...] = ()
         if self.rejected:
             counts = sorted(self.rejected.items())
@@ -350,6 +365,7 @@ class Agent:
             parent=intent.words.parent,
             role=intent.words.role,
             record_age_s=self._record_age_s,
+            believed=self._believed(senses, slot),
         )
         return Command(
             slot=slot,
@@ -360,3 +376,9 @@ class Agent:
             tilt=intent.tilt,
             telemetry=telemetry,
         )
+
+
+def _is_sendable(position: Vector) -> bool:
+    """Return whether a message may hold a position: one far off may be extrapolated beyond."""
+    x, y, z = position
+    return abs(x) <= MAX_M and abs(y) <= MAX_M and abs(z) <= MAX_M

@@ -199,6 +199,10 @@ class Observation(Message, frozen=True):
     """How long its process takes for that [s; wall time]; 0 where time waits for it."""
 
 
+Believed = tuple[tuple[AgentId, Position], ...]
+"""Neighbours and where an agent takes them to be [m; world frame]."""
+
+
 class Telemetry(Message, frozen=True):
     """An agent's internal state, for the recording and the judge."""
 
@@ -213,6 +217,7 @@ class Telemetry(Message, frozen=True):
     parent: ParentId  # see Beacon
     role: Annotated[int, Meta(ge=0, lt=len(ROLES))]  # index of ROLES
     record_age_s: Seconds = 0.0  # age of the oldest team record at the last housekeeping [s]
+    believed: Annotated[Believed, Meta(max_length=MAX_HEARD)] = ()  # told now and then
 
 
 class Command(Message, frozen=True):

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from agent.messages import Observation
+from agent.messages import Believed, Observation
 from tests.closed_loop.test_faults import (
     BAD,
     check_safety,
@@ -141,6 +141,9 @@ class Heard:
 
     def observe(self, observations: Sequence[tuple[int, Observation]]) -> None:
         """What agents observe is not looked at."""
+
+    def believe(self, agent: int, slot: int, believed: Believed) -> None:
+        """What agents believe is not looked at."""
 
     def event(self, event: RunEvent) -> None:
         """The loop keeps the events itself."""

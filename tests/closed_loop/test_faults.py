@@ -8,7 +8,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from agent.messages import Observation
+from agent.messages import Believed, Observation
 from worldsim.engine.virtual import Flight, fly
 from worldsim.judge.run_events import RunEvent
 from worldsim.judge.tick import Tick
@@ -37,6 +37,9 @@ class TickList:
 
     def observe(self, observations: Sequence[tuple[int, Observation]]) -> None:
         """What agents observe is not looked at."""
+
+    def believe(self, agent: int, slot: int, believed: Believed) -> None:
+        """What agents believe is not looked at."""
 
     def event(self, event: RunEvent) -> None:
         """The loop keeps the events itself."""

@@ -13,7 +13,7 @@ from typing import Any, assert_never
 
 import numpy as np
 
-from agent.messages import FramePath, Observation, Place
+from agent.messages import Believed, FramePath, Observation, Place
 from agent.qstructure.formation import formation_of
 from agent.qstructure.frame_path import ends_s
 from tests.structure_figures.bound import arrival_bound_s
@@ -111,6 +111,9 @@ class Watcher:
 
     def observe(self, observations: Sequence[tuple[int, Observation]]) -> None:
         """What agents observe is not looked at."""
+
+    def believe(self, agent: int, slot: int, believed: Believed) -> None:
+        """What agents believe is not looked at."""
 
     def event(self, event: RunEvent) -> None:
         """Take an event, before the tick of its time."""

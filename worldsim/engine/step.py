@@ -12,7 +12,7 @@ from typing import Protocol, final
 import msgspec
 import numpy as np
 
-from agent.messages import ROLES, Command, Mission, Observation, Vector
+from agent.messages import ROLES, Believed, Command, Mission, Observation, Vector
 from worldsim.engine.counters import RadioUse, RejectionCounters
 from worldsim.engine.operations import (
     FillDisk,
@@ -49,6 +49,9 @@ class Recorder(Protocol):
 
     def observe(self, observations: Sequence[tuple[int, Observation]]) -> None:
         """Record what some agents observe, each given with its agent."""
+
+    def believe(self, agent: int, slot: int, believed: Believed) -> None:
+        """Record where an agent takes its neighbours to be at a slot."""
 
     def event(self, event: RunEvent) -> None:
         """Record one event."""
@@ -219,6 +222,8 @@ class SlotLoop:
             self.effects.missions.report(agent, telemetry.mission, self.world.time_s)
             self._report_place(agent, telemetry.place)
             self._report_role(agent, telemetry.role)
+            if telemetry.believed and self._recorder is not None and self._records_ticks:
+                self._recorder.believe(agent, command.slot, telemetry.believed)
             if telemetry.rejected:
                 self.rejections.update(agent, command)
 

@@ -48,6 +48,7 @@ ASKED_FOR = (
 """Detail that every view hides."""
 LAYERS = (
     *LINK_LAYERS,
+    layout.BELIEFS,
     *ASKED_FOR,
     layout.SIDES,
     *FORMATION_LAYERS,
@@ -56,7 +57,7 @@ LAYERS = (
 """What some views hide; all views show vehicles, obstacles, jams, and what stops vehicles."""
 SHOWN = {
     MOTION: FORMATION_LAYERS,
-    NETWORK: (*LINK_LAYERS, layout.SIDES),
+    NETWORK: (*LINK_LAYERS, layout.BELIEFS, layout.SIDES),
     STRUCTURE: (*FORMATION_LAYERS, *GUIDANCE_LAYERS),
     FAULTS: (*FAULT_LAYERS, *FORMATION_LAYERS),
 }
@@ -117,6 +118,9 @@ def _network(records: bool) -> list[Plot]:
         _series("Connectivity lambda_2 (0: the team is parted)", layout.LAMBDA2),
         rrb.Tabs(
             _series("Neighbours heard", layout.NEIGHBOURS),
+            _series(
+                "Farthest that a neighbour is from where it is believed [m]", layout.BELIEF_ERROR
+            ),
             *(ages if records else ()),
             _series("Frames of the radio, from the start", layout.PACKETS, named=True),
         ),

@@ -22,6 +22,7 @@ WAYS = f"{WORLD}/guidance/ways"
 GUIDING_LINES = f"{WORLD}/guidance/guiding_lines"
 CONSTELLATION = f"{WORLD}/guidance/constellation"
 RAYS = f"{WORLD}/sensing/rays"
+BELIEFS = f"{WORLD}/beliefs"
 LINKS = f"{WORLD}/links"
 """Pairs of agents of which one hears the other; below it, those of which one does not."""
 LINKS_LOST = f"{LINKS}/lost"
@@ -53,6 +54,7 @@ OBSTACLE_DISTANCE = f"{METRICS}/obstacle_distance"
 TIER = f"{METRICS}/tier"
 RECORD_AGE = f"{METRICS}/record_age"
 NEIGHBOURS = f"{METRICS}/neighbours"
+BELIEF_ERROR = f"{METRICS}/belief_error"
 SAFETY_FILTER = f"{METRICS}/safety_filter"
 QUEUE_RESIDUAL = f"{METRICS}/queue_residual"
 PACKETS = f"{METRICS}/packets"
@@ -105,7 +107,7 @@ def agent_metrics(obstacles: bool) -> tuple[str, ...]:
     """Return the metrics with one series for each agent; obstacles: whether there are any."""
     measured = (FORCE, SEPARATION, TURN_DEG, SLOT_ERROR)
     distance = (OBSTACLE_DISTANCE,) if obstacles else ()
-    reported = (TIER, RECORD_AGE, NEIGHBOURS, SAFETY_FILTER)
+    reported = (TIER, RECORD_AGE, NEIGHBOURS, BELIEF_ERROR, SAFETY_FILTER)
     return (*measured, *distance, *reported)
 
 

@@ -28,8 +28,8 @@ SYMBOLS = {
     MOTION: "Box with an arrow: a vehicle and its nose. Trail: its last 4 s, in the colour that it"
     " had. Brown: an obstacle. Red lines in the plots: limits.",
     NETWORK: "Grey line: one hears the other. Amber: within range, but not heard. Red: cut by a"
-    " fault. Disc: the side of a partition (A white, B grey). Red sphere: a jam. Pairs out of range"
-    " are hidden.",
+    " fault. Disc: the side of a partition (A white, B grey). Red sphere: a jam. Violet line:"
+    " from a vehicle to where a neighbour takes it to be. Pairs out of range are hidden.",
     STRUCTURE: "A queue is a line of slots behind a vertex. The agent at a vertex leads: its label"
     " says so. Thick line: from an agent to the one that it follows, gold in tier 1, then paler."
     " Large dot: where an agent flies to.",

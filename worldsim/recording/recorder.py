@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from agent.messages import ROLES, VERTEX, Observation
+from agent.messages import ROLES, VERTEX, Believed, Observation
 from agent.qstructure.formation import Formation, FormationSpec
 from worldsim.judge.event_text import WARNINGS, sentence
 from worldsim.judge.run_events import (
@@ -32,6 +32,7 @@ from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures
 from worldsim.recording import layout
 from worldsim.recording.agent_colours import AgentColours
+from worldsim.recording.belief_columns import BeliefColumns
 from worldsim.recording.blueprint import blueprint_of
 from worldsim.recording.columns import ColumnBlock, Entity, merged
 from worldsim.recording.components import LOG_LEVELS, LOG_TEXTS
@@ -120,6 +121,7 @@ class RunRecorder:
         self._obstacles = ObstacleEntities(Obstacles(scenario.obstacle))
         self._guidance = GuidanceColumns(scenario) if forms else None
         self._sensing = SensingColumns(scenario)
+        self._beliefs = BeliefColumns(scenario.rows)
         self._team_view = TeamView(1.0 / tick_hz)
         self._ticks_per_block = max(1, round(tick_hz * BLOCK_S))
         self._blocks_sent = 0
@@ -144,6 +146,11 @@ class RunRecorder:
         """Record what some agents observe."""
         if self._working:
             self._sensing.observe(observations)
+
+    def believe(self, agent: int, slot: int, believed: Believed) -> None:
+        """Record where an agent takes its neighbours to be at a slot."""
+        if self._working:
+            self._beliefs.keep(agent, slot, believed)
 
     def event(self, event: RunEvent) -> None:
         """Record one event."""
@@ -253,6 +260,7 @@ class RunRecorder:
         if self._guidance is not None:
             yield from self._guidance.blocks(ticks)
         yield from self._sensing.blocks(ticks)
+        yield from self._beliefs.blocks(ticks)
 
     def _blocks(self) -> Iterator[ColumnBlock]:
         situations = [self._situations.at(tick) for tick in self._ticks]

@@ -116,6 +116,8 @@ def _guidance_styles() -> Iterator[Entity]:
     yield Entity(layout.GUIDING_LINES, rr.LineStrips3D.from_fields(colors=bent, radii=radii))
     agents = rr.Points3D.from_fields(colors=bent, radii=[2.0 * LINK_RADIUS_M])
     yield Entity(layout.CONSTELLATION, agents)
+    believed = np.array([palette.BELIEF])
+    yield Entity(layout.BELIEFS, rr.LineStrips3D.from_fields(colors=believed, radii=radii))
     sensed = np.array([palette.SENSED])
     yield Entity(layout.RAYS, rr.LineStrips3D.from_fields(colors=sensed, radii=radii))
 

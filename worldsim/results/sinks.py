@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from agent.messages import Observation
+from agent.messages import Believed, Observation
 from worldsim.engine.step import Recorder
 from worldsim.judge.run_events import RunEvent, as_row
 from worldsim.judge.tick import Tick
@@ -37,6 +37,11 @@ class Sinks:
         """Record what some agents observe, each given with its agent."""
         if self._recorder is not None:
             self._recorder.observe(observations)
+
+    def believe(self, agent: int, slot: int, believed: Believed) -> None:
+        """Record where an agent takes its neighbours to be at a slot."""
+        if self._recorder is not None:
+            self._recorder.believe(agent, slot, believed)
 
     def fill_disk(self, full: bool) -> None:
         """Let every write of events and recorder fail as on a full disk, or no longer."""
