@@ -262,7 +262,7 @@ def check(faults: list[Fault]) -> int:
 
 def told_of(rows: list[FaultRow]) -> dict[str, dict[str, Any]]:
     """Return what events and scenario tell of a run's faults, by their numbers."""
-    keys = ("number", "kind", "from_s", "to_s", "by", "agents", "process")
+    keys = ("number", "kind", "from_s", "to_s", "by", "agents", "process", "settings")
     return {str(row["number"]): {key: row[key] for key in keys} for row in rows}  # type: ignore[literal-required]
 
 

@@ -56,6 +56,49 @@ def test_a_fault_says_when_it_was_in_force_and_what_it_struck(kind: str) -> None
     assert idle_text(summary["faults"]) is None
 
 
+def test_a_change_of_the_radio_says_which_keys_it_changed_from_what_to_what() -> None:
+    outer = (
+        "at_s = 1.0\nnetem = { loss_percent = 20, local = { delay_ms = 40 },"
+        " gemodel = { p_percent = 1, r_percent = 50 } }"
+    )
+    inner = (
+        "at_s = 2.0\nfor_s = 1.0\nnetem = { loss_percent = 50, rate_kbit = 900,"
+        " local = { delay_ms = 60, jitter_ms = 5 }, link = [{ from = 0, to = 1, range_m = 3 }] }"
+    )
+    first, second = (summary := flown(outer, inner))["faults"]
+    burst = {"p_percent": 1, "r_percent": 50, "loss_bad_percent": 100, "loss_good_percent": 0}
+    assert first["settings"] == {
+        "loss_percent": {"from": 0, "to": 20},
+        "gemodel": {"from": None, "to": burst},
+        "local.delay_ms": {"from": 0, "to": 40},
+    }
+    assert second["settings"] == {
+        "loss_percent": {"from": 20, "to": 50},
+        "rate_kbit": {"from": None, "to": 900},
+        "local.delay_ms": {"from": 40, "to": 60},
+        "local.jitter_ms": {"from": 0, "to": 5},
+        "link.0-1.range_m": {"from": None, "to": 3},
+    }
+    begins = (
+        "netem (loss_percent 20 to 50, rate_kbit none to 900, local.delay_ms 40 to 60, 2 more), 2"
+    )
+    assert fault_texts(summary["faults"])[1].startswith(begins)
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings"),
+    [
+        ("partition", {"groups": [[0], [1]], "kind": "clean", "bridge": []}),
+        ("jam", {"centre_m": [0, 0, 0], "radius_m": 20}),
+        ("flap", {"period_s": 0.2, "links": []}),
+        ("kill", None),
+    ],
+)
+def test_a_fault_of_the_radio_says_its_keys(kind: str, settings: object) -> None:
+    (row,) = flown(f"at_s = 3.0\nfor_s = 1.0\n{STRIKE[kind][0]}")["faults"]
+    assert row["settings"] == settings
+
+
 @pytest.mark.parametrize(
     ("kind", "model"),
     [

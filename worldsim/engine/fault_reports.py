@@ -5,9 +5,11 @@ A fault that strikes nothing proves nothing of the fleet, however well the run e
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 from netem.faults import FaultOrder, Heal, RadioEvent
+from netem.link_parameters import Conditions
 from worldsim.engine.operations import (
     DisturbAgents,
     EndProcesses,
@@ -20,6 +22,7 @@ from worldsim.engine.operations import (
     StopWorldProcess,
 )
 from worldsim.judge.event import By
+from worldsim.judge.fault_settings import settings_of
 from worldsim.scenario.selectors import ProcessName
 
 
@@ -30,7 +33,8 @@ class FaultReport:
     to_s: when it ended [s], None while it is in force; agents: those that it struck, ascending;
     process: netem's or the world's, of a fault that struck that one. observations: how many did not
     pass while netem was down; stopped_s: how long the world stood still [s; wall time], None where
-    no process was stopped; writes: how many failed.
+    no process was stopped; writes: how many failed. settings: the keys of a fault of the radio; of
+    a change of the conditions each with its value before and after, as "from" and "to".
     """
 
     def __init__(
@@ -48,6 +52,7 @@ class FaultReport:
         self.to_s: float | None = None
         self.observations = self.writes = 0
         self.stopped_s: float | None = None
+        self.settings: Mapping[str, Any] = {}
         self._held = set(agents)
 
     def release(self, agents: Collection[int], t_s: float) -> None:
@@ -83,10 +88,11 @@ class FaultReports:
         """Return the faults of a kind, in the order in which they began."""
         return [each for each in self.all if each.kind == kind]
 
-    def take(self, operation: Operation, t_s: float, by: By) -> None:
+    def take(self, operation: Operation, t_s: float, by: By, conditions: Conditions) -> None:
         """Take an operation that was carried out at a time [s]: it may begin a fault, or end some.
 
-        Agents that an earlier fault holds down are struck too: this one may hold them for longer.
+        conditions: of the radio, before it. Agents that an earlier fault holds down are struck too:
+        this one may hold them for longer.
         """
         self._take_stop(operation, t_s, by)
         match operation:
@@ -109,7 +115,10 @@ class FaultReports:
                 kind, agents = event.radio_kind, event.victims
             case _:
                 return
-        self.all.append(FaultReport(operation.number, kind, t_s, by, agents))
+        report = FaultReport(operation.number, kind, t_s, by, agents)
+        if isinstance(operation, FaultOrder):
+            report.settings = settings_of(operation, conditions)
+        self.all.append(report)
 
     def _take_return(self, operation: ResumeProcesses | StartProcesses, t_s: float, by: By) -> None:
         """Take a return of agents: it ends faults, or is an idle one where there is nobody."""

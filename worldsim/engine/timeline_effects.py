@@ -153,7 +153,7 @@ class TimelineEffects:
     def apply(self, operation: Operation, by: By = None) -> None:
         """Apply an operation that was carried out, and emit its events."""
         by = by or self._repeated_by(operation)
-        self.faults.take(operation, self._t_s, by)
+        self.faults.take(operation, self._t_s, by, self.network.conditions)
         match operation:
             case EndProcesses():
                 self._end(operation, by)

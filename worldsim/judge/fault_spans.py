@@ -9,9 +9,11 @@ from typing import Any
 
 import msgspec
 
+from netem.conditions import NetworkConditions
 from netem.faults import Sabotage
 from netem.link_parameters import Conditions
 from worldsim.judge.event import By, PlannedEvent
+from worldsim.judge.fault_settings import settings_of
 from worldsim.judge.radio_events import (
     ConditionsChanged,
     Flapped,
@@ -20,6 +22,7 @@ from worldsim.judge.radio_events import (
     NetemOutage,
     RadioRunEvent,
     Sabotaged,
+    order_of,
 )
 from worldsim.judge.run_events import (
     WORKS_AGAIN,
@@ -65,6 +68,8 @@ class FaultSpan(msgspec.Struct, kw_only=True):
     """Those that a fault of processes struck and that have not come back."""
     known: bool = True
     """Whether all agents are known: an operator's fault may hold some that were down before."""
+    settings: dict[str, Any] | None = None
+    """Of a fault of the radio, see settings_of."""
 
     def strike(self, agent: int | None) -> None:
         """Note that the fault ended or paused an agent's process; None: that it found none."""
@@ -93,6 +98,7 @@ class FaultSpan(msgspec.Struct, kw_only=True):
             "by": self.by,
             "agents": None if self.agents is None else sorted(self.agents),
             "process": self.process,
+            "settings": self.settings,
         }
 
 
@@ -105,6 +111,7 @@ class FaultSpans:
 
     def __init__(self, scenario: Scenario, *, operated: bool) -> None:
         self._operated = operated
+        self._network = NetworkConditions(scenario.netem)
         self._spans: dict[int, FaultSpan] = {}
         self._ended: set[int] = set()
         """The agents that are dead or gone."""
@@ -181,6 +188,15 @@ class FaultSpans:
                 self._begin(event.number, event.kind, event).agents = set(agents)
             case _:
                 self._begin(event.number, event.kind, event)
+        self._set(event)
+
+    def _set(self, event: RadioRunEvent) -> None:
+        """Note what a fault sets that begins, and take its effect on the conditions in force."""
+        order = order_of(event)
+        if order.event is not None and order.number in self._spans and order.event.heal is None:
+            settings = settings_of(order, self._network.conditions)
+            self._spans[order.number].settings = settings
+        self._network.apply(order)
 
     def _take_other(self, event: Intruded | WorldStopped | DiskFilled) -> None:
         number = event.number

@@ -26,6 +26,7 @@ ADDED_LATER = (
     "asked_s",
     "overtaken_s",
     "changed",
+    "settings",
 )
 """Keys that the summary of an older recording lacks."""
 UNRECORDED = (

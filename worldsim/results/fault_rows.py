@@ -1,7 +1,8 @@
 """Proof of effect: what each fault of a run struck, for summary.json and in words."""
 
 from collections.abc import Mapping, Sequence
-from typing import TypedDict
+from math import inf
+from typing import Any, TypedDict
 
 from worldsim.engine.fault_reports import FaultReport
 
@@ -20,6 +21,8 @@ STEPS = {
     "starve": "suppressed",
 }
 """What the faults do that strike agents' steps, by kind."""
+MAX_KEYS_TOLD = 3
+"""So many keys of a change of the radio's conditions are told with it."""
 MAX_TOLD = 20
 """So many faults have a line of their own in the verdict."""
 
@@ -41,6 +44,9 @@ class FaultRow(TypedDict):
     observations: int | None  # that no agent got while netem was down
     stopped_s: float | None  # wall time that the world stood still; None in virtual time, too
     writes: int | None  # of events and recording, that failed on a full disk
+    settings: dict[str, Any] | None
+    """The keys of a fault of the radio; of netem each as {"from": before, "to": after}, where null
+    is no limit, or no such loss."""
 
 
 def fault_rows(
@@ -71,6 +77,7 @@ def fault_rows(
             "observations": each.observations if each.process == "netem" else None,
             "stopped_s": None if each.stopped_s is None else round(each.stopped_s, 3),
             "writes": each.writes if each.kind == "disk_full" else None,
+            "settings": dict(each.settings) if each.on_radio else None,
         }
         for each in faults
     ]
@@ -124,7 +131,28 @@ def _when(row: FaultRow) -> str:
     begins = _rounded(row["from_s"])
     until = "the end" if row["to_s"] is None else f"{_rounded(row['to_s'])} s"
     span = f"at {begins} s" if until == f"{begins} s" else f"{begins} s to {until}"
-    return f"{_what(row)}{by}, {span}"
+    return f"{_what(row)}{_changed(row)}{by}, {span}"
+
+
+def _changed(row: FaultRow) -> str:
+    """Return what a change of the radio's conditions set, in brackets; nothing of other faults."""
+    if row["kind"] != "netem" or not row["settings"]:
+        return ""
+    told = [
+        f"{key} {_value(each['from'])} to {_value(each['to'])}"
+        for key, each in row["settings"].items()
+    ]
+    left = len(told) - MAX_KEYS_TOLD
+    more = [f"{left} more"] if left > 0 else []
+    return f" ({', '.join(told[:MAX_KEYS_TOLD] + more)})"
+
+
+def _value(value: Any) -> str:
+    if value is None or value == inf:
+        return "none"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key} = {_value(each)}' for key, each in value.items())}}}"
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _what(row: FaultRow) -> str:
