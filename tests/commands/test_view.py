@@ -1,6 +1,7 @@
 """view: which recordings it opens, its errors, and that it serves loopback alone."""
 
 import re
+import shutil
 import signal
 import urllib.request
 from pathlib import Path
@@ -9,17 +10,25 @@ import pytest
 
 from tests.commands.conftest import Command
 from tests.processes.harness import QSWARM, Started, eventually
+from tests.small_scenario import SMALL
+from worldsim.commands.app import command
 from worldsim.recording.viewer import recordings
 
 
-@pytest.fixture
-def recorded(small: Path, qswarm: Command) -> Path:
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two recorded runs in one folder."""
-    printed = qswarm(
-        "sim", small, "--seeds", "1:3", "--duration", "0.5", "--jobs", "1", "--out", "two"
-    )
-    assert printed.status == 1
-    return small.parent / "two"
+    base = tmp_path_factory.mktemp("flown")
+    (base / "small.toml").write_text(SMALL)
+    options = ["--seeds", "1:3", "--duration", "0.5", "--jobs", "1", "--out", str(base / "two")]
+    assert command(["sim", str(base / "small.toml"), *options]) == 1
+    return base / "two"
+
+
+@pytest.fixture
+def recorded(small: Path, flown: Path) -> Path:
+    """A copy of the two runs beside the small scenario, in the current folder."""
+    return Path(shutil.copytree(flown, small.parent / "two"))
 
 
 def test_a_run_a_recording_and_a_folder_of_runs_are_found(recorded: Path) -> None:
@@ -69,6 +78,7 @@ def test_a_browser_is_served_on_loopback_until_it_is_ended(
 def answers(address: str) -> bool:
     try:
         with urllib.request.urlopen(address, timeout=1.0) as page:
-            return b"rerun" in page.read().lower()
+            html = page.read().lower()
+            return b"rerun" in html and b'<link rel="preconnect"' not in html
     except OSError:
         return False

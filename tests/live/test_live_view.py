@@ -7,6 +7,7 @@ import socket
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -16,7 +17,9 @@ from worldsim.fleet.fork import children
 from worldsim.live import live_view
 from worldsim.live.feeder import PIECE_B, Feed
 from worldsim.live.live_view import LiveView
+from worldsim.recording.rrd_file import is_finished
 from worldsim.recording.viewer import Ports, ViewerError, free_ports
+from worldsim.results.exit_status import INTERRUPTED
 
 FROZEN = [sys.executable, "-c", "import signal; signal.pause()"]
 """A server that never reads."""
@@ -73,15 +76,19 @@ def memory_kb(pid: int) -> int:
     return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
 
 
-def blocked(pid: int) -> bool:
-    """Whether a feeder has opened the recording, and read a piece of it."""
+def read_b(pid: int) -> int:
+    """Return how much of the recording a feeder has read [bytes]."""
     try:
         files = Path(f"/proc/{pid}/fd").iterdir()
         number = next(file.name for file in files if file.readlink().name == "run.rrd")
-        position = Path(f"/proc/{pid}/fdinfo/{number}").read_text().split()[1]
+        return int(Path(f"/proc/{pid}/fdinfo/{number}").read_text().split()[1])
     except (StopIteration, OSError):
-        return False
-    return int(position) >= PIECE_B
+        return 0
+
+
+def slices(pid: int) -> int:
+    """Return how often a process has run so far."""
+    return int(Path(f"/proc/{pid}/schedstat").read_text().split()[2])
 
 
 def test_a_server_that_never_reads_fills_no_memory_and_ends_with_the_feeder(
@@ -89,15 +96,13 @@ def test_a_server_that_never_reads_fills_no_memory_and_ends_with_the_feeder(
 ) -> None:
     feeder = start(fed, tmp_path, FROZEN)
     pid = feeder.process.pid
-    grow(tmp_path / "run.rrd", b"x" * PIECE_B)
-    eventually(lambda: blocked(pid), 20.0, lambda: feeder.text)
-    before_kb = memory_kb(pid)
     grow(tmp_path / "run.rrd", b"x" * RECORDING_B)
+    eventually(lambda: read_b(pid) > 0, 20.0, lambda: feeder.text)
     server = int(Path(f"/proc/{pid}/task/{pid}/children").read_text())
-    for _ in range(3):  # what it does with a recording that grows
-        looks = Path(f"/proc/{pid}/schedstat").read_text()
-        eventually(lambda seen=looks: Path(f"/proc/{pid}/schedstat").read_text() != seen, 5.0)
-    assert memory_kb(pid) < before_kb + 2 * PIECE_B // 1024
+    before = slices(pid)
+    eventually(lambda: slices(pid) > before + 10, 20.0)
+    assert read_b(pid) <= PIECE_B, "no second piece before the first is passed on"
+    assert memory_kb(pid) < 64 * 1024
     assert os.getpriority(os.PRIO_PROCESS, pid) == 19
     os.kill(server, signal.SIGSTOP)
     feeder.process.terminate()
@@ -159,12 +164,32 @@ def test_a_watched_flight_is_the_same_and_leaves_no_process(
     before = children()
     traces = []
     for name, live in (("plain", ()), ("watched", ("--live-web",))):
-        printed = qswarm("sim", small, "--duration", "1", "--out", name, *live)
+        printed = qswarm("sim", small, "--duration", "0.5", "--out", name, *live)
         assert printed.status == 1, printed  # too short to converge
         traces.append(json.loads(Path(name, "summary.json").read_text())["trace_sha256"])
     assert traces[0] == traces[1]
-    assert qswarm("verify", "watched").status == 1
+    assert is_finished(Path("watched", "run.rrd"))
     assert children() == before
+
+
+@pytest.mark.parametrize(
+    ("status", "terminal"), [(0, True), (1, True), (INTERRUPTED, True), (0, False)]
+)
+def test_viewers_stay_on_a_terminal_until_they_are_closed(
+    tmp_path: Path,
+    fake_viewer: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    status: int,
+    terminal: bool,
+) -> None:
+    stays = terminal and status != INTERRUPTED
+    fake_viewer.write_text(fake_viewer.read_text().replace("sleep 600", "sleep 0.2"))
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(isatty=lambda: terminal))
+    assert LiveView(browser=True).watch(tmp_path / "run.rrd", lambda: status) == status
+    printed = capfd.readouterr().err
+    assert ("it stays open; Ctrl-C ends it" in printed) is stays
+    assert ("live view: the server was closed" in printed) is stays
 
 
 @pytest.mark.parametrize(

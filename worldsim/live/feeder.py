@@ -28,6 +28,7 @@ LOWEST_PRIORITY = 19
 POLL_S = 0.1
 PIECE_B = 256 * 1024
 CONNECT_WITHIN_S = 0.1
+CLEAR_LINE = "\r\x1b[K"
 PAGE_B = os.sysconf("SC_PAGE_SIZE")
 
 
@@ -51,6 +52,8 @@ def main() -> None:
     feed = msgspec.json.decode(sys.argv[1], type=Feed)
     request_death_signal(feed.parent, signal.SIGKILL)
     signal.signal(signal.SIGTERM, _end)
+    # In a process group of its own, it may print to a terminal all the same.
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     os.nice(LOWEST_PRIORITY)
     feeder = Feeder(feed)
     try:
@@ -170,7 +173,9 @@ def _listens(port: int) -> bool:
 
 
 def _tell(text: str) -> None:
-    print(f"live view: {text}", file=sys.stderr, flush=True)
+    # On a terminal a progress line may be where this one begins.
+    begin = CLEAR_LINE if sys.stderr.isatty() else ""
+    print(f"{begin}live view: {text}", file=sys.stderr, flush=True)
 
 
 def _end(_number: int, _frame: object) -> None:
