@@ -103,7 +103,9 @@ def test_a_server_that_never_reads_fills_no_memory_and_ends_with_the_feeder(
     eventually(lambda: slices(pid) > before + 10, 20.0)
     assert read_b(pid) <= PIECE_B, "no second piece before the first is passed on"
     assert memory_kb(pid) < 64 * 1024
-    assert os.getpriority(os.PRIO_PROCESS, pid) == 19
+    for each in (pid, server):
+        assert os.getpriority(os.PRIO_PROCESS, each) == 19
+        assert os.sched_getscheduler(each) == os.SCHED_IDLE
     os.kill(server, signal.SIGSTOP)
     feeder.process.terminate()
     assert feeder.status(within_s=5.0) == 0

@@ -55,6 +55,8 @@ def main() -> None:
     # In a process group of its own, it may print to a terminal all the same.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     os.nice(LOWEST_PRIORITY)
+    # Whatever wakes up in the run interrupts it at once.
+    os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     feeder = Feeder(feed)
     try:
         _tell(feeder.serve())
