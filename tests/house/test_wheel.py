@@ -92,10 +92,10 @@ def test_installed_it_runs_the_library_in_an_empty_folder(target: Path, tmp_path
             check=False,
         )
 
-    made = qswarm("sim", "wedge-9", "--no-recording", "--duration", "3", "--out", "run")
+    made = qswarm("sim", "wedge-9", "--no-recording", "--quiet", "--duration", "3", "--out", "run")
     assert (made.returncode, made.stderr.count("\n")) == (3, 1), made.stderr
     assert made.stderr.startswith("wedge-9: expect.converge_within_s: warning: ")
-    assert "wedge-9, seed 1, virtual time: 9 agents, 3 s simulated" in made.stdout
+    assert made.stdout.startswith("inconclusive (not judged: pyramidal-wedge did not converge")
     summary = json.loads((tmp_path / "run/summary.json").read_text())
     assert (summary["reason"], summary["commit"]) == (NOT_JUDGED, SHA)
     assert all(summary["packages"].values())
