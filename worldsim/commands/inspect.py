@@ -30,7 +30,11 @@ def verify(run: RunFolder) -> int:
 
 
 @commands.command(
-    epilog=examples("qswarm view runs/wedge-9-20260102T030405Z", "qswarm view runs/twenty --web")
+    epilog=examples(
+        "qswarm view runs/wedge-9-20260102T030405Z",
+        "qswarm view runs/clean runs/lossy",
+        "qswarm view runs/twenty --web",
+    )
 )
 def view(
     runs: Annotated[
@@ -46,17 +50,20 @@ def view(
 ) -> int:
     """Open recordings in the rerun viewer.
 
-    Of several, one is shown at a time: choose in the viewer's left panel, whose button is at the
-    top right. Nothing is asked of other hosts, nor told to them. A run that is still going on is
-    shown as far as it was when the viewer started; see qswarm run --live.
+    Two are shown side by side, on one time line. Of more, one is shown at a time: choose in the
+    viewer's left panel, whose button is at the top right. Nothing is asked of other hosts, nor told
+    to them. A run that is still going on is shown as far as it was when the viewer started; see
+    qswarm run --live.
     """
+    from worldsim.recording.side_by_side import joined
     from worldsim.recording.viewer import recordings, shortcomings
     from worldsim.recording.viewer import view as show
 
     found = recordings(runs)
     for line in shortcomings(found):
         complain(line)
-    return PASS if show(found, web) == 0 else FAIL
+    with joined(found) as shown:
+        return PASS if show(shown, web) == 0 else FAIL
 
 
 @commands.command(epilog=examples("qswarm ps runs/wedge-9-20260102T030405Z"))

@@ -4,7 +4,7 @@ All 3D views are drawn in the team's frame, so they follow the team; each shows 
 answer its question and hides the others.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import rerun.blueprint as rrb
@@ -72,13 +72,59 @@ def blueprint_of(scenario: Scenario) -> rrb.Blueprint:
         STRUCTURE: _structure(),
         FAULTS: _faults(),
     }
-    pages = [_page(question, plots) for question, plots in tabs.items()]
+    return _layout([_page(question, plots) for question, plots in tabs.items()])
+
+
+def blueprint_of_two(roots: Mapping[str, str]) -> rrb.Blueprint:
+    """Return the layout of two runs side by side; roots: of the entities of each, by its name."""
+    pages = [
+        rrb.Horizontal(
+            *(_column(question, name, root) for name, root in roots.items()),
+            name=question.capitalize(),
+        )
+        for question in QUESTIONS
+    ]
+    return _layout(pages)
+
+
+def _layout(pages: Sequence[rrb.Horizontal]) -> rrb.Blueprint:
     return rrb.Blueprint(
         rrb.Tabs(*pages, active_tab=0),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=layout.SIM_TIME, playback_speed=1.0),
     )
+
+
+def _column(question: str, name: str, root: str) -> rrb.Vertical:
+    """Return one of two runs: its view, its plots, and its events."""
+    plots: dict[str, list[rrb.View]] = {
+        MOTION: [
+            _series("Distance to nearest vehicle [m]", root + layout.SEPARATION),
+            _series("Distance to own slot [m]", root + layout.SLOT_ERROR),
+        ],
+        NETWORK: [
+            _series("Pairs of agents by link", root + layout.LINK_COUNTS, named=True),
+            _series("Connectivity lambda_2 (0: the team is parted)", root + layout.LAMBDA2),
+        ],
+        STRUCTURE: [
+            rrb.StateTimelineView(
+                origin=root or "/",
+                contents=[f"{root}{layout.PHASE}/**", f"{root}{layout.ROLES}/**"],
+                name="Phase and roles",
+            ),
+        ],
+        FAULTS: [rrb.StateTimelineView(origin=root + layout.CONDITIONS, name="What is in force")],
+    }
+    texts = rrb.Tabs(
+        _event_view(ALL_EVENTS, root),
+        rrb.TextDocumentView(origin=root + layout.VERDICT, name="Verdict"),
+        rrb.TextDocumentView(origin=root + layout.panel_entity(question), name="What you see"),
+        rrb.TextDocumentView(origin=root + layout.SCENARIO, name="Scenario"),
+    )
+    view = _flight_view(question, root, name)
+    shares = [5, *([4.0 / len(plots[question])] * len(plots[question])), 2]
+    return rrb.Vertical(view, *plots[question], texts, row_shares=shares)
 
 
 def _page(question: str, plots: Sequence[Plot]) -> rrb.Horizontal:
@@ -149,13 +195,16 @@ def _faults() -> list[Plot]:
     ]
 
 
-def _flight_view(question: str) -> rrb.Spatial3DView:
-    """Return a 3D view in the team's frame: it follows the team and keeps it in view."""
+def _flight_view(question: str, root: str = "", name: str = "") -> rrb.Spatial3DView:
+    """Return a 3D view in the team's frame: it follows the team and keeps it in view.
+
+    root: of the run's entities. name: of the view; left out, its question.
+    """
     direction = EYE_DIRECTION / np.linalg.norm(EYE_DIRECTION)
     return rrb.Spatial3DView(
-        origin=layout.TEAM,
-        contents=f"{layout.WORLD}/**",
-        name=QUESTIONS[question],
+        origin=root + layout.TEAM,
+        contents=f"{root}{layout.WORLD}/**",
+        name=name or QUESTIONS[question],
         background=BACKGROUND,
         line_grid=False,
         eye_controls=rrb.EyeControls3D(
@@ -164,15 +213,15 @@ def _flight_view(question: str) -> rrb.Spatial3DView:
             look_target=(0, 0, 0),
             eye_up=(0, 0, 1),
         ),
-        overrides=_overrides(question),
+        overrides=_overrides(question, root),
     )
 
 
-def _overrides(question: str) -> dict[EntityPath | str, Override]:
+def _overrides(question: str, root: str) -> dict[EntityPath | str, Override]:
     """Return what a tab's view changes: trails behind vehicles, and the layers that it hides."""
-    changed: dict[EntityPath | str, Override] = {layout.AGENTS: _trail()}
+    changed: dict[EntityPath | str, Override] = {root + layout.AGENTS: _trail()}
     for layer in LAYERS:
-        changed[layer] = rrb.EntityBehavior(visible=layer in SHOWN[question])
+        changed[root + layer] = rrb.EntityBehavior(visible=layer in SHOWN[question])
     return changed
 
 
@@ -187,7 +236,7 @@ def _trail() -> rrb.VisibleTimeRanges:
     return rrb.VisibleTimeRanges([trail])
 
 
-def _event_view(levels: Sequence[str]) -> rrb.TextLogView:
+def _event_view(levels: Sequence[str], root: str = "") -> rrb.TextLogView:
     """Return the list of events: their text begins with the time, which the viewer would cut.
 
     levels: of the events that are listed.
@@ -199,7 +248,7 @@ def _event_view(levels: Sequence[str]) -> rrb.TextLogView:
     columns = rrb.TextLogColumns(timeline_columns=times, text_log_columns=["LogLevel", "Body"])
     listed = rrb.TextLogRows(filter_by_log_level=list(levels))
     name = "Events" if levels == ALL_EVENTS else "Faults and changes of the radio"
-    return rrb.TextLogView(origin=layout.EVENTS, name=name, columns=columns, rows=listed)
+    return rrb.TextLogView(origin=root + layout.EVENTS, name=name, columns=columns, rows=listed)
 
 
 def _series(name: str, origin: str, named: bool = False) -> rrb.TimeSeriesView:
