@@ -8,8 +8,16 @@ from typing import Final
 
 from msgspec.structs import replace
 
+from agent.child import ProgramError
 from agent.config import AgentSetup
-from agent.controller import Controller, FaultyControllerError, Intent, Senses, load
+from agent.controller import (
+    Controller,
+    FailedProgramError,
+    FaultyControllerError,
+    Intent,
+    Senses,
+    load,
+)
 from agent.messages import MAX_ANGLE_RAD, MAX_FORCE, MAX_M, MAX_SPEED_MPS, Vector
 from agent.parameters import made
 from netem.compiled import UnloadableError
@@ -38,6 +46,8 @@ class CheckedController:
         controller_class = load(setup.control.controller)
         try:
             self._controller: Controller = made(controller_class, setup, setup.control.parameters)
+        except ProgramError as error:
+            raise self._program_fault("at its start", error) from None
         except BaseException as error:
             raise self._fault("in its constructor", error) from error
 
@@ -45,8 +55,13 @@ class CheckedController:
         """Return the controller's intent, in plain floats within the bounds of a command."""
         try:
             return plain(self._controller.decide(senses))
+        except ProgramError as error:
+            raise self._program_fault(f"at {senses.now_s:g} s", error) from None
         except BaseException as error:
             raise self._fault(f"at {senses.now_s:g} s", error) from error
+
+    def _program_fault(self, when: str, error: ProgramError) -> FailedProgramError:
+        return FailedProgramError(f"{self._label} failed {when}: {error}")
 
     def _fault(self, when: str, error: BaseException) -> FaultyControllerError:
         """Return the error that names the controller; re-raise one that is not its own."""

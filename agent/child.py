@@ -34,7 +34,11 @@ Code that runs between fork and exec could wait for ever for a lock of another t
 """
 
 
-class ChildError(RuntimeError):
+class ProgramError(RuntimeError):
+    """A program failed: its text says all, for a trace of Python says nothing of the program."""
+
+
+class ChildError(ProgramError):
     """A child that cannot be started, has ended, or does not keep to one line for one line."""
 
 

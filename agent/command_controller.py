@@ -6,7 +6,7 @@ flight. In a free-running fleet an answer that comes late stops the vehicle for 
 
 import sys
 
-from agent.child import Child
+from agent.child import Child, ProgramError
 from agent.config import AgentSetup
 from agent.controller import Intent, Senses
 from agent.lines import SensesLines, hover, intent_of, setup_line
@@ -17,10 +17,12 @@ ANSWER_WITHIN_S = 8.0
 """Where time waits, an answer comes within this time."""
 SHARE_OF_TICK = 0.5
 """Where time does not wait, an answer comes within this share of a tick."""
+SILENT_S = 5.0
+"""A child whose answer does not come at all for this time has failed [s; simulated time]."""
 
 
-class NoAnswerError(RuntimeError):
-    """A child that does not answer though time waits for it."""
+class NoAnswerError(ProgramError):
+    """A child that does not answer."""
 
 
 class CommandController:
@@ -33,7 +35,9 @@ class CommandController:
         self._real_time = setup.real_time
         self._within_s = SHARE_OF_TICK / setup.tick_hz if self._real_time else ANSWER_WITHIN_S
         self._lines = SensesLines(setup.team)
-        self._late = 0
+        self._missed = 0
+        self._silent_from_s: float | None = None
+        """Since when the child owes an answer; None while it answers."""
         self._child = Child(setup.control.command or ())
         self._child.tell(setup_line(setup), START_WITHIN_S)
 
@@ -41,14 +45,22 @@ class CommandController:
         """Return what the child wants; where it is late, to stop."""
         answer = self._child.ask(self._lines.line(senses), self._within_s)
         if answer is not None:
+            self._silent_from_s = None
             return intent_of(answer, senses)
         if not self._real_time:
             raise NoAnswerError(f"no answer within {self._within_s:g} s")
-        self._count_late(senses.now_s)
+        self._count_missed(senses.now_s)
         return hover(senses)
 
-    def _count_late(self, now_s: float) -> None:
-        """Count a late answer, and tell of the 1st, 10th, 100th ... in the agent's log."""
-        self._late += 1
-        if str(self._late).rstrip("0") == "1":
-            print(f"{now_s:.2f} s: {self._late} answers came late so far", file=sys.stderr)
+    def _count_missed(self, now_s: float) -> None:
+        """Count a tick without an answer, and tell of the 1st, 10th, 100th ... in the agent's log.
+
+        Raises NoAnswerError where none has come for SILENT_S.
+        """
+        self._missed += 1
+        if self._silent_from_s is None:
+            self._silent_from_s = now_s
+        if now_s - self._silent_from_s >= SILENT_S:
+            raise NoAnswerError(f"no answer since {self._silent_from_s:.2f} s")
+        if str(self._missed).rstrip("0") == "1":
+            print(f"{now_s:.2f} s: no answer in time, {self._missed} so far", file=sys.stderr)

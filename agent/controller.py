@@ -64,6 +64,10 @@ class FaultyControllerError(RuntimeError):
     """A controller failed; the text names the controller, the agent, the time and the error."""
 
 
+class FailedProgramError(FaultyControllerError):
+    """The controller is a program, and failed: there is no trace of Python to show."""
+
+
 class Words(NamedTuple):
     """What an agent says of its part in the Q-structure."""
 

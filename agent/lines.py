@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta
 
+from agent.child import ProgramError
 from agent.config import AgentSetup
 from agent.controller import Intent, Senses
 from agent.messages import Place, Vector
@@ -91,7 +92,7 @@ class IntentLine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     tilt: tuple[float, float] = (0.0, 0.0)  # pitch and roll [rad]
 
 
-class LineError(ValueError):
+class LineError(ProgramError):
     """A line that is no intent; the text says why."""
 
 
@@ -145,6 +146,8 @@ class SensesLines:
 
 def intent_of(line: bytes, senses: Senses) -> Intent:
     """Return the intent that a line asks for. Raises LineError."""
+    if not line.strip():
+        raise LineError("an empty line instead of an intent")
     try:
         said = _decode_intent(line)
     except msgspec.DecodeError as error:  # of which a ValidationError is one

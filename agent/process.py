@@ -13,7 +13,7 @@ from typing import NamedTuple
 import msgspec
 
 from agent.config import AgentSetup
-from agent.controller import ControllerError
+from agent.controller import ControllerError, FailedProgramError
 from agent.free_running import FreeRunningAgent
 from agent.lockstep import LockstepAgent
 from agent.step_page import StepGuard
@@ -72,7 +72,7 @@ def run(
         return _failed(agent, error, 2)
     try:
         return fly(agent, keys, connect, patience, users, row)
-    except (WorldGoneError, LockstepError) as error:
+    except (WorldGoneError, LockstepError, FailedProgramError) as error:
         return _failed(agent, error, 1)
     except (AccessError, SessionError, RefusedError, ControllerError) as error:
         return _failed(agent, error, 2)

@@ -86,7 +86,7 @@ def test_only_the_velocity_must_be_given() -> None:
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        (b"", "truncated"),
+        (b"", "an empty line"),
         (b"hello", "the line: 'hello'"),
         (b"{}", "missing required field `velocity`"),
         (b'{"velocity":[1,2]}', "length 3"),

@@ -95,6 +95,8 @@ def test_a_command_that_cannot_be_run_is_named(
         ("['./none']", "control.command[0]: './none' does not exist"),
         ("['./ring.c']", "control.command[0]: './ring.c' is not executable"),
         ("['no-such-program']", "control.command[0]: 'no-such-program' does not exist"),
+        ('["./ring\\u0000x"]', "control.command[0]: holds a NUL"),
+        ("['perl', \"a\\u0000b\"]", "control.command[1]: holds a NUL"),
         ("[]", "control.command: got a list of 0; allowed: a list of 1 to 64"),
     ):
         arguments = ["check", str(folder / "ring.toml"), "--set", f"control.command={given}"]

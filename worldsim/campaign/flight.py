@@ -14,7 +14,7 @@ from contextlib import suppress
 from typing import Any
 
 from agent.checked_controller import described
-from agent.controller import FaultyControllerError
+from agent.controller import FailedProgramError, FaultyControllerError
 from netem.wire.shutdown import StopRequest
 from worldsim.campaign.pulse import ClosedFilesError, Guard, Pulse, blame
 from worldsim.engine.step import SlotLoop
@@ -104,6 +104,9 @@ def _close(sinks: Sinks, loop: SlotLoop | None = None) -> None:
 
 def _report(error: BaseException, scenario: Scenario, pulse: Pulse) -> None:
     """Leave an error's line and its traceback in the pulse."""
+    if isinstance(error, FailedProgramError):
+        pulse.note_end(str(error), "")
+        return
     if isinstance(error, FaultyControllerError):
         pulse.note_end(str(error), _traceback_of(error.__cause__ or error))
         return

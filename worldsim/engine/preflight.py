@@ -111,6 +111,10 @@ def _with_command(scenario: Scenario, file: Path) -> Scenario:
     """
     if scenario.control.command is None:
         return scenario
+    for index, each in enumerate(scenario.control.command):
+        if "\0" in each:
+            detail = "holds a NUL, which no argument of a program may"
+            raise ScenarioError(file, f"control.command[{index}]", detail)
     program, *arguments = scenario.control.command
     beside = str((file.parent / program).resolve())
     found = shutil.which(beside if "/" in program else program)
