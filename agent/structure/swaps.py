@@ -149,7 +149,10 @@ def _gain(view: View, mine: Vector | None, other: Heard) -> float:
     theirs = view.point(place.queue, view.number_of(other)) if place is not None else None
     if mine is None or theirs is None:
         return 0.0
-    (x, y, z), (u, v, w), (a, b, c), (d, e, f) = view.here, other.position, mine, theirs
+    x, y, z = view.here
+    u, v, w = other.position
+    a, b, c = mine
+    d, e, f = theirs
     return 2.0 * ((x - u) * (d - a) + (y - v) * (e - b) + (z - w) * (f - c))
 
 

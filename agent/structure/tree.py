@@ -199,8 +199,10 @@ def _least_tier(each: Follower) -> int:
 
 def _leaves(here: Vector, velocity: Vector, other: Heard, horizon_s: float, reach_m: float) -> bool:
     """Whether another agent leaves the range within a time, if both fly on as now."""
-    (x, y, z), (there_x, there_y, there_z) = here, other.position
-    (u, v, w), (their_u, their_v, their_w) = velocity, other.velocity
+    x, y, z = here
+    u, v, w = velocity
+    there_x, there_y, there_z = other.position
+    their_u, their_v, their_w = other.velocity
     away_m = apart(here, other.position)
     opening = (
         (there_x - x) * (their_u - u)

@@ -83,11 +83,13 @@ class _Sweep:
 
     def take(self, row: int, others: list[int]) -> None:
         """Take how near a vehicle and others come to each other."""
-        (x, y, z), (to_x, to_y, to_z) = self._before[row], self._after[row]
+        x, y, z = self._before[row]
+        to_x, to_y, to_z = self._after[row]
         square = self.square
         least = square[row]
         for other in others:
-            (a, b, c), (to_a, to_b, to_c) = self._before[other], self._after[other]
+            a, b, c = self._before[other]
+            to_a, to_b, to_c = self._after[other]
             u, v, w = a - x, b - y, c - z
             back_u, back_v, back_w = u - (to_a - to_x), v - (to_b - to_y), w - (to_c - to_z)
             along = back_u * back_u + back_v * back_v + back_w * back_w
@@ -140,7 +142,8 @@ def conserved(packets: Packets) -> bool:
 def _longest_way_m(before: list[Vector], after: list[Vector]) -> float:
     """Return how far a vehicle has moved at most [m]."""
     longest = 0.0
-    for (x, y, z), (to_x, to_y, to_z) in zip(before, after, strict=True):
+    for row, (to_x, to_y, to_z) in enumerate(after):
+        x, y, z = before[row]
         u, v, w = to_x - x, to_y - y, to_z - z
         longest = max(longest, u * u + v * v + w * w)
     return sqrt(longest)

@@ -60,10 +60,12 @@ class _Line:
     def _moved_as_one(self, here: list[Vector]) -> bool:
         if not self._stood:
             return False
-        (x, y, z), (from_x, from_y, from_z) = here[0], self._stood[0]
+        x, y, z = here[0]
+        from_x, from_y, from_z = self._stood[0]
         x, y, z = x - from_x, y - from_y, z - from_z
         most = 0.25 * self._slack_m * self._slack_m
-        for (a, b, c), (from_a, from_b, from_c) in zip(here, self._stood, strict=True):
+        for k, (a, b, c) in enumerate(here):
+            from_a, from_b, from_c = self._stood[k]
             u, v, w = a - from_a - x, b - from_b - y, c - from_c - z
             if not u * u + v * v + w * w <= most:
                 return False
