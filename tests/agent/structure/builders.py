@@ -13,7 +13,7 @@ from agent.qstructure.shape import Ray
 from agent.qstructure.target_frame import Frame
 from agent.structure.gathering import Gathering
 from agent.structure.label_code import FIRST_QUEUE, UNPLACED, of_vertex
-from agent.structure.link_timing import timing_of
+from agent.structure.link_timing import Timing
 from agent.structure.queue_map import QueueMap
 from agent.structure.view import View
 from worldsim.scenario.file import formation_tables
@@ -112,7 +112,7 @@ def subtree(**fields):
 def view(formation, now_s, neighbours=(), *, at=ZERO, link=None, summaries=None, blocked=()):
     """Return an agent's view. link: of a radio without loss or latency if left out."""
     made = View(now_s, at, sorted(neighbours, key=attrgetter("id")), 0, formation, Frame())
-    made.timing = timing_of(link or Link(0.0, 0.0, 100.0), BEACON_S)
+    made.timing = Timing(link or Link(0.0, 0.0, 100.0), BEACON_S)
     made.summaries = summaries if summaries is not None else [None] * formation.vertices
     made.blocked = frozenset(blocked)
     return made

@@ -14,7 +14,7 @@ from agent.controller import NO_WORDS, Flown, Heard, HeardSummary, Link, Senses
 from agent.messages import ZERO, Place, Standing, Vector
 from agent.qstructure.formation import FormationSpec
 from agent.qstructure.target_frame import Frame
-from agent.structure.link_timing import timing_of
+from agent.structure.link_timing import Timing
 from agent.structure.member import StructureMember
 
 TICK_S = 0.05
@@ -125,7 +125,7 @@ class Team:
             receiver.summaries.append(HeardSummary(said.sender, said.stamp_s, summary))
 
     def _decide(self, member):
-        lost_s = timing_of(self.link, TICK_S).lost_s
+        lost_s = Timing(self.link, TICK_S).lost_s
         member.beacons = {
             sender: beacon
             for sender, beacon in member.beacons.items()

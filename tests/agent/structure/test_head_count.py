@@ -1,6 +1,6 @@
 """Counting the team: what an agent knows of it by labels, and the order along its queue."""
 
-from dataclasses import replace
+from copy import copy
 
 from agent.messages import Summary
 from agent.structure.claim import Claim
@@ -52,7 +52,8 @@ def test_a_member_that_nobody_left_hears_is_not_waited_for():
     made.census.hear(1, lost_s, made.code)
     made.census.hear(2, lost_s, made.code)
     late = view(LINE, lost_s, others)
-    late.timing = replace(seen.timing, answer_s=2.0)
+    late.timing = copy(seen.timing)
+    late.timing.answer_s = 2.0
     assert made.population(late, 2, all_hear_the_same=True).total == 2
     assert made.population(late, 2, all_hear_the_same=False).total == 3
     assert made.population(late, 1, all_hear_the_same=True).total == 3, "somebody may be heard yet"

@@ -4,12 +4,12 @@ from agent.controller import Link
 from agent.messages import LeaderSummary, RootKey
 from agent.structure.census import Census
 from agent.structure.convergecast import own_part
-from agent.structure.link_timing import timing_of
+from agent.structure.link_timing import Timing
 from agent.structure.slow_layer import SlowLayer
 from agent.structure.tree import Tree
 from tests.agent.structure.builders import BEACON_S, LINE
 
-TIMING = timing_of(Link(0.0, 0.0, 5.0), BEACON_S)
+TIMING = Timing(Link(0.0, 0.0, 5.0), BEACON_S)
 ROUND_S = 0.5
 ROOT = RootKey(0, 7)
 

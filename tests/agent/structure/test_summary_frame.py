@@ -33,7 +33,7 @@ from agent.structure.census import NEWS, Census
 from agent.structure.convergecast import ROUNDS
 from agent.structure.gathering import MOST_S
 from agent.structure.label_code import FIRST_QUEUE
-from agent.structure.link_timing import timing_of
+from agent.structure.link_timing import Timing
 from agent.structure.queue_map import QueueMap
 from agent.structure.slow_layer import VERTICES_A_ROUND, SlowLayer
 from agent.structure.summary_frame import SUMMARY_HEAD_B, ReportTurns
@@ -54,7 +54,7 @@ LAST_ID = AGENT_IDS - 1
 FARTHEST = tuple(Place(2**15 - 1, 2**15 - 1 - k) for k in reversed(range(MAX_PLACES)))
 MOST_QUEUES = 64
 ROUND_S, START_S = 0.5, 1002.0
-CLEAN = timing_of(Link(0.0, 0.0, 100.0), BEACON_S)
+CLEAN = Timing(Link(0.0, 0.0, 100.0), BEACON_S)
 
 
 def greatest(queues, vertex=0, candidates=MAX_CANDIDATES):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from agent.controller import Link
 from agent.messages import ZERO, Branch, RootKey
-from agent.structure.link_timing import timing_of
+from agent.structure.link_timing import Timing
 from agent.structure.tree import (
     NEW_PARENT_STAYS_S,
     PARENT_STAYS_S,
@@ -22,7 +22,7 @@ from agent.structure.tree import (
 from tests.agent.structure.builders import BEACON_S, heard
 
 REACH_M = 10.0
-TIMING = timing_of(Link(0.0, 0.0, REACH_M), BEACON_S)
+TIMING = Timing(Link(0.0, 0.0, REACH_M), BEACON_S)
 LOW, HIGH = RootKey(100, 1), RootKey(200, 2)
 
 
@@ -34,7 +34,7 @@ class Team:
 
     def __init__(self, points, seed=0, loss=0.0, leaders=(0,)):
         self.points, self._loss, self._random = points, loss, Random(seed)
-        self.timing = timing_of(Link(loss, 0.0, REACH_M), BEACON_S)
+        self.timing = Timing(Link(loss, 0.0, REACH_M), BEACON_S)
         self.trees = [Tree(own, 0.0) for own in range(len(points))]
         self.alive = set(range(len(points)))
         self.leading = {leader: RootKey(100 + leader, leader) for leader in leaders}
