@@ -5,7 +5,7 @@ Zenoh, or virtual time) only carry bytes. Where that time jumps, the agent begin
 kept with a time counts no longer, its controller included. Its mission stays.
 """
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable
 from math import dist, hypot, inf
 from typing import Final, NamedTuple, assert_never, final
@@ -130,7 +130,7 @@ class Agent:
         self._table = RecordTable(setup.id, comms.multihop_hz, setup.ids)
         self._safety_monitor = SafetyMonitor(setup, restarted)
         self._forget_positions()
-        self._summaries: dict[int, deque[HeardSummary]] = {}
+        self._summaries: dict[int, list[HeardSummary]] = {}
         self._blocked: frozenset[Place] = frozenset()
         self._blocked_in = NO_MISSION  # key of the mission whose places these are
         self._intent: Intent | None = None
@@ -245,7 +245,9 @@ class Agent:
         if gossip.summary is not None:
             heard = self._summaries.get(source)
             if heard is None:
-                heard = self._summaries[source] = deque(maxlen=MAX_SUMMARIES)
+                heard = self._summaries[source] = []
+            elif len(heard) == MAX_SUMMARIES:
+                del heard[0]
             heard.append(HeardSummary(source, gossip.stamp_s, gossip.summary))
         if gossip.piece is not None:
             self._missions.receive(gossip.piece, source, now_s)

@@ -3,6 +3,7 @@
 Structures of msgspec are slow to read, and each receiver reads a beacon many times.
 """
 
+from functools import lru_cache
 from math import inf
 from typing import Final, final
 
@@ -19,8 +20,13 @@ from agent.messages import (
     Vector,
 )
 
+PLACES_KEPT: Final = 2048
 INCARNATION_LASTS_S: Final = 5.0
 """An older incarnation is heard again when the newer one has been silent for this long."""
+
+
+_place = lru_cache(PLACES_KEPT)(Place)
+"""Makes a place, or returns the same one again: making a named tuple takes longer."""
 
 
 @final
@@ -108,7 +114,7 @@ class HeardBeacon:
         standing = beacon.standing
         self.standing = HeardStanding(standing) if standing is not None else None
         claims = self.queue >= 0 and self.rank >= 0 and self.mission != NO_MISSION
-        self.place = Place(self.queue, self.rank) if claims else None
+        self.place = _place(self.queue, self.rank) if claims else None
         """The place that the sender claims in its mission."""
 
     def echo_of(self, agent: int) -> int:

@@ -55,12 +55,19 @@ UNHEARD = Link(loss=0.0, latency_s=0.0, reach_m=inf)
 """Before any neighbour was heard."""
 
 
-class HeardSummary(NamedTuple):
+@final
+class HeardSummary:
     """A summary of the Q-structure, heard on the multihop channel."""
 
-    sender: int
-    stamp_s: float  # the sender's time [s]
-    summary: Summary
+    def __init__(
+        self,
+        sender: int,
+        stamp_s: float,  # the sender's time [s]
+        summary: Summary,
+    ) -> None:
+        self.sender = sender
+        self.stamp_s = stamp_s
+        self.summary = summary
 
 
 @final

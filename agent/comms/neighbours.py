@@ -73,10 +73,13 @@ class LinkQuality:
         """Return the quality now."""
         if self._beacons == 0.0:
             return UNHEARD
+        reach_m = inf
+        for away_m in self._farthest_m.values():
+            reach_m = min(reach_m, away_m)
         return Link(
             loss=max(0.0, 1.0 - self._beacons / self._sent),
             latency_s=self._latency_s / self._beacons,
-            reach_m=min(self._farthest_m.values(), default=inf),
+            reach_m=reach_m,
         )
 
 

@@ -5,7 +5,7 @@ A vertex shared by queues is one place (E16); slots stand by arc length (E13).
 
 from collections.abc import Iterable, Sequence
 from math import dist, hypot
-from typing import NamedTuple
+from typing import final
 
 from agent.comms.unidentified_vehicles import SURE_RANGE_M
 from agent.controller import Flown
@@ -14,12 +14,19 @@ from agent.qstructure.formation import NO_PLACES, Layout, Slot
 from agent.qstructure.target_frame import Frame
 
 
-class OwnTarget(NamedTuple):
+@final
+class OwnTarget:
     """An agent's place and its slot."""
 
-    place: Place | None  # None where the agent waits by a slot without claiming it
-    slot: Slot  # [m, rad; target's frame]
-    vertex: bool  # whether its holder is a queue-vertex agent
+    def __init__(
+        self,
+        place: Place | None,  # None where the agent waits by a slot without claiming it
+        slot: Slot,  # [m, rad; target's frame]
+        vertex: bool,  # whether its holder is a queue-vertex agent
+    ) -> None:
+        self.place = place
+        self.slot = slot
+        self.vertex = vertex
 
 
 class PlacePoints:

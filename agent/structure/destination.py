@@ -52,4 +52,6 @@ class Destination:
         if view.distance(claim.queue, claim.number) <= FAR_M:
             return own
         slot = view.map.slot(claim.queue, count, view.extent(claim.queue, count))
-        return own._replace(slot=slot) if own is not None and slot is not None else own
+        if own is None or slot is None:
+            return own
+        return OwnTarget(own.place, slot, own.vertex)

@@ -131,7 +131,8 @@ class Gathering:
         if has_arrived(line, now_s):
             return own
         moved = _add(own.slot.point, displacement_of(line, now_s))
-        return own._replace(slot=own.slot._replace(point=moved, attitude=FREE))
+        slot = own.slot._replace(point=moved, attitude=FREE)
+        return OwnTarget(own.place, slot, own.vertex)
 
     def queues(self, now_s: float) -> frozenset[int]:
         """Return the queues whose lines wait or fly."""

@@ -24,6 +24,8 @@ class StructureMember:
         self._structure: Structure | None = None
         self._mission = -1
         points = PlacePoints(setup.control.spacing_m)
+        self._words = Words()
+        """Said last; made anew only where something changed, for it is a named tuple."""
         self._occupied = OccupiedSlots(points, "proximity" in setup.vehicle.sensors)
 
     @property
@@ -58,6 +60,10 @@ class StructureMember:
         own = self._structure
         if own is None:
             return Words(role=DISTRESS)
-        return Words(
-            own.standing(now_s), own.summary(now_s), own.tier, own.parent, own.role, own.agents
-        )
+        standing, summary, said = own.standing(now_s), own.summary(now_s), self._words
+        tier, parent, role, agents = own.tier, own.parent, own.role, own.agents
+        spoken = standing is said.standing and summary is None and said.summary is None
+        if spoken and (tier, parent, role, agents) == said[2:]:
+            return said
+        self._words = Words(standing, summary, tier, parent, role, agents)
+        return self._words

@@ -9,7 +9,7 @@ to where a vehicle hovers in a place of old.
 
 from functools import lru_cache
 from math import dist, remainder, tau
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, final
 
 from agent.assignment.allocation import allocate
 from agent.controller import Flown, Peer
@@ -24,14 +24,23 @@ SAME_M, SAME_RAD = 0.05, 0.02
 """Two frames nearer to each other than this are one, known at different times."""
 
 
-class Held(NamedTuple):
+@final
+class Held:
     """What a member held in a mission: its place in a team of so many members."""
 
-    place: Place
-    members: int
-    blocked: frozenset[Place]
-    mission: Flown  # with the frame at the time at_s
-    at_s: float  # [s]
+    def __init__(
+        self,
+        place: Place,
+        members: int,
+        blocked: frozenset[Place],
+        mission: Flown,  # with the frame at the time at_s
+        at_s: float,  # [s]
+    ) -> None:
+        self.place = place
+        self.members = members
+        self.blocked = blocked
+        self.mission = mission
+        self.at_s = at_s
 
 
 class Relocated(NamedTuple):

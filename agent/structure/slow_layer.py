@@ -76,7 +76,8 @@ class SlowLayer:
 
     def hear(self, heard: Sequence[HeardSummary], trees: Sequence[Tree], now_s: float) -> None:
         """Take what comes up and down the trees, and the labels of the census."""
-        for sender, stamp_s, summary in heard:
+        for each in heard:
+            sender, stamp_s, summary = each.sender, each.stamp_s, each.summary
             if summary.mission != self._mission:
                 continue
             self._census.merge(summary, stamp_s, now_s, sender)

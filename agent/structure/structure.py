@@ -134,7 +134,8 @@ class Structure:
             self.held = Held(own.place, view.total, view.blocked, mission, view.now_s)
         elif self.held is not None and view.blocked == self.held.blocked:
             # Where others are blocked, the team changes to other places, one member after another.
-            self.held = self.held._replace(place=own.place, members=view.total)
+            held = self.held
+            self.held = Held(own.place, view.total, held.blocked, held.mission, held.at_s)
 
     def _flown(self, now_s: float) -> OwnTarget | None:
         """Return the own target, displaced while the members of the own queue gather."""

@@ -16,6 +16,7 @@ from agent.messages import (
     Swap,
     TreeReport,
 )
+from agent.places.place_points import OwnTarget
 from agent.structure.census import (
     LAGS,
     MAX_LAG_S,
@@ -49,7 +50,9 @@ class LyingStructure:
     def select(self, senses):
         self._senses = senses
         own = self._honest.select(senses)
-        return own._replace(place=self._lies.place(senses)) if own is not None else None
+        if own is None:
+            return None
+        return OwnTarget(self._lies.place(senses), own.slot, own.vertex)
 
     def words(self, now_s):
         self._honest.words(now_s)

@@ -113,7 +113,7 @@ def test_a_team_all_of_whose_places_are_blocked_has_no_plan():
 def test_a_place_beyond_the_team_is_none_of_its_places():
     held = Held(Place(0, 6), 6, frozenset(), flown(LINE, Frame()), 0.0)
     assert relocated(held, flown(LINE, ASIDE, 1), 0.0, SPACING_M) is None
-    first = held._replace(place=Place(0, 0))
+    first = Held(Place(0, 0), 6, frozenset(), flown(LINE, Frame()), 0.0)
     assert relocated(first, flown(LINE, ASIDE, 1), 0.0, SPACING_M) == Relocated(Place(0, 0), 6)
 
 
