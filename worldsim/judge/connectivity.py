@@ -345,13 +345,13 @@ def _found(
     label = _labels(reached.rows, alive)
     inside = label[:, None] == label
     within = lost[(lost < 1.0) & inside]
-    losses = np.unique(within)
+    losses = np.array(sorted(set(within.tolist())))
     loss = _weakest(lost, label, losses)
     if len(losses) > 1 or not inside.all():
         reached = _reached(_neighbours((lost <= loss) & inside))
     foreign = (heard | (lost < 1.0)) & ~inside
-    open_ = np.unique(label[foreign.any(axis=0) | (silent & alive)])
-    closed = ~np.isin(np.arange(label.max(initial=-1) + 1), open_)
+    closed = np.ones(int(label.max(initial=-1)) + 1, dtype=np.bool_)
+    closed[label[(foreign.any(axis=0) | silent) & alive]] = False
     return Components(label, reached.hops, loss, bool(within.any()), closed, heard.T)
 
 
