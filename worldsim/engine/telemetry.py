@@ -128,11 +128,12 @@ def _reasons(rows: list[Telemetry]) -> NDArray[np.float32]:
 
 
 def _attitude(world: World) -> NDArray[np.float32]:
-    row, tilts = array("f"), world.vehicles.tilts
+    tilts = world.vehicles.tilts
+    rows: list[float] = []
     for agent, yaw in enumerate(world.vehicles.yaws):
-        row.append(yaw)
-        row.extend(tilts[agent])
-    return np.frombuffer(row, dtype=np.float32).reshape(-1, 3)
+        pitch, roll = tilts[agent]
+        rows += (yaw, pitch, roll)
+    return np.frombuffer(array("f", rows), dtype=np.float32).reshape(-1, 3)
 
 
 def _links(rows: list[Telemetry]) -> NDArray[np.int32]:

@@ -2,7 +2,6 @@
 
 from array import array
 from collections.abc import Sequence
-from itertools import chain
 from math import cos, inf, isnan, nan, sin, sqrt, tau
 from typing import Final, NamedTuple, assert_never, final
 
@@ -33,6 +32,8 @@ def wrapped(angle: float) -> float:
     turns = angle / _TURN
     if -0.5 <= turns <= 0.5:
         return angle + 0.0  # no negative zero
+    if -1.5 < turns < 1.5:  # one turn too much: nearly always, and round() takes long
+        return angle - _TURN if turns > 0.0 else angle + _TURN
     return angle - _TURN * round(turns)
 
 
@@ -88,12 +89,12 @@ class Vehicles:
 
     def pose_bytes(self) -> bytes:
         """Return all positions, then all yaws, then all tilts, as doubles."""
-        row = array("d", chain.from_iterable(self.positions))
-        row.extend(self.yaws)
+        row = _flat(self.positions) + self.yaws
         if not self._tilts:
-            return row.tobytes() + self._level
-        row.extend(chain.from_iterable(self.tilts))
-        return row.tobytes()
+            return array("d", row).tobytes() + self._level
+        for pitch, roll in self.tilts:
+            row += (pitch, roll)
+        return array("d", row).tobytes()
 
     def place(self, row: int, position: Vector, yaw: float) -> None:
         """Put a vehicle into the world [m; world frame, rad], at rest and level."""
@@ -105,7 +106,7 @@ class Vehicles:
         self.place(row, (nan, nan, nan), nan)
 
     def integrate(
-        self, velocity: Sequence[Vector], yaw: Sequence[float], tilt: Sequence[Tilt], dt: float
+        self, velocity: list[Vector], yaw: list[float], tilt: list[Tilt], dt: float
     ) -> None:
         """Fly for ``dt`` [s] at velocities [m/s], towards yaws and tilts [rad], one for each.
 
@@ -151,7 +152,8 @@ class Vehicles:
 
     def _accelerated(self, row: int, velocity: Vector, dt: float) -> Vector:
         """Return the velocity [m/s] reached after ``dt`` [s] towards one that is commanded."""
-        (x, y, z), (u, v, w) = self.velocities[row], velocity
+        x, y, z = self.velocities[row]
+        u, v, w = velocity
         du, dv, dw = u - x, v - y, w - z
         size = sqrt(du * du + dv * dv + dw * dw)
         share = self._max_accel[row] * dt / max(size, 1e-12)
@@ -168,7 +170,16 @@ class Vehicles:
 
 def _array(rows: list[Vector]) -> Floats:
     """Return vectors as an array; numpy reads one flat row far faster than many."""
-    return np.frombuffer(array("d", chain.from_iterable(rows))).reshape(-1, 3)
+    return np.frombuffer(array("d", _flat(rows))).reshape(-1, 3)
+
+
+def _flat(rows: list[Vector]) -> list[float]:
+    flat: list[float] = []
+    for x, y, z in rows:
+        flat.append(x)
+        flat.append(y)
+        flat.append(z)
+    return flat
 
 
 def _within(value: float, most: float) -> float:
