@@ -16,6 +16,8 @@ HEAD = Layout("<4q").pack
 """Packs a frame's key: source, incarnation, channel, count."""
 FATE = Layout("<BBdd").pack
 """Packs a verdict: copy (1 for a duplicate, else 0), cause, delay [s], place of the flipped bit."""
+WHOLE = Layout("<4qBBdd").pack
+"""Packs both: HEAD and FATE."""
 ENTRY = np.dtype(
     [(name, "<i8") for name in ("source", "incarnation", "channel", "count")]
     + [("copy", "u1"), ("cause", "u1"), ("delay_s", "<f8"), ("flipped_at", "<f8")]
@@ -60,7 +62,8 @@ class DeliveryLog:
 
     def _clear(self) -> None:
         for page in self.pages:
-            page.clear()
+            if page:
+                page.clear()
 
 
 def joined_pages(shards: Iterable[Mapping[int, bytes]]) -> list[bytes]:

@@ -16,7 +16,7 @@ from typing import Any
 import msgspec
 
 from netem.conditions import NetworkConditions, differing
-from netem.delivery_log import FATE, HEAD, DeliveryLog
+from netem.delivery_log import FATE, HEAD, WHOLE, DeliveryLog
 from netem.faults import FaultOrder, Outage, Position, Sabotage
 from netem.link import LOST_TO_PARTITION, LOST_TO_QUEUE, Cause, Links, Sending, Verdict
 from netem.link_model import LinkModel
@@ -177,7 +177,9 @@ class Medium:
         if not queue:
             return ()
         queue.sort()
-        count = bisect_right(queue, (now_s, inf))
+        count = len(queue)
+        if queue[-1][0] > now_s:
+            count = bisect_right(queue, (now_s, inf))
         if count > SURELY_FIT:
             count = _count_fitting(queue[:count])
         taken = queue[:count]
@@ -292,7 +294,7 @@ class Medium:
     def _deliver_all(self, sending: Sending, near: InRange, delay_s: float) -> None:
         """Deliver a frame to all receivers in range, after the same delay [s]."""
         source, incarnation, channel, count = sending.key
-        log_entry = HEAD(source, incarnation, channel, count) + FATE(0, DELIVERED, delay_s, -1.0)
+        log_entry = WHOLE(source, incarnation, channel, count, 0, DELIVERED, delay_s, -1.0)
         due_s = sending.sent_s + delay_s
         entry: _InFlight = (due_s, source, incarnation, channel, count, 0, sending.frame)
         queues, pages = self._queues, self._delivery_log.pages
