@@ -117,9 +117,14 @@ def _read(file: Path) -> dict[str, Any]:
     return found  # type: ignore[no-any-return]
 
 
+def is_preferred() -> bool:
+    """Return whether compiled modules run, where there are any of these."""
+    return any(isinstance(each, Finder) for each in sys.meta_path)
+
+
 def prefer() -> None:
     """Import compiled modules from now on, if they fit; the packages call it before all else."""
-    if os.environ.get(PURE, "0") not in {"", "0"} or _installed():
+    if os.environ.get(PURE, "0") not in {"", "0"} or is_preferred():
         return
     try:
         files = fitting(ROOT, FOLDER)
@@ -131,7 +136,3 @@ def prefer() -> None:
         return
     if files:
         sys.meta_path.insert(0, Finder(files))
-
-
-def _installed() -> bool:
-    return any(isinstance(each, Finder) for each in sys.meta_path)

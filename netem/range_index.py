@@ -14,10 +14,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from netem.compiled import is_preferred
 from netem.faults import Position
 
-ARRAYS_FROM: Final = 40
-"""Number of receivers from which arrays are faster."""
+KEPT_FROM: Final = 40
+"""Number of receivers from which those near a sender are kept."""
+ARRAYS_FROM = 400 if is_preferred() else 40
+"""Number of receivers from which arrays are faster than a loop, compiled or not."""
 MARGIN_M: Final = 0.5
 """Receivers so far beyond the reach are kept among those that are near [m]."""
 MOST_MOVED_M = 0.499 * MARGIN_M
@@ -63,7 +66,7 @@ class RangeIndex:
 
     def near(self, source: int, reach_m: float) -> Sequence[int]:
         """Return receivers, all within a distance [m] of the source among them, ascending."""
-        if len(self._receivers) < ARRAYS_FROM:
+        if len(self._receivers) < KEPT_FROM:
             return self._receivers
         here = self.positions[source]
         if here is None:
@@ -72,7 +75,7 @@ class RangeIndex:
             self._check_near()
         near = self._near.get((source, reach_m))
         if near is None or not _is_within(here, near[0], MOST_MOVED_M):
-            pairs = self._by_array(self._array_before, source, here, reach_m + MARGIN_M)
+            pairs = self._in_range_before(source, here, reach_m + MARGIN_M)
             near = here, [receiver for receiver, _ in pairs]
             self._near[source, reach_m] = near
         return near[1]
@@ -80,8 +83,14 @@ class RangeIndex:
     def _among_near(self, source: int, here: Position, reach_m: float) -> InRange:
         near = self.near(source, reach_m)
         if len(near) < ARRAYS_FROM:
-            return self._by_loop(source, here, reach_m, near)
+            return _by_loop(self.positions, source, here, reach_m, near)
         return self._by_array(self._placed(), source, here, reach_m)
+
+    def _in_range_before(self, source: int, here: Position, reach_m: float) -> InRange:
+        """Return the receivers that were within a distance [m] when ``_near`` was begun."""
+        if len(self._receivers) < ARRAYS_FROM:
+            return _by_loop(self._before, source, here, reach_m, self._receivers)
+        return self._by_array(self._array_before, source, here, reach_m)
 
     def _check_near(self) -> None:
         """Begin ``_near`` anew if any receiver has moved too far."""
@@ -89,7 +98,9 @@ class RangeIndex:
         for receiver in self._receivers:
             here, before = self.positions[receiver], self._before[receiver]
             if here is not None and (before is None or not _is_within(here, before, MOST_MOVED_M)):
-                self._before, self._array_before = self.positions, self._placed()
+                self._before = self.positions
+                if len(self._receivers) >= ARRAYS_FROM:
+                    self._array_before = self._placed()
                 self._near.clear()
                 return
 
@@ -100,27 +111,33 @@ class RangeIndex:
             self._array = np.array(known).T.copy()
         return self._array
 
-    def _by_loop(
-        self, source: int, here: Position, reach_m: float, receivers: Sequence[int]
-    ) -> InRange:
-        x, y, z = here
-        found = []
-        for receiver in receivers:
-            there = self.positions[receiver]
-            if there is None or receiver == source:
-                continue
-            dx, dy, dz = there[0] - x, there[1] - y, there[2] - z
-            distance_m = sqrt(dx * dx + dy * dy + dz * dz)
-            if distance_m <= reach_m:
-                found.append((receiver, distance_m))
-        return found
-
     def _by_array(self, positions: Floats, source: int, here: Position, reach_m: float) -> InRange:
         dx, dy, dz = (positions[axis] - here[axis] for axis in range(3))
         distance_m = np.sqrt(dx * dx + dy * dy + dz * dz)
         within = np.flatnonzero(distance_m <= reach_m)
         pairs = zip(self._rows[within].tolist(), distance_m[within].tolist(), strict=True)
         return [pair for pair in pairs if pair[0] != source]
+
+
+def _by_loop(
+    positions: tuple[Position | None, ...],
+    source: int,
+    here: Position,
+    reach_m: float,
+    receivers: Sequence[int],
+) -> InRange:
+    x, y, z = here
+    found = []
+    for receiver in receivers:
+        there = positions[receiver]
+        if there is None or receiver == source:
+            continue
+        a, b, c = there
+        dx, dy, dz = a - x, b - y, c - z
+        distance_m = sqrt(dx * dx + dy * dy + dz * dz)
+        if distance_m <= reach_m:
+            found.append((receiver, distance_m))
+    return found
 
 
 def _is_within(a: Position, b: Position, distance_m: float) -> bool:

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from netem.range_index import ARRAYS_FROM
+from netem.range_index import KEPT_FROM
 from worldsim.judge.metrics import FIRST_WITHIN_M, Separation
 
-LARGE = ARRAYS_FROM + 20
+LARGE = KEPT_FROM + 20
 TICKS = 4
 
 

@@ -12,7 +12,7 @@ from netem.link_parameters import Conditions, DirectedLink, GilbertElliott, Path
 from netem.medium import Medium
 from netem.messages import MediumSetup
 from netem.random_draws import MAX_QUANTILE, SHAPES, FrameDraws, PlainDraws, correlated_share
-from netem.range_index import ARRAYS_FROM, RangeIndex
+from netem.range_index import ARRAYS_FROM, KEPT_FROM, RangeIndex
 from netem.rate_queue import RateQueue
 from netem.wire.channels import LOCAL, MULTIHOP
 from netem.wire.frame import Outgoing, Transmission
@@ -217,9 +217,13 @@ def test_loop_and_arrays_find_the_same_receivers(seed):
             assert [each for each in near if each[0] in few] == by_loop.in_range(source, reach_m)
 
 
+@pytest.mark.parametrize("arrays_from", [KEPT_FROM, 10 * KEPT_FROM])
 @pytest.mark.parametrize("seed", range(3))
-def test_receivers_that_move_are_found_as_if_they_were_looked_for_anew(seed):
-    random, radios = Random(seed), ARRAYS_FROM + 40
+def test_receivers_that_move_are_found_as_if_they_were_looked_for_anew(
+    seed, arrays_from, monkeypatch
+):
+    monkeypatch.setattr("netem.range_index.ARRAYS_FROM", arrays_from)
+    random, radios = Random(seed), KEPT_FROM + 40
     receivers = tuple(range(0, radios, 2)) if seed else tuple(range(radios))
     kept = RangeIndex(radios, receivers)
     places = [[random.uniform(-4.0, 4.0) for _ in range(3)] for _ in range(radios)]
