@@ -134,12 +134,17 @@ class Formation:
         left = max(0, agents - len(_without(self.common, blocked)))
         owned = [len(_without(own, blocked)) for own in self._own]
         counts = owned if left >= sum(owned) else [0] * len(bounds)
+        asked = [capacity * left for capacity in self.capacities]
+        lacking = [round(each - counts[j], 9) for j, each in enumerate(asked)]
         for _ in range(left - sum(counts)):
-            free = [j for j in range(len(counts)) if counts[j] < bounds[j]]
-            if not free:
+            most = -1
+            for j, bound in enumerate(bounds):
+                if counts[j] < bound and (most < 0 or lacking[j] > lacking[most]):
+                    most = j
+            if most < 0:
                 break
-            lacking = {j: round(self.capacities[j] * left - counts[j], 9) for j in free}
-            counts[max(free, key=lambda j: (lacking[j], -j))] += 1
+            counts[most] += 1
+            lacking[most] = round(asked[most] - counts[most], 9)
         return tuple(counts)
 
     def check(self, agents: int, least_m: float) -> None:

@@ -17,7 +17,6 @@ from array import array
 from collections import Counter
 from collections.abc import Container
 from math import inf
-from operator import add
 from typing import Final, NamedTuple
 
 from agent.messages import MAX_LABELS_B, MAX_TEAM, Summary
@@ -171,11 +170,11 @@ class Census:
         end = min(first + len(wire), self._ids)
         self._make_room(end)
         limit = greatest - WORTH_QUANTA * CODES
-        known = self._labels[first:end]
-        later = [k for k, both in enumerate(map(add, wire, known)) if both < limit]
+        known, sent = self._labels[first:end], wire.tolist()
+        later = [k for k, label in enumerate(known) if label + sent[k] < limit]
         for k in later:
-            if wire[k] != UNKNOWN:
-                self._adopt(first + k, greatest - wire[k], now_s)
+            if sent[k] != UNKNOWN:
+                self._adopt(first + k, greatest - sent[k], now_s)
 
     def _adopt(self, member: int, label: int, now_s: float) -> None:
         """Take a repeated label, and note its age in the member's usual lag."""

@@ -63,7 +63,10 @@ class DirectRule:
             self._ids, self._same_since_s = ids, now_s
         self.heard = len(ids) + 1
         short = view.total == 0 or self.heard < view.total or not _all_led(view)
-        least = min([h.standing.heard for h in members if h.standing], default=self.heard)
+        least = self.heard
+        for h in members:
+            if h.standing is not None:
+                least = min(least, h.standing.heard)
         if self.applies:
             self._leave(view, short=short, uneven=least < self.heard)
         else:

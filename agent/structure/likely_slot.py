@@ -1,7 +1,6 @@
 """Where an agent without a number flies meanwhile: to the slot that it is likely to get."""
 
-from math import dist, inf
-from operator import itemgetter
+from math import dist
 from typing import Final
 
 from agent.qstructure.formation import Slot
@@ -21,9 +20,11 @@ def standing_slot(view: View, queue: int, members: int) -> Slot | None:
     number = view.number_near(queue, members, WAITS_M)
     slots = [view.map.slot(queue, number, view.extent(queue, number))] if number else []
     slots += [view.map.vertex_slot(v) for v in view.map.vertices_of[queue]]
-    near = [(dist(each.point, view.origin), each) for each in slots if each is not None]
-    distance_m, slot = min(near, key=itemgetter(0), default=(inf, None))
-    return slot if distance_m < WAITS_M else None
+    nearest, within_m = None, WAITS_M
+    for each in slots:
+        if each is not None and (away_m := dist(each.point, view.origin)) < within_m:
+            nearest, within_m = each, away_m
+    return nearest
 
 
 def slot_by_order(view: View, queue: int, own_id: int) -> Slot | None:

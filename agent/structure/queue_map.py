@@ -12,11 +12,14 @@ from typing import Final, NamedTuple
 
 from agent.messages import MAX_TEAM, ZERO, Place, Vector
 from agent.qstructure.formation import NO_PLACES, Formation, Slot
+from agent.vectors import apart
 
 MAPS_KEPT: Final = 16
 SPARSE: Final = 8
 """The nearest slot is looked for among each so many first."""
 LEAST_STEP_M: Final = 1e-6
+ROUNDED_UP: Final = 1.0 + 1e-9
+"""By this factor a distance exceeds any rounding of it."""
 
 
 class Nearest(NamedTuple):
@@ -31,6 +34,7 @@ class Row:
 
     def __init__(self, slots: Iterable[Slot] = ()) -> None:
         self.slots: list[Slot] = []
+        self._points: list[Vector] = []
         self._longest_m = LEAST_STEP_M
         """No slot is farther from the next one [m]."""
         for slot in slots:
@@ -41,23 +45,28 @@ class Row:
         if self.slots:
             self._longest_m = max(self._longest_m, dist(self.slots[-1].point, slot.point))
         self.slots.append(slot)
+        self._points.append(slot.point)
 
     def nearest(self, first: int, here: Vector, within_m: float = inf) -> Nearest | None:
         """Return the nearest of the first members; None if none is within a distance [m].
 
         The slots next to a far one are far, too: they are left out. here [m; target's frame].
         """
-        slots, end = self.slots, min(first, len(self.slots))
+        points, end = self._points, min(first, len(self._points))
         near_m = within_m
         if within_m == inf:
-            near_m = min([dist(slots[k].point, here) for k in range(0, end, SPARSE)], default=inf)
-        found, k = None, 0
+            for k in range(0, end, SPARSE):
+                if apart(points[k], here) <= ROUNDED_UP * near_m:
+                    near_m = min(near_m, dist(points[k], here))
+        found, k = -1, 0
         while k < end:
-            away_m = dist(slots[k].point, here)
-            if away_m < near_m or (found is None and away_m == near_m):
-                found, near_m = k, away_m
+            away_m = apart(points[k], here)
+            if away_m <= ROUNDED_UP * near_m:
+                away_m = dist(points[k], here)
+                if away_m < near_m or (found < 0 and away_m == near_m):
+                    found, near_m = k, away_m
             k += max(1, int((away_m - near_m) / self._longest_m))
-        return Nearest(found + 1, near_m) if found is not None else None
+        return Nearest(found + 1, near_m) if found >= 0 else None
 
 
 class QueueMap:

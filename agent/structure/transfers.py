@@ -15,8 +15,8 @@ def transfers(
     several leaders each transfer has one giver, so that no two leaders fill one gap; the nearest
     queues come first.
     """
-    missing = [share - count for share, count in zip(shares, counts, strict=True)]
-    if not any(missing):
+    missing = [share - counts[queue] for queue, share in enumerate(shares)]
+    if missing == [0] * len(missing):
         return {}
     if len(set(formation.home)) == 1:
         takers = [max(0, each) for each in missing]

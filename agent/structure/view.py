@@ -75,8 +75,7 @@ class View:
         counts = [0] * self.map.queues
         for v, summary in enumerate(self.summaries):
             if summary is not None:
-                for j, count in zip(self.map.homed[v], summary.counts, strict=False):
-                    counts[j] = count
+                _spread(summary.counts, self.map.homed[v], counts)
         return counts
 
     @property
@@ -90,8 +89,7 @@ class View:
         highest = [0] * self.map.queues
         for v, summary in enumerate(self.summaries):
             if summary is not None:
-                for j, number in zip(self.map.homed[v], summary.highest, strict=False):
-                    highest[j] = number
+                _spread(summary.highest, self.map.homed[v], highest)
         return highest
 
     @property
@@ -225,6 +223,12 @@ class View:
         slot = self.map.slot(claim.queue, claim.number, self.extent(claim.queue, claim.number))
         place = self.map.place(claim.queue, claim.number)
         return OwnTarget(place, slot, claim.leads) if slot is not None else None
+
+
+def _spread(numbers: tuple[int, ...], queues: list[int], over: list[int]) -> None:
+    """Note the numbers of a vertex's queues among those of all queues."""
+    for k in range(min(len(numbers), len(queues))):
+        over[queues[k]] = numbers[k]
 
 
 def _latest_of(summaries: Sequence[LeaderSummary | None], *, steady: bool) -> LeaderSummary | None:
