@@ -1,13 +1,12 @@
-"""Obstacles as arrays: their positions at a time, and distances of points from their surfaces.
+"""Obstacles: their positions at a time, and distances of points from their surfaces.
 
 Every shape is convex and keeps its heading, so the distance along a straight line has one minimum.
-Only + - * / sqrt and comparisons act across rows here.
 """
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import atan2, cos, dist, hypot, radians, sin
-from typing import Final, Literal, NamedTuple, assert_never
+from math import atan2, copysign, cos, dist, hypot, inf, isnan, nan, radians, sin, sqrt
+from typing import Final, Literal, NamedTuple, assert_never, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,16 +42,64 @@ class Relative(NamedTuple):
     surface: SurfaceDistances
 
 
-class Solid(NamedTuple):
-    """The shape of an obstacle about its centre."""
+Surface = tuple[float, Vector]
+"""The distance of a point from a surface [m], negative inside, and the unit vector along which it
+grows fastest [world axes]."""
 
-    kind: Literal["sphere", "cylinder", "box"]
-    radius: float = 0.0
-    """Of a sphere or a cylinder [m]."""
-    half: Vector = (0.0, 0.0, 0.0)
-    """Half of a box's size [m; its own axes]; of a cylinder only the half height."""
-    yaw: float = 0.0
-    """Heading of a box [rad; world frame]."""
+
+NOWHERE: Final[Surface] = (nan, (nan, nan, nan))
+
+
+@final
+class Solid:
+    """The shape of an obstacle about its centre.
+
+    radius: of a sphere or a cylinder [m]. half: half of a box's size [m; its own axes]; of a
+    cylinder only the half height. yaw: heading of a box [rad; world frame].
+    """
+
+    def __init__(
+        self,
+        kind: Literal["sphere", "cylinder", "box"],
+        radius: float = 0.0,
+        half: Vector = (0.0, 0.0, 0.0),
+        yaw: float = 0.0,
+    ) -> None:
+        self.kind = kind
+        self.radius = radius
+        self.half = half
+        self.yaw = yaw
+        self._cos, self._sin = cos(yaw), sin(yaw)
+
+    def surface_from(self, x: float, y: float, z: float) -> Surface:
+        """Return the surface as seen from a point relative to the centre [m; world axes]."""
+        if self.kind == "sphere":
+            length = sqrt(x * x + y * y + z * z)
+            return length - self.radius, _unit(x, y, z, length)
+        if self.kind == "cylinder":
+            return self._from_cylinder(x, y, z)
+        return self._from_box(x, y, z)
+
+    def _from_cylinder(self, x: float, y: float, z: float) -> Surface:
+        across = sqrt(x * x + y * y)
+        distance, (radial, upward, _) = _from_corner(
+            across - self.radius, abs(z) - self.half[2], -inf
+        )
+        up = copysign(upward, z)
+        if not across > 0.0:
+            return distance, (radial, y * radial, up)
+        outward = radial / across
+        return distance, (x * outward, y * outward, up)
+
+    def _from_box(self, x: float, y: float, z: float) -> Surface:
+        c, s = self._cos, self._sin
+        ahead, left = c * x + s * y, c * y - s * x
+        half_x, half_y, half_z = self.half
+        distance, (a, b, up) = _from_corner(
+            abs(ahead) - half_x, abs(left) - half_y, abs(z) - half_z
+        )
+        a, b = copysign(a, ahead), copysign(b, left)
+        return distance, (c * a - s * b, s * a + c * b, copysign(up, z))
 
 
 class Path(NamedTuple):
@@ -88,7 +135,7 @@ class Obstacles:
         self._centre = np.array([_centre(each) for each in tables], dtype=np.float64)
         self._centre = self._centre.reshape(-1, 3)
         self._paths = {j: _path(each) for j, each in enumerate(tables) if _moves(each)}
-        solids = [_solid(each) for each in tables]
+        self._solids = solids = [_solid(each) for each in tables]
         self.spheres = _columns(solids, "sphere")
         """Columns of the spheres."""
         self.cylinders = _columns(solids, "cylinder")
@@ -101,6 +148,9 @@ class Obstacles:
         """(M, 3): half of each solid's size [m; its own axes]."""
         self.heading = np.array([(cos(each.yaw), sin(each.yaw)) for each in solids]).reshape(-1, 2)
         """(M, 2): cosine and sine of each solid's yaw."""
+        self._centred: list[Vector] = []
+        """The centres at ``_centred_s``, at any time where no obstacle moves."""
+        self._centred_s = nan
 
     def __len__(self) -> int:
         return len(self.tables)
@@ -119,6 +169,25 @@ class Obstacles:
             centre[column] = path.at(time_s)
         return centre
 
+    def near(self, point: Vector, time_s: float, within_m: float) -> list[tuple[int, Surface]]:
+        """Return the surfaces within a distance [m] of a point, and the columns of their obstacles.
+
+        point [m; world frame]; time_s: the simulated time [s].
+        """
+        x, y, z = point
+        found = []
+        for column, (a, b, c) in enumerate(self._centres_at(time_s)):
+            surface = self._solids[column].surface_from(x - a, y - b, z - c)
+            if surface[0] <= within_m:
+                found.append((column, surface))
+        return found
+
+    def _centres_at(self, time_s: float) -> list[Vector]:
+        if not self._centred or (self._paths and time_s != self._centred_s):
+            self._centred = [(x, y, z) for x, y, z in self.centres(time_s).tolist()]
+            self._centred_s = time_s
+        return self._centred
+
     def nearest(self, points: Floats, time_s: float) -> SurfaceDistances:
         """Return the distances of points (P, 3) [m; world frame] from each surface at a time."""
         return self.relative(points, time_s).surface
@@ -129,17 +198,23 @@ class Obstacles:
         return Relative(position, self.from_centres(position))
 
     def from_centres(self, relative: Floats) -> SurfaceDistances:
-        """Return the distances of points (P, M, 3) [m], given relative to the centres."""
-        distance, outward = np.empty(relative.shape[:2]), np.empty(relative.shape)
-        for columns, measure in (
-            (self.spheres, self._from_spheres),
-            (self.cylinders, self._from_cylinders),
-            (self.boxes, self._from_boxes),
-        ):
-            if len(columns):
-                found = measure(relative[:, columns], columns)
-                distance[:, columns], outward[:, columns] = found
-        return SurfaceDistances(distance, outward)
+        """Return the distances of points (P, M, 3) [m], given relative to the centres.
+
+        NaN stays NaN.
+        """
+        distances: list[float] = []
+        outward: list[float] = []
+        for row in relative.tolist():
+            for column, (x, y, z) in enumerate(row):
+                distance, (a, b, c) = NOWHERE
+                if not isnan(x):
+                    distance, (a, b, c) = self._solids[column].surface_from(x, y, z)
+                distances.append(distance)
+                outward += (a, b, c)
+        shape = relative.shape
+        return SurfaceDistances(
+            np.array(distances).reshape(shape[:2]), np.array(outward).reshape(shape)
+        )
 
     def swept(self, start: Relative, end: Relative) -> Floats:
         """Return the least distances (P, M) [m] on the straight lines between relative points.
@@ -151,75 +226,46 @@ class Obstacles:
         least = np.minimum(first.distance, last.distance)
         passing = (_dot(first.outward, way) < 0.0) & (_dot(last.outward, way) > 0.0)
         for row, column in np.argwhere(passing).tolist():
-            here, way_here = before[row, column], way[row, column]
-            least[row, column] = self._passing(column, here, way_here)
+            (x, y, z), (u, v, w) = before[row, column].tolist(), way[row, column].tolist()
+            least[row, column] = self._passing(column, (x, y, z), (u, v, w))
         return least
 
-    def _passing(self, column: int, start: Floats, way: Floats) -> float:
+    def _passing(self, column: int, start: Vector, way: Vector) -> float:
         """Return the least distance [m] on a line that first approaches and then departs."""
-        one = Obstacles(self.tables[column : column + 1])
+        solid = self._solids[column]
+        x, y, z = start
+        u, v, w = way
         low, high = 0.0, 1.0
         for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
-            found = one.from_centres((start + middle * way).reshape(1, 1, 3))
-            if _dot(found.outward, way)[0, 0] < 0.0:
+            _, (a, b, c) = solid.surface_from(x + middle * u, y + middle * v, z + middle * w)
+            if a * u + b * v + c * w < 0.0:
                 low = middle
             else:
                 high = middle
-        return float(one.from_centres((start + high * way).reshape(1, 1, 3)).distance[0, 0])
-
-    def _from_spheres(self, relative: Floats, columns: NDArray[np.intp]) -> SurfaceDistances:
-        r = np.sqrt(_dot(relative, relative))
-        return SurfaceDistances(r - self.radius[columns], _unit(relative, r))
-
-    def _from_cylinders(self, relative: Floats, columns: NDArray[np.intp]) -> SurfaceDistances:
-        x, y, z = np.moveaxis(relative, 2, 0)
-        across = np.sqrt(x * x + y * y)
-        side, cap = across - self.radius[columns], np.abs(z) - self.half[columns, 2]
-        distance, (radial, upward) = _from_corner((side, cap))
-        outward = radial / np.where(across > 0.0, across, 1.0)
-        out_x = np.where(across > 0.0, x * outward, radial)
-        out_z = np.copysign(upward, z)
-        return SurfaceDistances(distance, np.stack((out_x, y * outward, out_z), axis=2))
-
-    def _from_boxes(self, relative: Floats, columns: NDArray[np.intp]) -> SurfaceDistances:
-        c, s = self.heading[columns].T
-        half = self.half[columns]
-        x, y, z = np.moveaxis(relative, 2, 0)
-        ahead, left = c * x + s * y, c * y - s * x
-        beyond = [np.abs(each) - half[:, k] for k, each in enumerate((ahead, left, z))]
-        distance, away = _from_corner(tuple(beyond))
-        a, b, up = (np.copysign(n, each) for n, each in zip(away, (ahead, left, z), strict=True))
-        return SurfaceDistances(distance, np.stack((c * a - s * b, s * a + c * b, up), axis=2))
+        return solid.surface_from(x + high * u, y + high * v, z + high * w)[0]
 
 
-def _from_corner(beyond: tuple[Floats, ...]) -> tuple[Floats, list[Floats]]:
-    """Return distances from a corner's body, and the components of the outward unit vectors.
+def _unit(x: float, y: float, z: float, length: float) -> Vector:
+    """Return a unit vector; straight up for one of no length that can be told."""
+    if length > LEAST_LENGTH_M:
+        return x / length, y / length, z / length
+    return 0.0, 0.0, 1.0
 
-    beyond: along each axis, how far the point lies past the face [m]; negative inside.
+
+def _from_corner(a: float, b: float, c: float) -> Surface:
+    """Return the distance from a corner's body, and the components of the outward unit vector.
+
+    a, b, c: along each axis, how far the point lies past the face [m]; negative inside.
     """
-    outer = [np.maximum(each, 0.0) for each in beyond]
-    square = outer[0] * outer[0]
-    for each in outer[1:]:
-        square = square + each * each
-    outside = np.sqrt(square)
-    inside = beyond[0]
-    for each in beyond[1:]:
-        inside = np.maximum(inside, each)
-    out, taken = outside > 0.0, np.zeros(inside.shape, dtype=np.bool_)
-    outward = []
-    for past, each in zip(outer, beyond, strict=True):
-        face = (each == inside) & ~taken
-        taken |= face
-        outward.append(np.where(out, past / np.where(out, outside, 1.0), face))
-    return np.where(out, outside, inside), outward
-
-
-def _unit(vector: Floats, length: Floats) -> Floats:
-    """Return unit vectors; straight up for those of no length that can be told."""
-    sound = (length > LEAST_LENGTH_M)[:, :, None]
-    scaled: Floats = vector / np.where(sound, length[:, :, None], 1.0)
-    return np.where(sound | np.isnan(vector), scaled, (0.0, 0.0, 1.0))
+    past_a, past_b, past_c = max(a, 0.0), max(b, 0.0), max(c, 0.0)
+    outside = sqrt(past_a * past_a + past_b * past_b + past_c * past_c)
+    if outside > 0.0:
+        return outside, (past_a / outside, past_b / outside, past_c / outside)
+    inside = max(a, b, c)
+    if a == inside:
+        return inside, (1.0, 0.0, 0.0)
+    return inside, (0.0, 1.0, 0.0) if b == inside else (0.0, 0.0, 1.0)
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

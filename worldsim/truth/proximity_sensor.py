@@ -1,6 +1,5 @@
 """The proximity sensor: relative positions of near vehicles and of near obstacles' surfaces."""
 
-from math import nan
 from typing import final
 
 import numpy as np
@@ -8,10 +7,8 @@ import numpy as np
 from agent.messages import MAX_OBSTACLE_POINTS, PROXIMITY_RANGE_M, Vector
 from netem.range_index import RangeIndex
 from worldsim.truth.obstacles import Obstacles
-from worldsim.truth.vehicle import Floats
 
 Positions = tuple[Vector | None, ...]
-NOWHERE = (nan, nan, nan)
 
 
 @final
@@ -52,11 +49,11 @@ class ProximitySensor:
         if len(self._index.positions) != len(position):
             self._index = RangeIndex(len(position), tuple(range(len(position))))
         self._index.place(position)
-        vehicles = [self._vehicles(position, agent) for agent in agents]
-        points = self._obstacle_points(position, agents, time_s) if len(self._obstacles) else None
         return [
-            self._reading(near, points[row] if points is not None else None, agents[row], slot)
-            for row, near in enumerate(vehicles)
+            self._reading(
+                self._vehicles(position, agent), self._points(position[agent], time_s), agent, slot
+            )
+            for agent in agents
         ]
 
     def _vehicles(self, position: Positions, agent: int) -> list[Vector]:
@@ -70,33 +67,26 @@ class ProximitySensor:
             there = position[row]
             if there is None or row == agent:
                 continue
-            dx, dy, dz = there[0] - x, there[1] - y, there[2] - z
+            a, b, c = there
+            dx, dy, dz = a - x, b - y, c - z
             if dx * dx + dy * dy + dz * dz <= PROXIMITY_RANGE_M**2:
                 found.append((dx, dy, dz))
         return found
 
-    def _obstacle_points(
-        self, position: Positions, agents: list[int], time_s: float
-    ) -> list[Floats]:
-        """Return the nearest points of obstacles near each agent, (K, 3) [m; relative]."""
-        points = np.array([position[agent] or NOWHERE for agent in agents])
-        distance, outward = self._obstacles.nearest(points, time_s)
-        found = []
-        for row in range(len(agents)):
-            near = np.flatnonzero(distance[row] <= PROXIMITY_RANGE_M)
-            if len(near) > MAX_OBSTACLE_POINTS:
-                order = np.argsort(distance[row, near], kind="stable")
-                near = np.sort(near[order[:MAX_OBSTACLE_POINTS]])
-            found.append(-distance[row, near, None] * outward[row, near])
-        return found
+    def _points(self, here: Vector | None, time_s: float) -> list[Vector]:
+        """Return the nearest points of obstacles near a position [m; relative]."""
+        if here is None or not len(self._obstacles):
+            return []
+        near = self._obstacles.near(here, time_s, PROXIMITY_RANGE_M)
+        if len(near) > MAX_OBSTACLE_POINTS:
+            nearest = sorted(near, key=lambda each: each[1][0])[:MAX_OBSTACLE_POINTS]
+            near = sorted(nearest, key=lambda each: each[0])
+        return [(-d * x, -d * y, -d * z) for _, (d, (x, y, z)) in near]
 
     def _reading(
-        self, vehicles: list[Vector], points: Floats | None, agent: int, slot: int
+        self, vehicles: list[Vector], points: list[Vector], agent: int, slot: int
     ) -> ProximityReading:
-        true = vehicles
-        if points is not None:
-            true = vehicles + [(x, y, z) for x, y, z in points.tolist()]
-        noisy = self._with_noise(true, agent, slot)
+        noisy = self._with_noise(vehicles + points, agent, slot)
         return ProximityReading(noisy[: len(vehicles)], noisy[len(vehicles) :])
 
     def _with_noise(self, true: list[Vector], agent: int, slot: int) -> tuple[Vector, ...]:
