@@ -5,8 +5,8 @@ exact far from the origin as at it. A verdict recomputed from the recording ther
 numbers of the first one.
 """
 
-from dataclasses import dataclass, field, fields
-from typing import Any, Final
+from dataclasses import dataclass, fields
+from typing import Any, Final, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,9 +36,10 @@ class HierarchyRows:
         return HierarchyRows, _values(self)
 
 
-@dataclass(frozen=True, slots=True)
+@final
+@dataclass(init=False, eq=False)
 class Tick:
-    """One tick of truth and telemetry.
+    """One tick of truth and telemetry; nobody changes it.
 
     Row i is agent i. NaN means that the vehicle is not in the world. Where ticks are not recorded,
     what is not judged is NaN or empty.
@@ -55,13 +56,45 @@ class Tick:
     alive: NDArray[np.bool_]  # (N,) whether the process takes part, and is not paused
     links: NDArray[np.int32]  # (L, 2) hearer and heard
     mission: NDArray[np.int64]  # (N,) key of the mission that the agent flies, or NO_MISSION
-    packets: Packets = field(default_factory=dict)
+    packets: Packets
     """The newest counters; empty before the first come."""
-    hierarchy: HierarchyRows | None = None
+    hierarchy: HierarchyRows | None
     """None where ticks are not recorded."""
-    filtered_mps: Float32s | None = None
+    filtered_mps: Float32s | None
     """(N,), the difference between each agent's wanted and commanded velocity [m/s]: what its
     safety filter does. Not judged; None where ticks are not recorded."""
+
+    def __init__(  # noqa: PLR0913, PLR0917
+        self,
+        index: int,
+        time_s: float,
+        position: Floats,
+        attitude: Float32s,
+        target: Float32s,
+        place: NDArray[np.int16],
+        force: Float32s,
+        turn_deg: Floats,
+        alive: NDArray[np.bool_],
+        links: NDArray[np.int32],
+        mission: NDArray[np.int64],
+        packets: Packets | None = None,
+        hierarchy: HierarchyRows | None = None,
+        filtered_mps: Float32s | None = None,
+    ) -> None:
+        self.index = index
+        self.time_s = time_s
+        self.position = position
+        self.attitude = attitude
+        self.target = target
+        self.place = place
+        self.force = force
+        self.turn_deg = turn_deg
+        self.alive = alive
+        self.links = links
+        self.mission = mission
+        self.packets = packets if packets is not None else {}
+        self.hierarchy = hierarchy
+        self.filtered_mps = filtered_mps
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Tick, _values(self)
