@@ -228,10 +228,11 @@ class Links:
             ]
         verdicts: list[Verdict] = []
         group_draw, group = b"", -1
+        last_of = {receiver // GROUP_SIZE: receiver for receiver, _ in in_range}
         for receiver, distance_m in in_range:
             if receiver // GROUP_SIZE != group:
                 group = receiver // GROUP_SIZE
-                group_draw = draw_group(self._seed, sending.frame, group)
+                group_draw = draw_group(self._seed, sending.frame, group, last_of[group])
             draws = plain_draws(group_draw, receiver)
             verdicts.append(law.verdict(distance_m, draws))
         waited_s = sending.waited_s

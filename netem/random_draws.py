@@ -26,7 +26,8 @@ GROUP_SIZE: Final = 32
 
 _KEY: Final = Layout("<6q").pack
 _EIGHT: Final = Layout("<8Q").unpack
-_PAIR: Final = Layout("<2Q").unpack_from
+_PAIR: Final = Layout("<4I").unpack_from
+"""Two numbers of 64 bits, each as its lower and its upper half: halves need no long integers."""
 _PAIR_B: Final = 16
 _UNIT: Final = 1.0 / 2**53
 _MIN_SHARE: Final = 2.0**-54
@@ -86,16 +87,21 @@ def draw(seed: bytes, frame: Frame, destination: int, purpose: Purpose) -> Frame
     return FrameDraws(*[(number >> 11) * _UNIT for number in drawn])
 
 
-def draw_group(seed: bytes, frame: Frame, group: int) -> bytes:
-    """Return the numbers of a frame for ``GROUP_SIZE`` destinations; see ``plain_draws``."""
+def draw_group(seed: bytes, frame: Frame, group: int, last: int = GROUP_SIZE - 1) -> bytes:
+    """Return the numbers of a frame for a group, up to the last destination; see ``plain_draws``.
+
+    last: in any group the same as ``last % GROUP_SIZE``.
+    """
     key = _KEY(frame.source, frame.incarnation, group, frame.channel, frame.count, Purpose.PLAIN)
-    return shake_128(seed + key).digest(GROUP_SIZE * _PAIR_B)
+    return shake_128(seed + key).digest((last % GROUP_SIZE + 1) * _PAIR_B)
 
 
 def plain_draws(group_draw: bytes, destination: int) -> PlainDraws:
     """Return one destination's numbers from those of its group (destination // GROUP_SIZE)."""
-    loss, delay = _PAIR(group_draw, destination % GROUP_SIZE * _PAIR_B)
-    return PlainDraws((loss >> 11) * _UNIT, (delay >> 11) * _UNIT)
+    halves: tuple[int, int, int, int] = _PAIR(group_draw, destination % GROUP_SIZE * _PAIR_B)
+    low, high, delay_low, delay_high = halves
+    loss, delay = high << 21 | low >> 11, delay_high << 21 | delay_low >> 11
+    return PlainDraws(loss * _UNIT, delay * _UNIT)
 
 
 def uniform(share: float) -> float:
