@@ -83,9 +83,11 @@ def joined(parts: Sequence[Subtree], queues: int) -> Subtree:
     for part in parts:
         if len(part.highest) != queues or len(part.candidates) != queues:
             continue
-        highest = [max(a, b) for a, b in zip(highest, part.highest, strict=True)]
-        for known, more in zip(candidates, part.candidates, strict=True):
-            known.update(more)
+        for queue, number in enumerate(part.highest):
+            highest[queue] = max(highest[queue], number)
+        for queue, more in enumerate(part.candidates):
+            if more:
+                candidates[queue].update(more)
         blocked.update(Place(*place) for place in part.blocked)
         histograms.append(part.histogram)
     return Subtree(

@@ -259,7 +259,7 @@ def _group(view: View, place: Place | None) -> int | None:
 
 def _all_led(view: View) -> bool:
     """Whether each vertex that is available has a leader."""
-    return all(
-        summary is not None or place in view.blocked
-        for summary, place in zip(view.summaries, view.map.vertex_places, strict=True)
-    )
+    for v, summary in enumerate(view.summaries):
+        if summary is None and view.map.vertex_places[v] not in view.blocked:
+            return False
+    return True

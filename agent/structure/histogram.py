@@ -22,7 +22,7 @@ def total(histograms: Iterable[bytes]) -> bytes:
     bins = [0] * BINS
     for each in histograms:
         if len(each) == BINS:
-            bins = [a + b for a, b in zip(bins, each, strict=True)]
+            bins = [count + each[k] for k, count in enumerate(bins)]
     return bytes([min(each, 255) for each in bins])
 
 
