@@ -18,8 +18,19 @@ FLYING = (
     "random_flights",
     "recording",
     "report",
+    "structure_figures",
 )
 """Folders of tests that mostly fly: CI runs them compiled where it can, in half of the time."""
+FLYING_FILES = (
+    "test_control.py",
+    "test_documents.py",
+    "test_evasion.py",
+    "test_extreme_numbers.py",
+    "test_gathering_teams.py",
+    "test_numbers.py",
+    "test_team.py",
+)
+"""The same of files in other folders."""
 
 # A shell that starts this run in the background has it ignore SIGINT, and nohup has it ignore
 # SIGHUP. Whatever a test starts would inherit that; some tests send these signals.
@@ -39,7 +50,8 @@ gc.set_threshold(200_000)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what flies, and does so compiled as well."""
     for item in items:
-        if item.path.parent.name in FLYING and item.get_closest_marker("pure") is None:
+        flies = item.path.parent.name in FLYING or item.path.name in FLYING_FILES
+        if flies and item.get_closest_marker("pure") is None:
             item.add_marker("flight")
 
 

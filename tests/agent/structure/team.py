@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.controller import NO_WORDS, Flown, Heard, HeardSummary, Link, Senses
+from agent.heard_beacon import HeardStanding
 from agent.messages import ZERO, Place, Standing, Vector
 from agent.qstructure.formation import FormationSpec
 from agent.qstructure.target_frame import Frame
@@ -170,7 +171,7 @@ class Team:
             place=said.place,
             mission=said.mission,
             cost_m=said.cost_m,
-            standing=said.standing,
+            standing=HeardStanding(said.standing) if said.standing is not None else None,
             hears_me=echoed is not None and self.now_s - echoed.stamp_s < ECHO_LASTS_S,
         )
 
