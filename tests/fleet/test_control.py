@@ -14,8 +14,16 @@ from worldsim.engine.operations import Operation
 from worldsim.engine.virtual import VirtualFleet
 from worldsim.fleet.control import MAX_REQUEST_B, Answer, Control, Request, RequestError
 from worldsim.judge.event import By
+from worldsim.judge.event_text import sentence
 from worldsim.judge.radio_events import ConditionsChanged
-from worldsim.judge.run_events import FormationGiven, FrameGiven
+from worldsim.judge.run_events import (
+    FormationGiven,
+    FrameGiven,
+    QueueChanged,
+    Reconnected,
+    RoleChanged,
+    SlotChanged,
+)
 from worldsim.scenario.file import formation_tables, load
 
 DEPLOY = Path("deploy")
@@ -232,6 +240,32 @@ def test_each_time_of_a_fault_that_repeats_is_by_who_asked_for_it() -> None:
         ("kill", "operator")
     ] * 2
     assert {each.by for each in rows if each.kind == "pause"} == {None}
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"kill": [4]},
+        {"leave": [4]},
+        {"pause": [4]},
+        {"sensor": {"agents": [4], "mode": "silent"}},
+        {"slow": {"agents": [4], "delay_s": 0.2}},
+        {"netem": {"loss_percent": 50}},
+        {"partition": [[0], [1]]},
+        {"kill": ["netem"]},
+        {"disk_full": True},
+    ],
+    ids=lambda fault: next(iter(fault)),
+)
+def test_the_end_that_an_operator_gave_a_fault_is_by_the_operator(fault: dict[str, Any]) -> None:
+    fleet = OperatedFleet()
+    begun = fleet.ask(**fault, for_s=0.1).events
+    before = len(fleet.loop.events)
+    fleet.fly(fleet.loop.world.time_s + 0.2)
+    own = (SlotChanged, QueueChanged, RoleChanged, Reconnected)
+    ends = [each for each in fleet.loop.events[before:] if not isinstance(each, own)]
+    assert len(ends) == len(begun) > 0
+    assert {sentence(each)[-18:] for each in (*begun, *ends)} == {" (by the operator)"}
 
 
 def test_a_fault_whose_agents_are_brought_back_has_ended() -> None:

@@ -7,6 +7,7 @@ import socket
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+from typing import cast
 
 import msgspec
 import pytest
@@ -33,8 +34,10 @@ from worldsim.fleet.ipc import (
     ToWorld,
     ToZygote,
 )
+from worldsim.fleet.planned_stops import PlannedKill, PlannedStops
 from worldsim.fleet.process_table import ProcessTable, processes
 from worldsim.fleet.terminal import Terminal
+from worldsim.judge.event import By
 
 AGENT = AgentProcess(2, 0)
 KILLED = ProcessExit(9, None)
@@ -150,11 +153,16 @@ def test_an_unexpected_exit_ends_a_lockstep_run(launched: Launched) -> None:
 
 
 @pytest.mark.parametrize("launched", [False, True], indirect=True)
-def test_a_kill_that_the_world_requested_is_scheduled(launched: Launched) -> None:
+@pytest.mark.parametrize(
+    ("by", "origin"), [(None, "(scheduled)"), ("operator", "(by the operator)")]
+)
+def test_a_kill_that_the_world_requested_is_by_who_asked_for_it(
+    launched: Launched, by: By, origin: str
+) -> None:
     launched.begin()
-    launched.world.send(ActionRequest("kill", (AGENT,)))  # not read before the exit arrives
+    launched.world.send(ActionRequest("kill", (AGENT,), by=by))  # not read before the exit arrives
     launched.from_zygote(AgentExited(AGENT, 123, KILLED))
-    assert launched.lines == ["agent-2 (pid 123) was killed by signal 9 at about 3.2 s (scheduled)"]
+    assert launched.lines == [f"agent-2 (pid 123) was killed by signal 9 at about 3.2 s {origin}"]
     launched.from_zygote(AgentExited(AgentProcess(2, 1), 124, KILLED))
     assert "(not scheduled)" in launched.lines[1]
 
@@ -202,6 +210,25 @@ def test_a_child_that_ends_by_an_error_is_quoted(launched: Launched) -> None:
         f"netem ended with status 1 at about 3.2 s; the run ends{quoted}",
     ]
     assert launched.world.receive() == [RunFailed(f"netem ended with status 1{quoted}")]
+
+
+class AskedKills:
+    """Planned stops of which each exit is a kill by the operator."""
+
+    def take_kill(self, name: str) -> PlannedKill:
+        return PlannedKill("operator")
+
+
+def test_an_operators_kill_of_netem_or_the_world_is_by_the_operator(launched: Launched) -> None:
+    launched.begin()
+    launched.monitor.stops = cast(PlannedStops, AskedKills())
+    launched.monitor.child_exited("netem", KILLED)
+    launched.monitor.child_exited("world", KILLED)
+    assert not launched.monitor.failed
+    assert launched.lines == [
+        "netem was killed by signal 9 at about 3.2 s (by the operator)",
+        "world was killed by signal 9 at about 3.2 s (by the operator); the run ends",
+    ]
 
 
 def test_exits_are_expected_once_the_run_is_over(launched: Launched) -> None:

@@ -46,11 +46,11 @@ AGENTS = (AgentProcess(3, 1), AgentProcess(7, 0))
 PROGRESS = Progress(1.5, 20.0, 9, 4, 0.1 + 0.2, 0.01)
 EXAMPLES: tuple[Message, ...] = (
     ActionRequest("start", AGENTS, after_s=2.5),
-    ActionRequest("kill", AGENTS),
+    ActionRequest("kill", AGENTS, by="operator"),
     ActionRequest("pause", ()),
     ActionDone("resume", AGENTS),
     OtherProcessRequest("world", "pause", for_s=2.5),
-    OtherProcessRequest("netem", "kill"),
+    OtherProcessRequest("netem", "kill", by="operator"),
     WorldWoken(),
     EndRequest(),
     IntruderRequest(3, (1, 2), 1e4),

@@ -12,6 +12,7 @@ from netem.faults import FaultOrder, Outage, Partition
 from netem.link_parameters import Conditions
 from netem.messages import FaultOrders, MediumCounters
 from worldsim.fleet.netem_process import NetemProcess
+from worldsim.judge.event import By
 
 PARTITION = Partition(((0,),))
 COUNTERS = MediumCounters(
@@ -31,6 +32,7 @@ class Around:
 
     def __init__(self) -> None:
         self.actions: list[str] = []
+        self.asked_by: list[str | None] = []
         self.orders: list[FaultOrders] = []
         self.setups: list[Any] = []
 
@@ -38,9 +40,10 @@ class Around:
         assert topic == "orders"
         return lambda data: self.orders.append(msgspec.json.decode(data, type=FaultOrders))
 
-    def stop(self, process: str, action: str, for_s: float = 0.0) -> None:
+    def stop(self, process: str, action: str, by: str | None = None) -> None:
         assert process == "netem"
         self.actions.append(action)
+        self.asked_by.append(by)
 
     def resume_medium(self, speed: float, resumption: Any) -> Accepting:
         self.setups.append(resumption)
@@ -61,8 +64,8 @@ class Driven:
         self.netem = NetemProcess(made, made, made, self.network, speed=1.0)
         self.slot = 0
 
-    def order(self, order: FaultOrder) -> None:
-        self.netem.order(order, self.slot)
+    def order(self, order: FaultOrder, by: By = None) -> None:
+        self.netem.order(order, self.slot, by)
         self.network.apply(order)
 
     def follow(self, times: int = 1) -> None:
@@ -104,6 +107,15 @@ def test_orders_wait_for_a_paused_netem(around: Around) -> None:
     driven.follow()
     assert around.actions == ["pause", "resume"]
     assert [each.orders[0].number for each in around.orders] == [1]
+
+
+@pytest.mark.parametrize("by", [None, "operator"])
+def test_a_kill_is_by_who_asked_for_it_even_over_a_pause(around: Around, by: By) -> None:
+    driven = Driven(around)
+    driven.order(begin(0, Outage("pause")), None if by else "operator")
+    driven.order(begin(1, Outage("kill")), by)
+    driven.follow()
+    assert (around.actions, around.asked_by) == (["kill"], [by])
 
 
 steps = st.lists(

@@ -5,12 +5,13 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from worldsim.fleet.fork import ProcessExit
 from worldsim.fleet.ipc import OtherProcessRequest, WorldWoken, world_sockets
-from worldsim.fleet.planned_stops import PlannedStops
+from worldsim.fleet.planned_stops import PlannedKill, PlannedStops
 from worldsim.fleet.process_table import ProcessTable
 from worldsim.fleet.supervisor import Supervisor
 
@@ -48,7 +49,8 @@ class Fleet:
             self.stops.wake_world()
 
     def ask(self, process: str, action: str, for_s: float = 0.0) -> None:
-        self.stops.carry_out(OtherProcessRequest(process, action, for_s))  # type: ignore[arg-type]
+        request: Any = (process, action, for_s, "operator")
+        self.stops.carry_out(OtherProcessRequest(*request))
 
 
 def wait_for_signals() -> int:
@@ -71,8 +73,9 @@ def test_a_kill_of_netem_is_of_every_shard_and_each_is_started_anew(fleet: Fleet
     fleet.ask("netem", "start")  # before the exits are seen
     fleet.poll_until(lambda: len(fleet.exits) == 2)
     assert sorted(fleet.exits) == [(name, ProcessExit(9, None)) for name in fleet.mediums]
-    assert [fleet.stops.was_planned(name) for name in (*fleet.mediums, "world")] == [1, 1, 0]
-    assert not fleet.stops.was_planned("netem"), "the next exit is not planned"
+    planned = [fleet.stops.take_kill(name) for name in (*fleet.mediums, "world")]
+    assert planned == [PlannedKill("operator"), PlannedKill("operator"), None]
+    assert fleet.stops.take_kill(fleet.mediums[0]) is None, "the next exit is not planned"
     for name in fleet.mediums:
         assert fleet.supervisor.pids[name] != before[name]
         assert fleet.state(name) in "RS"
@@ -104,7 +107,7 @@ def test_a_world_that_died_in_its_pause_is_not_woken(fleet: Fleet) -> None:
     fleet.poll_until(lambda: bool(fleet.exits))
     fleet.poll_until(lambda: fleet.stops.seconds_left(1.0) == 1.0)
     assert fleet.exits == [("world", ProcessExit(9, None))]
-    assert not fleet.stops.was_planned("world")
+    assert fleet.stops.take_kill("world") is None
 
 
 def test_a_stopped_child_ends_when_it_is_asked_to(fleet: Fleet) -> None:

@@ -152,7 +152,7 @@ class TimelineEffects:
 
     def apply(self, operation: Operation, by: By = None) -> None:
         """Apply an operation that was carried out, and emit its events."""
-        by = by or self._repeated_by(operation)
+        by = self.asked_by(operation, by)
         self.faults.take(operation, self._t_s, by, self.network.conditions)
         match operation:
             case EndProcesses():
@@ -201,20 +201,15 @@ class TimelineEffects:
             case _:
                 assert_never(operation)
 
-    def _repeated_by(self, operation: Operation) -> By:
-        """Return by whom a fault of the timeline happens again; None for the scenario and ends."""
-        match operation:
-            case EndProcesses() | PauseProcesses():
-                begins = True
-            case SetSensorMode(mode=mode):
-                begins = mode is not None
-            case DisturbAgents(ends=ends):
-                begins = not ends
-            case FaultOrder(fault=fault):
-                begins = fault is not None
-            case _:
-                return None
-        return "operator" if begins and self.timeline.is_operators(operation.number) else None
+    def asked_by(self, operation: Operation, by: By = None) -> By:
+        """Return who asked for an operation; None: the scenario.
+
+        by: who asks for it now. Otherwise a fault that the timeline lets happen again, or end, is
+        by whoever began it.
+        """
+        if by is not None or isinstance(operation, AdmitAgents | ThrottleProcesses | GiveMission):
+            return by
+        return "operator" if self.timeline.is_operators(operation.number) else None
 
     def reconnect(self, after_s: float = 0.0, missing: tuple[int, ...] = ()) -> None:
         """Report that every agent is observed again, but for those that are missing.

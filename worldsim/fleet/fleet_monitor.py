@@ -38,6 +38,8 @@ from worldsim.fleet.ipc import (
 from worldsim.fleet.planned_stops import WORLD, PlannedStops
 from worldsim.fleet.process_table import ProcessTable
 from worldsim.fleet.terminal import Terminal
+from worldsim.judge.event import By
+from worldsim.judge.event_text import origin
 
 REPORT_MISSING_EVERY_S = 5.0
 TAIL_LINES = 5
@@ -86,7 +88,8 @@ class FleetMonitor:
         self._table = table
         self._logs = logs
         self._lockstep = lockstep
-        self._expected_exits: set[AgentProcess] = set()
+        self._expected_exits: dict[AgentProcess, By] = {}
+        """Who asked for each exit that is expected."""
         self._missing: tuple[str, ...] | None = None
         self._report_missing_at_s = time.monotonic() + REPORT_MISSING_EVERY_S
         self._time_s = 0.0
@@ -127,13 +130,13 @@ class FleetMonitor:
             return
         if not self.all_present:
             raise self._start_error(name, process_exit)
-        planned = self.stops is not None and self.stops.was_planned(name)
+        planned = self.stops.take_kill(name) if self.stops is not None else None
         if name == WORLD:
             self.world_exit = f"the world {process_exit} at about {self._time_s:.1f} s"
-        if planned:
+        if planned is not None:
             ends = "; the run ends" if name == WORLD else ""
-            text = f"{name} {process_exit} at about {self._time_s:.1f} s (scheduled){ends}"
-            self._terminal.print(text)
+            when = f"at about {self._time_s:.1f} s{origin(planned.by)}"
+            self._terminal.print(f"{name} {process_exit} {when}{ends}")
         else:
             self._fail(f"{name} {process_exit}", self._log_end(name, process_exit))
 
@@ -222,7 +225,7 @@ class FleetMonitor:
                 self.stops.carry_out(request)
             return
         if request.action == "kill":
-            self._expected_exits.update(request.processes)
+            self._expected_exits.update(dict.fromkeys(request.processes, request.by))
         self._table.note_action(request.action, request.processes)
         self._zygote.send(request)
 
@@ -245,16 +248,16 @@ class FleetMonitor:
         show = self._terminal.print if expected else self._terminal.print_error
         show(
             f"{name} (pid {message.pid}) {process_exit} at about {self._time_s:.1f} s"
-            f" {self._consequence(message.process)}"
+            f"{self._consequence(message.process)}"
         )
         if process_exit.status is not None:
             self._terminal.print_error(self.log_tail(name))
 
     def _consequence(self, process: AgentProcess) -> str:
         if process in self._expected_exits:
-            return "(scheduled)"
+            return origin(self._expected_exits[process])
         ends = "the run ends" if self._lockstep else "its vehicle stops and hovers"
-        return f"(not scheduled); {ends}"
+        return f" (not scheduled); {ends}"
 
     def _start_error(self, name: str, process_exit: ProcessExit) -> StartError:
         return StartError(f"{name} did not start: it {process_exit}; {self.log_tail(name)}")

@@ -96,7 +96,7 @@ class FreeRunningFleet:
         self._startup = startup
         self._netem = NetemProcess(bus, startup, launcher, self.loop.network, speed)
         self._reconnection = Reconnection(speed)
-        self._stops: list[StopWorldProcess] = []
+        self._stops: list[tuple[StopWorldProcess, By]] = []
         """Stops of the world at the end of the present slot."""
         boot_wall_s = scenario.fleet.boot_s / speed
         self._actions = ProcessActions(self._netem, startup, launcher, boot_wall_s)
@@ -285,12 +285,13 @@ class FreeRunningFleet:
     def _carry_out(self, operation: Operation, by: By = None) -> None:
         """Carry out an operation between slots, and apply it to the world at once."""
         members = self.loop.members
-        late = self._actions.carry_out(operation, self.loop.world.slot, members.incarnations)
+        by = self.loop.effects.asked_by(operation, by)
+        late = self._actions.carry_out(operation, self.loop.world.slot, members.incarnations, by)
         was_down = bool(self.loop.network.outages)
         self.loop.apply(operation, by)
         self._follow_outage(was_down=was_down)
         if isinstance(operation, StopWorldProcess):
-            self._stops.append(operation)
+            self._stops.append((operation, by))
         if isinstance(operation, EndProcesses | PauseProcesses | ResumeProcesses | AdmitAgents):
             self.lateness.drop_pending(operation.agents)
         if isinstance(operation, ThrottleProcesses):
@@ -323,8 +324,9 @@ class FreeRunningFleet:
 
     def _stop_world(self, should_stop: Callable[[], bool]) -> None:
         """Stop this process where the timeline asks for it, after what it did is written."""
-        for operation in self._stops:
-            stopped_s = stop_world(operation, self._launcher, self.overload.speed, should_stop)
+        for operation, by in self._stops:
+            speed = self.overload.speed
+            stopped_s = stop_world(operation, self._launcher, speed, should_stop, by)
             self.loop.effects.faults.note_standstill(operation.number, stopped_s)
             self._pacer.stand_still(stopped_s)
             if not self.loop.network.outages:

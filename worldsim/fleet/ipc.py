@@ -12,6 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from worldsim.fleet.fork import ProcessExit
+from worldsim.judge.event import By
 from worldsim.results.progress_line import pace_text
 from worldsim.scenario.selectors import ProcessName
 
@@ -52,6 +53,7 @@ class ActionRequest(Message, frozen=True):
     action: ProcessAction
     processes: tuple[AgentProcess, ...]
     after_s: float = 0.0  # wall time that a started process sleeps first [s]
+    by: By = None  # who asked for it
 
 
 class ActionDone(Message, frozen=True):
@@ -67,6 +69,7 @@ class OtherProcessRequest(Message, frozen=True):
     process: ProcessName
     action: ProcessAction
     for_s: float = 0.0  # wall time after which the world is woken from a pause [s]
+    by: By = None  # who asked for it
 
 
 class WorldWoken(Message, frozen=True):

@@ -34,6 +34,7 @@ from worldsim.fleet.ipc import (
     WorldWoken,
     names_of,
 )
+from worldsim.judge.event import By
 from worldsim.scenario.selectors import ProcessName
 
 PRINT_EVERY_S = 2.0
@@ -82,16 +83,19 @@ class LauncherLink(Protocol):
         action: ProcessAction,
         processes: Sequence[AgentProcess],
         after_s: float = 0.0,
+        by: By = None,
     ) -> None:
         """Request an action on agents' processes; without processes do nothing.
 
-        A process that is started sleeps ``after_s`` [s] of wall time first.
+        A process that is started sleeps ``after_s`` [s] of wall time first. by: who asked for it.
         """
 
-    def stop(self, process: ProcessName, action: ProcessAction, for_s: float = 0.0) -> None:
+    def stop(
+        self, process: ProcessName, action: ProcessAction, for_s: float = 0.0, by: By = None
+    ) -> None:
         """Request an action on netem's processes or the world's.
 
-        A pause of the world ends after ``for_s`` [s] of wall time.
+        A pause of the world ends after ``for_s`` [s] of wall time. by: who asked for it.
         """
 
     def is_woken(self) -> bool:
@@ -168,14 +172,17 @@ class LaunchedLink:
         action: ProcessAction,
         processes: Sequence[AgentProcess],
         after_s: float = 0.0,
+        by: By = None,
     ) -> None:
         """Ask the launcher for an action."""
         if processes:
-            self._launcher.send(ActionRequest(action, tuple(processes), after_s))
+            self._launcher.send(ActionRequest(action, tuple(processes), after_s, by))
 
-    def stop(self, process: ProcessName, action: ProcessAction, for_s: float = 0.0) -> None:
+    def stop(
+        self, process: ProcessName, action: ProcessAction, for_s: float = 0.0, by: By = None
+    ) -> None:
         """Ask the launcher for an action on netem's processes or the world's."""
-        self._launcher.send(OtherProcessRequest(process, action, for_s))
+        self._launcher.send(OtherProcessRequest(process, action, for_s, by))
 
     def is_woken(self) -> bool:
         """Return whether the launcher has ended a pause of the world."""
@@ -284,13 +291,16 @@ class ManualLink:
         action: ProcessAction,
         processes: Sequence[AgentProcess],
         after_s: float = 0.0,
+        by: By = None,
     ) -> None:
         """Refuse: a process that was started by hand is ended by hand. Raises LookupError."""
         raise LookupError(
             f"cannot {action} {names_of(processes)}: these processes were started by hand"
         )
 
-    def stop(self, process: ProcessName, action: ProcessAction, for_s: float = 0.0) -> None:
+    def stop(
+        self, process: ProcessName, action: ProcessAction, for_s: float = 0.0, by: By = None
+    ) -> None:
         """Refuse: a process that was started by hand is stopped by hand. Raises LookupError."""
         raise LookupError(f"cannot {action} {process}: these processes were started by hand")
 

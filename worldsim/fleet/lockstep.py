@@ -103,8 +103,8 @@ class LockstepFleet:
         self._culprits = Culprits(launcher.steps, launcher.report_notice, speed=0.0)
         self.begun = self._landed = False
         self._stepping: list[int] = []
-        self._stops: list[StopWorldProcess] = []
-        """Stops of the world at the end of the present slot."""
+        self._stops: list[tuple[StopWorldProcess, By]] = []
+        """Stops of the world at the end of the present slot, and who asked for each."""
         self._slots = scenario.slots
         self._launcher = launcher
         self._should_stop: Callable[[], bool] = lambda: False
@@ -171,15 +171,16 @@ class LockstepFleet:
 
     def _carry_out(self, operation: Operation, by: By = None) -> None:
         """Carry out an operation, wait until it is done, and apply it to the world."""
-        self._actions.carry_out(operation, self.loop.members.incarnations)
+        by = self.loop.effects.asked_by(operation, by)
+        self._actions.carry_out(operation, self.loop.members.incarnations, by)
         self.loop.apply(operation, by)
         if isinstance(operation, StopWorldProcess):
-            self._stops.append(operation)
+            self._stops.append((operation, by))
 
     def _stop_world(self) -> None:
         """Stop this process where the timeline asks for it; the others wait."""
-        for operation in self._stops:
-            stopped_s = stop_world(operation, self._launcher, 1.0, self._stopped)
+        for operation, by in self._stops:
+            stopped_s = stop_world(operation, self._launcher, 1.0, self._stopped, by)
             self.loop.effects.faults.note_standstill(operation.number, stopped_s)
         self._stops.clear()
 
@@ -272,16 +273,16 @@ class AwaitedActions:
         self._should_stop = should_stop
         self._orders: list[FaultOrder] = []
 
-    def carry_out(self, operation: Operation, incarnations: Sequence[int]) -> None:
+    def carry_out(self, operation: Operation, incarnations: Sequence[int], by: By = None) -> None:
         """Carry out an operation; orders to the medium wait for ``orders``.
 
         A process starts when its agent has booted: until then there is nothing for it to do.
-        incarnations: of all agents, as they were before the operation. Raises LockstepError when it
-        does not come to pass, RunOverError when the run ends meanwhile.
+        incarnations: of all agents, as they were before the operation. by: who asked for it. Raises
+        LockstepError when it does not come to pass, RunOverError when the run ends meanwhile.
         """
         match operation:
             case EndProcesses(agents=agents):
-                self._act("kill", agents, incarnations)
+                self._act("kill", agents, incarnations, by)
                 self._until(lambda: not self._startup.present(agents), f"the end of {agents}")
             case PauseProcesses(agents=agents):
                 self._act("pause", agents, incarnations)
@@ -318,11 +319,15 @@ class AwaitedActions:
         return not self._startup.absent(agents)
 
     def _act(
-        self, action: ProcessAction, agents: Iterable[int], incarnations: Sequence[int]
+        self,
+        action: ProcessAction,
+        agents: Iterable[int],
+        incarnations: Sequence[int],
+        by: By = None,
     ) -> None:
         processes = [AgentProcess(agent, incarnations[agent]) for agent in agents]
         if processes:
-            self._launcher.request(action, processes)
+            self._launcher.request(action, processes, by=by)
             what = f"a {action} of {names_of(processes)}"
             self._until(lambda: self._launcher.has_done(action, processes), what)
 

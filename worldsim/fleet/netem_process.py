@@ -15,6 +15,7 @@ from netem.messages import FaultOrders, MediumCounters, Resumption
 from netem.wire.bus import Bus, PendingQuery
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.startup import Startup
+from worldsim.judge.event import By
 
 ProcessState = Literal["up", "paused", "dead", "starting"]
 MOST_BACKLOG_S = 1.0
@@ -41,6 +42,8 @@ class NetemProcess:
         self._network, self._speed = network, speed
         self._waiting: list[FaultOrders] = []
         """Orders that netem could not take so far."""
+        self._outages_by: dict[int, By] = {}
+        """Who asked for each outage, by its number."""
         self._setup: PendingQuery | None = None
         self._since_s = time.monotonic()
 
@@ -54,11 +57,14 @@ class NetemProcess:
         """Whether messages may be sent: those to a process that is paused for long would block."""
         return self.paused_s < MOST_BACKLOG_S
 
-    def order(self, order: FaultOrder, slot: int) -> None:
+    def order(self, order: FaultOrder, slot: int, by: By = None) -> None:
         """Send netem an order that applies before a slot; while it is down, keep it back.
 
         Call it before the order is applied to the faults in force. An outage is no order to netem.
+        by: who asked for it.
         """
+        if order.outage is not None:
+            self._outages_by[order.number] = by
         if order.outage is None and order.number not in self._network.outages:
             self._waiting.append(FaultOrders(slot, (order,)))
             self._send_waiting()
@@ -95,8 +101,17 @@ class NetemProcess:
     def _act(
         self, action: Literal["kill", "pause", "resume", "start"], state: ProcessState
     ) -> None:
-        self._launcher.stop("netem", action)
+        self._launcher.stop("netem", action, by=self._outage_by())
         self.state, self._since_s = state, time.monotonic()
+
+    def _outage_by(self) -> By:
+        """Return who asked for the outage that holds the process down; of several, the first.
+
+        A kill comes before a pause, which a process that is not up yet takes as a kill too.
+        """
+        in_force = self._network.outages
+        first = sorted(in_force, key=lambda number: in_force[number] != "kill")[:1]
+        return next((self._outages_by.get(number) for number in first), None)
 
     def _set_up(self, slot: int, counters: MediumCounters | None) -> None:
         """Send a new process its setup, until it accepts one."""

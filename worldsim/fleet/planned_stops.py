@@ -4,12 +4,20 @@ import os
 import signal
 import time
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from worldsim.fleet.ipc import LauncherToWorld, OtherProcessRequest, WorldWoken
 from worldsim.fleet.process_table import ProcessTable
 from worldsim.fleet.supervisor import Supervisor
+from worldsim.judge.event import By
 
 WORLD = "world"
+
+
+class PlannedKill(NamedTuple):
+    """A kill that was asked for."""
+
+    by: By
 
 
 class PlannedStops:
@@ -28,7 +36,8 @@ class PlannedStops:
     ) -> None:
         self._supervisor, self._table, self._world = supervisor, table, world
         self._mediums, self._start_medium = mediums, start_medium
-        self._killed: list[str] = []
+        self._killed: dict[str, list[By]] = {}
+        """Who asked for the kills that are not seen yet, by process."""
         self._wake_at_s: float | None = None
         """When the world's pause is over [s; monotonic clock]; None: it is not paused."""
 
@@ -42,12 +51,10 @@ class PlannedStops:
             elif name in self._supervisor.pids:
                 self._strike(name, request)
 
-    def was_planned(self, name: str) -> bool:
-        """Return whether an exit of a process is a planned kill; True once for each."""
-        planned = name in self._killed
-        if planned:
-            self._killed.remove(name)
-        return planned
+    def take_kill(self, name: str) -> PlannedKill | None:
+        """Return the planned kill that an exit of a process is, once for each; None: it is none."""
+        asked_by = self._killed.get(name)
+        return PlannedKill(asked_by.pop(0)) if asked_by else None
 
     def seconds_left(self, at_most_s: float) -> float:
         """Return how long to wait before ``wake_world`` has something to do [s]."""
@@ -68,7 +75,7 @@ class PlannedStops:
     def _strike(self, name: str, request: OtherProcessRequest) -> None:
         match request.action:
             case "kill":
-                self._killed.append(name)
+                self._killed.setdefault(name, []).append(request.by)
                 self._supervisor.strike(name, signal.SIGKILL, os.WEXITED)
             case "pause":
                 self._supervisor.strike(name, signal.SIGSTOP, os.WSTOPPED)

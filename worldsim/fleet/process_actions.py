@@ -22,6 +22,7 @@ from worldsim.fleet.ipc import AgentProcess, IntruderEndRequest, IntruderRequest
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.netem_process import NetemProcess
 from worldsim.fleet.startup import Startup
+from worldsim.judge.event import By
 from worldsim.scenario.faults import Intruder
 
 START_WITHIN_S = 5.0
@@ -42,15 +43,17 @@ class ProcessActions:
         self._launcher = launcher
         self._after_s = max(0.0, boot_wall_s - START_WITHIN_S)
 
-    def carry_out(self, operation: Operation, slot: int, incarnations: Sequence[int]) -> list[int]:
+    def carry_out(
+        self, operation: Operation, slot: int, incarnations: Sequence[int], by: By = None
+    ) -> list[int]:
         """Carry out an operation before a slot; return admitted agents that are not up.
 
-        incarnations: of all agents, as they were before the operation.
+        incarnations: of all agents, as they were before the operation. by: who asked for it.
         """
         match operation:
             case EndProcesses() | PauseProcesses() | ResumeProcesses():
                 processes = _processes(operation.agents, incarnations)
-                self._launcher.request(_action(operation), processes)
+                self._launcher.request(_action(operation), processes, by=by)
             case ThrottleProcesses(stops=stops, continues=continues):
                 self._launcher.request("pause", _processes(stops, incarnations))
                 self._launcher.request("resume", _processes(continues, incarnations))
@@ -61,7 +64,7 @@ class ProcessActions:
             case AdmitAgents(agents=agents):
                 return self._startup.absent(agents)
             case FaultOrder():
-                self._netem.order(operation, slot)
+                self._netem.order(operation, slot, by)
             case DisturbAgents(fault=Intruder() as intruder):
                 self._intrude(operation, intruder)
             case (

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import assert_never
 
 from agent.messages import Role
-from worldsim.judge.event import PlannedEvent
+from worldsim.judge.event import By, PlannedEvent
 from worldsim.judge.radio_events import (
     ConditionsChanged,
     Jammed,
@@ -71,6 +71,11 @@ def sentence(event: RunEvent, queues: Queues = ()) -> str:
     queues: the names of the formation's queues, in order. Slots are counted from 1 along a queue.
     """
     return _words(event, queues) + _origin(event)
+
+
+def origin(by: By) -> str:
+    """Return who asked for something, as the end of a sentence, such as " (by the operator)"."""
+    return " (scheduled)" if by is None else f" (by the {by})"
 
 
 def _words(event: RunEvent, queues: Queues) -> str:
@@ -221,9 +226,7 @@ def _origin(event: RunEvent) -> str:
     """Return whether the operator or the scenario's timeline asked for an event, if either did."""
     if not isinstance(event, PlannedEvent | ConditionsChanged):
         return ""
-    if event.by is not None:
-        return f" (by the {event.by})"
-    return " (scheduled)" if event.planned else " (unplanned)"
+    return origin(event.by) if event.planned else " (unplanned)"
 
 
 def _of_processes(event: LateStart | WorldStopped | Reconnected | DiskFilled) -> str:
