@@ -23,6 +23,7 @@ def words(judge: Judge) -> str:
             "timed_from_s": each.timed_from_s,
             "asked_s": each.asked_s,
             "overtaken_s": each.overtaken_s,
+            "in_place_from_s": each.in_place_from_s,
             "changed": each.changed,
         }
         for each in judge.recoveries
@@ -89,4 +90,18 @@ def test_the_words_tell_what_conditions_changed() -> None:
     )
     assert "netem (end of loss_percent = 50) at 8 s: not re" in words(
         judged(away(8.0, 99.0), radio((5.0, 0, lossy), (8.0, 0, None)))
+    )
+
+
+def test_the_words_tell_that_a_team_was_whole_but_had_not_stood_for_long_enough() -> None:
+    lossy = radio((11.0, 0, Conditions(loss_percent=50.0)))
+    off_m = away(8.0, 10.0), away(11.0, 13.5)
+    judge = judged(lambda time_s: max(each(time_s) for each in off_m), [kill(8.0), *lossy])
+    assert words(judge) == (
+        "kill of a4 at 8 s: the team was whole after 2 s, but had stood for only 1 s of 2 s"
+        " when the netem (loss_percent = 50) at 11 s overtook it (limit 3 s; margin -2.5 s)"
+    )
+    assert words(judged(away(17.0, 18.5), [kill(17.0)])) == (
+        "kill of a4 at 17 s: the team was whole after 1.5 s, but had stood for only 1.5 s of 2 s"
+        " when the run ended (limit 3 s)"
     )

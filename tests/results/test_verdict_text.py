@@ -141,6 +141,7 @@ def change(t_s: float, kind: str, agents: list[int], reformed_s: float | None) -
         "reformed_s": reformed_s,
         "timed_from_s": t_s,
         "overtaken_s": None,
+        "in_place_from_s": None,
         "changed": None,
         "asked_s": 5.0 - t_s if reformed_s is None else reformed_s,
     }

@@ -47,6 +47,11 @@ class Recovery(msgspec.Struct):
     """The longest time without such a fault that the team had, or took [s]."""
     overtaken_s: float | None = None
     """What of that time it had before the next disturbance [s]; None where it re-formed before."""
+    in_place_from_s: float | None = None
+    """Since when it was whole again, at the next disturbance or now [s; simulated time].
+
+    None where it was not, and where it has re-formed before that disturbance.
+    """
     changed: str | None = None
     """What conditions of the radio changed; None where none did."""
 
@@ -113,6 +118,7 @@ class Recoveries:
         for each, its in self._open:
             if each.overtaken_s is None:
                 each.overtaken_s = its.until(until_s)
+                each.in_place_from_s = self.standing_since_s
         self.standing_since_s = None
         asked = AskedTime(event.t_s, forbidden=self._forbidden)
         recovery = Recovery(event.t_s, event.kind, [], timed_from_s=asked.from_s)
@@ -129,6 +135,8 @@ class Recoveries:
         elif self.standing_since_s is None:
             self.standing_since_s = tick.time_s
         since_s = self.standing_since_s
+        newest, _ = self._open[-1]  # the others were overtaken
+        newest.in_place_from_s = since_s
         for recovery, asked in self._open:
             recovery.asked_s = asked.until(tick.time_s if since_s is None else since_s)
         if since_s is not None and tick.time_s - since_s >= CONVERGED_S - 1e-9:
@@ -137,6 +145,7 @@ class Recoveries:
                 recovery.timed_from_s, recovery.reformed_s = asked.from_s, recovery.asked_s
                 if asked.from_s is None:
                     recovery.reformed_s = since_s - recovery.t_s
+            newest.in_place_from_s = None
             self._open = []
 
     def _all_back(self, tick: Tick) -> bool:

@@ -25,6 +25,7 @@ ADDED_LATER = (
     "timed_from_s",
     "asked_s",
     "overtaken_s",
+    "in_place_from_s",
     "changed",
     "settings",
 )

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple, TypedDict
 
 from worldsim.judge.finding import ExpectationRow
+from worldsim.scenario.tables import CONVERGED_S
 
 CONVERGE = "converge "
 """An expectation's name begins so where it is about a formation; the formation's name follows."""
@@ -27,7 +28,10 @@ class RecoveryRow(TypedDict):
     reformed_s: float | None  # from timed_from_s, or t_s if null, to a whole formation
     timed_from_s: float | None  # t_s, or the end of the last fault that forbade it
     asked_s: float  # the longest time without such a fault, until it is whole again or to the end
-    overtaken_s: float | None  # that time until the next change; null if whole before it
+    overtaken_s: float | None  # that time until the next change; null if re-formed before it
+    in_place_from_s: (
+        float | None
+    )  # since when it was whole then, or is now; null if re-formed before
     changed: str | None  # conditions of the radio, where they are what changed
 
 
@@ -250,17 +254,33 @@ def _unrestored(row: ExpectationRow, run: Circumstances, worst: RecoveryRow) -> 
     """Return how the team did after the change that is worst, in words."""
     limit = _limit(row)
     if row["held"] is None and worst["overtaken_s"] is not None:
-        had_s = worst["overtaken_s"]
-        by = _change(_overtaker(worst, run))
-        return f"{_change(worst)}: overtaken by the {by} after {had_s:.3g} s{limit}"
+        overtaken = _overtaken(worst, worst["overtaken_s"], _overtaker(worst, run))
+        return f"{_change(worst)}: {overtaken}{limit}"
     reformed_s, from_s = worst["reformed_s"], worst["timed_from_s"]
     timed = _timed(None if from_s == worst["t_s"] else from_s)
     if reformed_s is not None and from_s is None:
         return f"{_change(worst)}: re-formed after {reformed_s:.3g} s{_untimed(row)}"
     if reformed_s is not None:
         return f"{_change(worst)}: re-formed after {reformed_s:.3g} s{timed}{limit}"
+    if row["held"] is None and worst["in_place_from_s"] is not None:
+        stood = _stood(run.ended_s - worst["in_place_from_s"])
+        whole = f"the team was whole after {worst['asked_s']:.3g} s{timed}"
+        return f"{_change(worst)}: {whole}, but {stood} when the run ended{limit}"
     left = Span(worst["asked_s"], "the run ended")
     return f"{_change(worst)}: not re-formed{_within(row['wanted'], left)}{timed}"
+
+
+def _overtaken(recovery: RecoveryRow, had_s: float, by: RecoveryRow) -> str:
+    """Return how far the team had come at the next change, in words. had_s: its time until then."""
+    whole_s = recovery["in_place_from_s"]
+    if whole_s is None:
+        return f"overtaken by the {_change(by)} after {had_s:.3g} s"
+    stood = _stood(by["t_s"] - whole_s)
+    return f"the team was whole after {had_s:.3g} s, but {stood} when the {_change(by)} overtook it"
+
+
+def _stood(stood_s: float) -> str:
+    return f"had stood for only {stood_s:.3g} s of {CONVERGED_S:g} s"
 
 
 def _slowest(row: ExpectationRow, run: Circumstances) -> RecoveryRow | None:

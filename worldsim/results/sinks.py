@@ -79,6 +79,7 @@ def _found(judge: Judge, ended_s: float) -> list[str]:
             "timed_from_s": row.timed_from_s,
             "asked_s": row.asked_s,
             "overtaken_s": row.overtaken_s,
+            "in_place_from_s": row.in_place_from_s,
             "changed": row.changed,
         }
         for row in judge.recoveries

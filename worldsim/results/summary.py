@@ -400,6 +400,7 @@ def _recovery_rows(judge: Judge) -> list[RecoveryRow]:
             "timed_from_s": recovery.timed_from_s,
             "asked_s": recovery.asked_s,
             "overtaken_s": recovery.overtaken_s,
+            "in_place_from_s": recovery.in_place_from_s,
             "changed": recovery.changed,
         }
         for recovery in judge.recoveries
