@@ -133,6 +133,53 @@ def test_an_agent_that_ends_by_itself_fails_the_run(
     assert found.failure == fails
 
 
+def test_agents_that_end_alike_are_named_together_with_the_log_of_the_first() -> None:
+    found = Culprits(None, lambda _: None)
+    for agent, time_s in ((0, 2.0), (1, 2.0), (4, 2.0), (2, 2.06), (3, 2.06), (6, 2.1), (9, 2.1)):
+        log_end = f": agent {agent} failed at {time_s:g} s: died (logs/agent-{agent}.log)"
+        found.note_exit(agent, ProcessExit(None, 1), time_s, log_end)
+    found.note_exit(
+        5, ProcessExit(None, 1), 3.0, ": agent 5 failed at 3 s: lost (logs/agent-5.log)"
+    )
+    found.note_exit(7, ProcessExit(11, None), 3.0)
+    found.note_exit(8, ProcessExit(11, None), 3.0)
+    assert (found.failure or "").split("; ") == [
+        "agent-0 to agent-4, agent-6, agent-9 ended with status 1 at 2.0 s to 2.1 s:"
+        " agent 0 failed at 2 s: died (logs/agent-0.log)",
+        "agent-5 ended with status 1 at 3.0 s: agent 5 failed at 3 s: lost (logs/agent-5.log)",
+        "agent-7, agent-8 were killed by signal 11 at 3.0 s",
+    ]
+
+
+def test_of_many_agents_that_end_alike_some_are_named() -> None:
+    found = Culprits(None, lambda _: None)
+    for agent in range(0, 20, 2):
+        found.note_exit(agent, ProcessExit(None, 1), 2.0)
+    named = ", ".join(f"agent-{agent}" for agent in range(0, 10, 2))
+    assert found.failure == f"{named} and 5 more ended with status 1 at 2.0 s"
+
+
+def test_controllers_that_hang_alike_are_named_together(
+    process: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(culprits, "HANG_S", -1.0)
+    steps, told = steps_in(process(BUSY), agents=3), list[str]()
+    StepGuard(steps.page.row(2), 0.05).enter()
+    steps.page.note_pid(2, steps.page.read(1).pid)
+    for agent in (1, 2):
+        steps.page.row(agent)[2] = 0
+    found = Culprits(steps, told.append, speed=0.0)
+    found.look([1, 2], 5.0)
+    does = "computes without end"
+    assert told == [
+        f"the controller of agent-{agent} has not returned since 5.0 s: it {does}"
+        for agent in (1, 2)
+    ]
+    assert found.failure == (
+        f"the controllers of agent-1, agent-2 have not returned since 5.0 s: each {does}"
+    )
+
+
 def test_slow_steps_count_where_the_controller_computes_or_waits() -> None:
     steps = SharedSteps.of(2, 1)
     for agent, wait in ((0, lambda: None), (1, lambda: eventually(later(3), 5.0))):

@@ -4,9 +4,10 @@ Agents note their steps in a shared page; /proc says what a process does. Where 
 started by hand there is no page, and nobody is named.
 """
 
+import re
 import signal
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from agent.step_page import StepPage, StepTimes
@@ -27,6 +28,8 @@ CRASH_SIGNALS = frozenset(
 )
 """Signals that a process gets for its own errors."""
 MAX_NAMED = 5
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
+"""Ends of logs are alike that differ in numbers only: in ids and times."""
 LARGE_B = 1024**3
 
 
@@ -51,6 +54,15 @@ class SharedSteps(NamedTuple):
         return self.page.read(self.agents + shard).pid
 
 
+class _Fault(NamedTuple):
+    """What an agent's process did."""
+
+    agent: int
+    what: str
+    time_s: float
+    log_end: str = ""
+
+
 class Culprits:
     """Names the process at fault; ``report`` gets a line the first time.
 
@@ -64,8 +76,8 @@ class Culprits:
         self._steps = steps
         self._report = report
         self._speed = speed
-        self._hangs: dict[int, str] = {}
-        self._ends: list[str] = []
+        self._hangs: dict[int, _Fault] = {}
+        self._ends: list[_Fault] = []
         self._asleep_since: dict[int, tuple[int, float]] = {}  # switches and time, by agent
         self._stops: dict[str, str] = {}
 
@@ -93,7 +105,7 @@ class Culprits:
         its log, to quote.
         """
         if process_exit.status is not None or process_exit.signal in CRASH_SIGNALS:
-            self._ends.append(f"{agent_name(agent)} {process_exit} at {time_s:.1f} s{log_end}")
+            self._ends.append(_Fault(agent, str(process_exit), time_s, log_end))
 
     def named(self, agent: int) -> bool:
         """Return whether an agent itself is at fault: it hangs, or was stopped."""
@@ -101,8 +113,12 @@ class Culprits:
 
     @property
     def failure(self) -> str | None:
-        """Which agents have ended by themselves, or have not returned; None: none."""
-        return "; ".join([*self._ends, *self._hangs.values()][:MAX_NAMED]) or None
+        """Which agents have ended by themselves, or have not returned; None: none.
+
+        Those that did so alike are named together, with the log of the first.
+        """
+        texts = [*map(_ended, _alike(self._ends)), *map(_hang, _alike(self._hangs.values()))]
+        return "; ".join(texts[:MAX_NAMED]) or None
 
     @property
     def stop(self) -> str | None:
@@ -139,23 +155,21 @@ class Culprits:
             return
         since_s = max(0.0, time_s - lasts_s * self._speed)
         holds = f", and holds {process.resident_b / 1e9:.1f} GB of memory"
-        self._hangs[agent] = (
-            f"the controller of {agent_name(agent)} has not returned since {since_s:.1f} s:"
-            f" {does}{holds if process.resident_b > LARGE_B else ''}"
-        )
-        self._report(self._hangs[agent])
+        what = f"{does}{holds if process.resident_b > LARGE_B else ''}"
+        self._hangs[agent] = _Fault(agent, what, since_s)
+        self._report(_hang([self._hangs[agent]]))
 
     def _hang_in_words(
         self, agent: int, lasts_s: float, cpu_s: float, process: ProcessState
     ) -> str | None:
         """Return what a step does that hangs; None for one that a slow host may delay."""
         if cpu_s > HANG_S:
-            return "it computes without end"
+            return "computes without end"
         if lasts_s <= HANG_S:
             return None
         if self._asleep(agent, process):
-            return "it is blocked"
-        return "it computes and waits in turn" if lasts_s > LONG_HANG_S else None
+            return "is blocked"
+        return "computes and waits in turn" if lasts_s > LONG_HANG_S else None
 
     def _asleep(self, agent: int, process: ProcessState) -> bool:
         """Return whether a process has waited without a break for ASLEEP_S."""
@@ -165,3 +179,52 @@ class Culprits:
             self._asleep_since[agent] = (process.switches, now_s)
             return False
         return now_s - since_s >= ASLEEP_S
+
+
+def _alike(faults: Iterable[_Fault]) -> list[list[_Fault]]:
+    """Return faults in groups that differ in their agents, times and numbers only, in order."""
+    groups: dict[tuple[str, str], list[_Fault]] = {}
+    for each in faults:
+        groups.setdefault((each.what, NUMBER.sub("0", each.log_end)), []).append(each)
+    return list(groups.values())
+
+
+def _ended(alike: Sequence[_Fault]) -> str:
+    """Return which agents have ended, and how, with the end of the first one's log."""
+    first, agents = alike[0], [each.agent for each in alike]
+    what = first.what if len(alike) == 1 else re.sub("^was ", "were ", first.what)
+    return f"{_names(agents)} {what} at {_times(alike)}{first.log_end}"
+
+
+def _hang(alike: Sequence[_Fault]) -> str:
+    """Return whose controllers have not returned, and what they do."""
+    agents = _names([each.agent for each in alike])
+    if len(alike) == 1:
+        who = f"the controller of {agents} has not returned since {_times(alike)}: it"
+    else:
+        who = f"the controllers of {agents} have not returned since {_times(alike)}: each"
+    return f"{who} {alike[0].what}"
+
+
+def _times(faults: Sequence[_Fault]) -> str:
+    times_s = [each.time_s for each in faults]
+    first, last = (f"{time_s:.1f} s" for time_s in (min(times_s), max(times_s)))
+    return first if first == last else f"{first} to {last}"
+
+
+def _names(agents: Iterable[int]) -> str:
+    """Return the names of agents: "agent-0 to agent-4, agent-7"; of many, the first."""
+    runs: list[list[int]] = []
+    for agent in sorted(agents):
+        if not runs or agent != runs[-1][-1] + 1:
+            runs.append([])
+        runs[-1].append(agent)
+    left = sum(map(len, runs[MAX_NAMED:]))
+    more = f" and {left} more" if left else ""
+    return f"{', '.join(map(_run, runs[:MAX_NAMED]))}{more}"
+
+
+def _run(agents: Sequence[int]) -> str:
+    """Return the names of agents with ids one after the other."""
+    names = list(map(agent_name, agents))
+    return f"{names[0]} to {names[-1]}" if len(names) > 2 else ", ".join(names)
