@@ -80,6 +80,7 @@ def summary_of(judge: Judge, scenario: Scenario | None = None) -> dict[str, Any]
                 "converged": phase.converge_s is not None,
                 "converge_s": phase.converge_s,
                 "timed_from_s": phase.timed_from_s,
+                "in_place_from_s": phase.in_place_from_s,
                 "residual_m": phase.residual_m,
                 "queues_converge_s": dict(zip(queues.names, queues.converge_s, strict=True)),
             }

@@ -57,7 +57,12 @@ def row(name: str, wanted: Any, got: Any, held: bool | None, margin: Any = None)
         ),
         (
             row("converge vee", None, None, None),
-            ["vee converges", "by the end", "did not converge in 5 s", "not judged"],
+            [
+                "vee converges",
+                "by the end",
+                "did not converge in 5 s: the run ended too early",
+                "not judged",
+            ],
         ),
         (
             row("reform_within_s", 10.0, 3.25, True, 6.75),

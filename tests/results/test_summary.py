@@ -63,6 +63,7 @@ def test_it_has_every_key_of_the_contract(run: FinishedRun) -> None:
         "converged",
         "converge_s",
         "timed_from_s",
+        "in_place_from_s",
         "residual_m",
         "queues_converge_s",
     }
@@ -271,7 +272,10 @@ def test_without_a_limit_the_planned_duration_is_the_limit() -> None:
         SMALL, overrides={"fleet.start": "{ kind = 'list', positions_m = [[9, 0, 0], [12, 0, 0]] }"}
     )
     made = summarise(scenario, finished(fly(scenario), scenario))
-    assert (made["outcome"], made["reason"]) == ("fail", "line did not converge in 5 s")
+    assert (made["outcome"], made["reason"]) == (
+        "fail",
+        "line did not converge in 5 s: not every agent was in its place at the end",
+    )
     flight = fly(scenario, should_stop=StopAfter(40))
     assert flight.loop.judge.expectations()[1].held is None
 

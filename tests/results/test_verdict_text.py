@@ -75,7 +75,14 @@ def test_the_viewer_is_named_where_there_is_a_recording(summary: Summary) -> Non
         (row("converge vee", 15.0, 11.8, True), "  met      vee: converged in 11.8 s (limit 15 s)"),
         (row("converge vee", None, 11.8, True), "  met      vee: converged in 11.8 s"),
         (row("converge vee", 4.0, None, False), "  NOT MET  vee did not converge within 4 s"),
-        (row("converge vee", None, None, False), "  NOT MET  vee did not converge in 5 s"),
+        (
+            row("converge vee", None, None, False),
+            "  NOT MET  vee did not converge in 5 s: not every agent was in its place at the end",
+        ),
+        (
+            row("converge vee", None, None, None),
+            "  open     vee did not converge in 5 s: the run ended too early",
+        ),
         (
             row("converge vee", 15.0, None, None),
             "  open     vee did not converge: the run ended after 5 s, before the limit of 15 s",
@@ -199,6 +206,26 @@ def test_a_formation_that_was_replaced_names_the_next_mission(summary: Summary) 
         "  open     a did not converge: the next mission came after 2 s, before the limit of 3 s",
         "  NOT MET  b did not converge within 3 s",
     ]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "in_place_from_s", "words"),
+    [
+        (None, 3.5, "whole after 3.5 s, but had stood for only 1.5 s of 2 s when the run ended"),
+        (
+            4.0,
+            3.5,
+            "whole after 3.5 s, but had stood for only 1.5 s of 2 s when the run ended (limit 4 s)",
+        ),
+        (None, 3.01, "whole after 3.01 s, but had stood for a little less than 2 s when the run"),
+    ],
+)
+def test_a_team_that_was_whole_when_the_run_ended_is_told_from_one_that_was_not(
+    summary: Summary, wanted: float | None, in_place_from_s: float, words: str
+) -> None:
+    phases = [{**summary["phases"][0], "in_place_from_s": in_place_from_s}]
+    line = text(summary, expectations=[row("converge a", wanted, None, None)], phases=phases)[1]
+    assert line.startswith(f"  open     a: the team was {words}")
 
 
 @pytest.mark.parametrize(

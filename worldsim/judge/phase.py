@@ -97,6 +97,14 @@ class Phase:
         return None if at_s is None else at_s - self.from_s
 
     @property
+    def in_place_from_s(self) -> float | None:
+        """Since when all have been in place, for less than 2 s so far [s; simulated time].
+
+        None where they are not, and once the team has converged.
+        """
+        return self._timer.since_s if self._timer.converged_s is None else None
+
+    @property
     def timed_from_s(self) -> float | None:
         """From when the time to converge counts [s; simulated time]; None while a fault forbids it.
 

@@ -52,6 +52,7 @@ class PhaseFigures:
     converged: bool
     converge_s: Figure
     timed_from_s: Figure
+    in_place_from_s: Figure
     residual_m: Figure
     queues_converge_s: dict[str, Figure]
 
@@ -261,6 +262,7 @@ def _phases(judge: Judge) -> Iterator[PhaseFigures]:
             converged=phase.converge_s is not None,
             converge_s=phase.converge_s,
             timed_from_s=phase.timed_from_s,
+            in_place_from_s=phase.in_place_from_s,
             residual_m=phase.residual_m,
             queues_converge_s=dict(zip(queues.names, queues.converge_s, strict=True)),
         )

@@ -11,6 +11,7 @@ from worldsim.judge.finding import ExpectationRow
 from worldsim.results.expectation_text import (
     CONVERGE,
     Circumstances,
+    PhaseTimes,
     expectation_texts,
     was_tested,
 )
@@ -104,8 +105,11 @@ def verdict_of(run: Run) -> Verdict:
 def expectation_cells(run: Run) -> Iterator[ExpectationCells]:
     """Yield the run's expectations."""
     rows: list[ExpectationRow] = run.figures["expectations"]
-    spans_s = [(phase["from_s"], phase["timed_from_s"]) for phase in run.figures["phases"]]
-    circumstances = Circumstances(run.ended_s, spans_s, run.figures["recoveries"])
+    phases = [
+        PhaseTimes(phase["from_s"], phase["timed_from_s"], phase["in_place_from_s"])
+        for phase in run.figures["phases"]
+    ]
+    circumstances = Circumstances(run.ended_s, phases, run.figures["recoveries"])
     texts = expectation_texts(rows, circumstances)
     for index, (row, text) in enumerate(zip(rows, texts, strict=True)):
         unit, key = _unit(row["name"]), f"expectations.{index}"

@@ -1,7 +1,7 @@
 """Expectations in words: what a run showed of each, beside what was required."""
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple, TypedDict
+from typing import NamedTuple, Protocol, TypedDict
 
 from worldsim.judge.finding import ExpectationRow
 from worldsim.scenario.tables import CONVERGED_S
@@ -10,6 +10,8 @@ CONVERGE = "converge "
 """An expectation's name begins so where it is about a formation; the formation's name follows."""
 STARTS = ("join at ", "restart at ")
 """An expectation's name begins so where agents were to start and found no room."""
+NEARLY_S = 0.1
+"""A time that lacks less of what it has to be is not told exactly."""
 MAX_NAMED = 4
 """A change of more agents is described by their number; so are more encounters."""
 HINDRANCE_WORDS = {
@@ -45,15 +47,40 @@ class EncounterRow(TypedDict):
     hindrance: str  # why the vehicle could not give way
 
 
+class TimedPhase(Protocol):
+    """What tells the times of a formation."""
+
+    @property
+    def from_s(self) -> float:
+        """When it is asked for [s; simulated time]."""
+
+    @property
+    def timed_from_s(self) -> float | None:
+        """From when its time counts [s; simulated time]."""
+
+    @property
+    def in_place_from_s(self) -> float | None:
+        """Since when all are in place, for less than 2 s [s; simulated time]."""
+
+
+class PhaseTimes(NamedTuple):
+    """The times of one formation [s; simulated time]."""
+
+    from_s: float  # when it is asked for
+    timed_from_s: float | None  # from when its time counts; null while a fault forbids it
+    in_place_from_s: float | None = None  # since when all were in place at its end, if not for 2 s
+
+    @staticmethod
+    def of(phase: TimedPhase) -> "PhaseTimes":
+        """Return the times of a phase."""
+        return PhaseTimes(phase.from_s, phase.timed_from_s, phase.in_place_from_s)
+
+
 class Circumstances(NamedTuple):
     """What the words on an expectation depend on, beside its figures."""
 
     ended_s: float  # end of the run [s; simulated time]
-    phases_s: Sequence[tuple[float, float | None]]
-    """When each formation is asked for, and from when its time counts [s; simulated time].
-
-    The latter is None where a fault in force forbids it.
-    """
+    phases: Sequence[PhaseTimes]  # of each formation
     recoveries: Sequence[RecoveryRow]
 
 
@@ -64,6 +91,7 @@ class Span(NamedTuple):
     end: str  # what ended it, in words
     forbidden: bool = False  # whether a fault forbade it to the end
     timed_from_s: float | None = None  # where a fault forbade it until then
+    stood_s: float | None = None  # how long all were in place at the end; None: they were not
 
 
 def expectation_texts(rows: Sequence[ExpectationRow], run: Circumstances) -> list[str]:
@@ -112,29 +140,47 @@ def figure(value: float | None, unit: str, digits: int) -> str:
 
 def _spans(run: Circumstances) -> Iterator[Span]:
     """Yield the time of each formation, in order."""
-    ends_s = [*(start_s for start_s, _ in run.phases_s[1:]), run.ended_s]
-    for index, ((start_s, timed_s), end_s) in enumerate(zip(run.phases_s, ends_s, strict=True)):
+    ends_s = [*(phase.from_s for phase in run.phases[1:]), run.ended_s]
+    for index, (phase, end_s) in enumerate(zip(run.phases, ends_s, strict=True)):
         end = "the run ended" if index == len(ends_s) - 1 else "the next mission came"
+        start_s, timed_s, whole_s = phase
+        stood_s = end_s - whole_s if whole_s is not None else None
         if timed_s is None or timed_s == start_s:
-            yield Span(end_s - start_s, end, forbidden=timed_s is None)
+            yield Span(end_s - start_s, end, forbidden=timed_s is None, stood_s=stood_s)
         else:
-            yield Span(end_s - timed_s, end, timed_from_s=timed_s)
+            yield Span(end_s - timed_s, end, timed_from_s=timed_s, stood_s=stood_s)
 
 
 def _convergence(row: ExpectationRow, span: Span) -> str:
-    name, got, wanted = row["name"].removeprefix(CONVERGE), row["got"], row["wanted"]
+    name, got = row["name"].removeprefix(CONVERGE), row["got"]
     if got is not None:
         if span.forbidden:
             return f"{name}: converged in {got:.3g} s{_untimed(row)}"
         return f"{name}: converged in {got:.3g} s{_timed(span.timed_from_s)}{_limit(row)}"
-    timed = _timed(span.timed_from_s)
+    return _unconverged(name, row, span)
+
+
+def _unconverged(name: str, row: ExpectationRow, span: Span) -> str:
+    """Return what a team did that has not converged, in words. name: of the formation."""
+    wanted, timed = row["wanted"], _timed(span.timed_from_s)
     if row["held"] is None and span.forbidden:
         return f"{name} did not converge: a fault that forbids it was in force to the end"
+    if row["held"] is None and span.stood_s is not None:
+        whole_s = span.length_s - span.stood_s
+        stood = f"{_stood(span.stood_s)} when {span.end}"
+        return f"{name}: the team was whole after {whole_s:.3g} s{timed}, but {stood}{_limit(row)}"
     if wanted is None:
-        return f"{name} did not converge in {span.length_s:.4g} s{timed}"
+        return f"{name} did not converge in {span.length_s:.4g} s{timed}{_unlimited(row, span)}"
     if row["held"] is False:
         return f"{name} did not converge within {wanted:g} s{timed}"
     return f"{name} did not converge{_within(wanted, span)}{timed}"
+
+
+def _unlimited(row: ExpectationRow, span: Span) -> str:
+    """Return why a team without a limit has not converged, or why that is not judged."""
+    if row["held"] is None:
+        return f": {span.end} too early"
+    return ": not every agent was in its place at the end" if span.stood_s is None else ""
 
 
 def _untimed(row: ExpectationRow) -> str:
@@ -280,6 +326,9 @@ def _overtaken(recovery: RecoveryRow, had_s: float, by: RecoveryRow) -> str:
 
 
 def _stood(stood_s: float) -> str:
+    """Return how long a team stood that has to stand for longer, in words."""
+    if stood_s > CONVERGED_S - NEARLY_S:  # the last tick was a little earlier
+        return f"had stood for a little less than {CONVERGED_S:g} s"
     return f"had stood for only {stood_s:.3g} s of {CONVERGED_S:g} s"
 
 

@@ -8,7 +8,12 @@ from worldsim.engine.step import Recorder
 from worldsim.judge.run_events import RunEvent, as_row
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Figures, Judge
-from worldsim.results.expectation_text import Circumstances, RecoveryRow, expectation_texts
+from worldsim.results.expectation_text import (
+    Circumstances,
+    PhaseTimes,
+    RecoveryRow,
+    expectation_texts,
+)
 from worldsim.results.run_folder import RunDirectory
 from worldsim.scenario.tables import Scenario
 
@@ -69,7 +74,7 @@ class Sinks:
 
 def _found(judge: Judge, ended_s: float) -> list[str]:
     """Return what a run that ended at a time [s] showed of each expectation, one text for each."""
-    spans_s = [(phase.from_s, phase.timed_from_s) for phase in judge.phases]
+    phases = [PhaseTimes.of(phase) for phase in judge.phases]
     recoveries: list[RecoveryRow] = [
         {
             "t_s": row.t_s,
@@ -85,7 +90,7 @@ def _found(judge: Judge, ended_s: float) -> list[str]:
         for row in judge.recoveries
     ]
     rows = [expectation.row for expectation in judge.expectations()]
-    texts = expectation_texts(rows, Circumstances(ended_s, spans_s, recoveries))
+    texts = expectation_texts(rows, Circumstances(ended_s, phases, recoveries))
     words = {True: "met", False: "NOT MET", None: "open"}
     return [f"{words[row['held']]}: {text}" for row, text in zip(rows, texts, strict=True)]
 

@@ -19,6 +19,7 @@ from worldsim.judge.verdict import Judge
 from worldsim.results.expectation_text import (
     Circumstances,
     EncounterRow,
+    PhaseTimes,
     RecoveryRow,
     expectation_texts,
 )
@@ -103,6 +104,7 @@ class PhaseRow(TypedDict):
     converged: bool
     converge_s: float | None  # from the phase's start
     timed_from_s: float | None  # for its expectation; later than from_s where a fault forbade it
+    in_place_from_s: float | None  # since when all were in place at its end, for less than 2 s
     residual_m: float | None  # largest slot error at the last tick of the phase
     queues_converge_s: dict[str, float | None]  # by queue name
 
@@ -319,8 +321,8 @@ def _with_words(invariants: list[str]) -> str:
 
 def _circumstances(run: FinishedRun) -> Circumstances:
     judge = run.loop.judge
-    spans_s = [(phase.from_s, phase.timed_from_s) for phase in judge.phases]
-    return Circumstances(run.duration_s, spans_s, _recovery_rows(judge))
+    phases = [PhaseTimes.of(phase) for phase in judge.phases]
+    return Circumstances(run.duration_s, phases, _recovery_rows(judge))
 
 
 def _cut(run: FinishedRun) -> str | None:
@@ -383,6 +385,7 @@ def _phase_rows(judge: Judge) -> list[PhaseRow]:
             "converged": phase.converge_s is not None,
             "converge_s": phase.converge_s,
             "timed_from_s": phase.timed_from_s,
+            "in_place_from_s": phase.in_place_from_s,
             "residual_m": phase.residual_m,
             "queues_converge_s": dict(zip(queues.names, queues.converge_s, strict=True)),
         }

@@ -9,6 +9,7 @@ from worldsim.recording.layout import SUMMARY_FILE
 from worldsim.results.expectation_text import (
     Circumstances,
     EncounterRow,
+    PhaseTimes,
     RecoveryRow,
     encounter_texts,
     expectation_texts,
@@ -152,14 +153,17 @@ def _outcome(summary: Any, file: Path) -> str:
 
 def circumstances(summary: Summary) -> Circumstances:
     """Return what the words on a run's expectations depend on."""
-    spans_s = [(phase["from_s"], phase["timed_from_s"]) for phase in summary["phases"]]
-    return Circumstances(summary["duration_s"], spans_s, summary["recoveries"])
+    phases = [
+        PhaseTimes(phase["from_s"], phase["timed_from_s"], phase["in_place_from_s"])
+        for phase in summary["phases"]
+    ]
+    return Circumstances(summary["duration_s"], phases, summary["recoveries"])
 
 
 def _recorded_circumstances(verification: "Verification") -> Circumstances:
     recoveries: list[RecoveryRow] = verification.figures["recoveries"]
-    spans_s = [(phase.from_s, phase.timed_from_s) for phase in verification.phases]
-    return Circumstances(verification.until_s, spans_s, recoveries)
+    phases = [PhaseTimes.of(phase) for phase in verification.phases]
+    return Circumstances(verification.until_s, phases, recoveries)
 
 
 def _expectations(rows: list[ExpectationRow], run: Circumstances) -> list[str]:
