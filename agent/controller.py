@@ -48,6 +48,10 @@ __all__ = [
 BUILT_IN = {
     "q_structure": "agent.guidance.q_structure:QStructure",
     "flocking": "agent.guidance.flocking:Flocking",
+    "leader_follower": "agent.schemes.leader_follower:LeaderFollower",
+    "virtual_structure": "agent.schemes.virtual_structure:VirtualStructure",
+    "former_q_structure": "agent.schemes.former_q_structure:FormerQStructure",
+    "printed_q_structure": "agent.schemes.printed_q_structure:PrintedQStructure",
 }
 COMMAND = "command"
 """The name of a controller that is a program of its own; see agent.command_controller."""

@@ -18,6 +18,7 @@ FLYING = (
     "random_flights",
     "recording",
     "report",
+    "schemes",
     "structure_figures",
 )
 """Folders of tests that mostly fly: CI runs them compiled where it can, in half of the time."""

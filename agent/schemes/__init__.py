@@ -1,0 +1,1 @@
+"""Schemes of the literature that the paper compares itself with, flown as controllers."""
