@@ -18,8 +18,9 @@ Our choices, where the paper is silent:
   place meanwhile. So a queue cannot be longer than the radio's range.
 - The trench is as steep as any approach here, and slopes towards the vertex by SLOPE_MPS. Only the
   member ahead repels, below d_ir of arc length; members settle SLOPE_MPS / REPULSION_HZ too near.
-- An agent joins the nearest queue. The last member of a queue leaves it for another one that would
-  then still be emptier for its capacity, each agent at a time of its own.
+- An agent joins the nearest queue. The vertex agent counts the members of each queue and tells the
+  counts (``queue_counts``). The last member of a queue leaves it for another one that would then
+  still be emptier for its capacity, each agent at a time of its own.
 - Distances are those of open queues; on a closed one members stand too near to its first vertex.
 """
 
@@ -27,11 +28,12 @@ from math import dist, hypot, inf
 from typing import Final
 
 from agent.config import AgentSetup
-from agent.controller import Flown, Heard, Intent, Senses
+from agent.controller import NO_WORDS, Flown, Heard, Intent, Senses, Words
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation
 from agent.schemes.approach import GAIN, Approach, towards
 from agent.schemes.links import NOBODY, Situation
+from agent.schemes.queue_counts import counts_heard, counts_told
 from agent.schemes.queue_points import end_m, nearest, point
 
 LISTEN_S: Final = 1.0
@@ -42,8 +44,12 @@ REPULSION_HZ: Final = 8.0
 """Speed away from the member ahead for each metre below d_ir [1/s]."""
 ABREAST_M: Final = 0.05
 """Of two members whose arc lengths differ by less, the lower id goes ahead."""
-TURN_S: Final = 0.3
-"""How long it is each agent's turn to leave its queue; longer than a claim takes to be heard."""
+TELL_S: Final = 0.25
+"""Period in which the vertex agent tells the counts."""
+COUNTS_S: Final = 1.0
+"""Counts that are older do not count."""
+TURN_S: Final = 0.5
+"""How long it is each agent's turn to leave its queue; about as long as until the others know."""
 TURNS: Final = 10
 
 
@@ -59,6 +65,12 @@ class FormerQStructure:
         self._queue = NOBODY
         self._s: dict[tuple[int, int], float] = {}
         """Where on a queue an agent was last [m]."""
+        self._tells_s = -inf
+        self._counts: list[int] = []
+        """The members of each queue by the vertex agent's last word."""
+        self._counts_s = -inf
+        self._turn = NOBODY
+        """The last turn in which it left its queue."""
 
     def decide(self, senses: Senses) -> Intent:
         """Return the intent; without a mission an agent hovers."""
@@ -68,7 +80,7 @@ class FormerQStructure:
         if mission.key != self._key:
             self._key, self._since_s = mission.key, senses.now_s
             self._holds_vertex, self._queue = False, NOBODY
-            self._s = {}
+            self._s, self._counts_s = {}, -inf
         others = [each for each in senses.neighbours if each.mission == mission.key]
         layout = mission.formation.layout(1 + len(others))
         main = layout.places[0]
@@ -79,7 +91,8 @@ class FormerQStructure:
         if self._holds_vertex:
             self._queue = NOBODY
             velocity = towards(senses.position, vertex, mission.frame.velocity_at(vertex))
-            return self._approach.fly(senses, velocity, vertex, main)
+            words = self._counted(senses.now_s, mission, others, main)
+            return self._approach.fly(senses, velocity, vertex, main, words)
         if not in_touch:
             self._queue = NOBODY
             return self._approach.fly(senses, towards(senses.position, vertex), vertex, None)
@@ -129,11 +142,20 @@ class FormerQStructure:
         place = Place(j, rank) if slot is not None else None
         return self._approach.fly(senses, velocity, target, place)
 
+    def _counted(self, now_s: float, mission: Flown, others: list[Heard], main: Place) -> Words:
+        """Return the vertex agent's words: the counts, where they are due."""
+        if now_s < self._tells_s + TELL_S - 1e-9:
+            return NO_WORDS
+        self._tells_s = now_s
+        claims = [each.place for each in others if each.place is not None and each.place != main]
+        queues = range(len(mission.formation.queues))
+        counts = [sum(each.queue == j for each in claims) for j in queues]
+        return Words(summary=counts_told(mission.key, self._id, now_s, counts))
+
     def _choose_queue(
         self, senses: Senses, mission: Flown, others: list[Heard], main: Place
     ) -> None:
         formation, n = mission.formation, len(others)
-        claims = [each.place for each in others if each.place is not None and each.place != main]
         if self._queue == NOBODY:
             p = mission.frame.to_frame(senses.position)
             away = [
@@ -142,18 +164,38 @@ class FormerQStructure:
                 if capacity > 0.0
             ]
             self._queue = min(away)[1]
+        self._hear_counts(senses, mission, others, main)
+        turn = int(senses.now_s / TURN_S)
+        late = senses.now_s > self._counts_s + COUNTS_S
+        if turn % TURNS != self._id % TURNS or turn == self._turn or late:
             return
-        if int(senses.now_s / TURN_S) % TURNS != self._id % TURNS:
-            return
+        if self._counts[self._queue] > 0 and self._is_last(senses, mission, others, main):
+            best = emptier_queue(self._queue, self._counts, formation.capacities)
+            if best != self._queue:
+                self._queue, self._turn = best, turn
+
+    def _hear_counts(
+        self, senses: Senses, mission: Flown, others: list[Heard], main: Place
+    ) -> None:
+        holders = [each.id for each in others if each.place == main]
+        for heard in senses.summaries:
+            if heard.sender in holders and heard.stamp_s > self._counts_s:
+                counts = counts_heard(heard, mission.key, len(mission.formation.queues))
+                if counts is not None:
+                    self._counts, self._counts_s = counts, heard.stamp_s
+
+    def _is_last(self, senses: Senses, mission: Flown, others: list[Heard], main: Place) -> bool:
+        """Return whether no other member of the own queue is farther from its vertex."""
+        n = len(others)
         own = self._arc_length(mission, self._queue, self._id, senses.position, n)
         for other in others:
-            if other.place in claims and other.place.queue == self._queue:
-                s = self._arc_length(mission, self._queue, other.id, other.position, n)
-                if (s, other.id) > (own, self._id):
-                    return  # another member is the last one
-        counts = [sum(each.queue == j for each in claims) for j in range(len(formation.queues))]
-        counts[self._queue] += 1
-        self._queue = emptier_queue(self._queue, counts, formation.capacities)
+            place = other.place
+            if place is None or place == main or place.queue != self._queue:
+                continue
+            s = self._arc_length(mission, self._queue, other.id, other.position, n)
+            if (s, other.id) > (own, self._id):
+                return False
+        return True
 
     def _arc_length(
         self, mission: Flown, queue: int, agent: int, position: Vector, others: int

@@ -35,7 +35,9 @@ def heard(own, position, place=None, velocity=(0.0, 0.0, 0.0), target=None, stan
     return Heard(own, 0.05, position, velocity, target or position, place, standing=standing)
 
 
-def senses(position, neighbours=(), now_s=0.0, yaw=0.0, frame=None, formation=WEDGE):
+def senses(
+    position, neighbours=(), now_s=0.0, yaw=0.0, *, frame=None, formation=WEDGE, summaries=()
+):
     return Senses(
         now_s=now_s,
         position=position,
@@ -45,4 +47,5 @@ def senses(position, neighbours=(), now_s=0.0, yaw=0.0, frame=None, formation=WE
         neighbours=tuple(neighbours),
         team=lambda: tuple(Peer(each.id, each.position, each.place) for each in neighbours),
         mission=Flown(0, formation, frame or Frame()),
+        summaries=summaries,
     )

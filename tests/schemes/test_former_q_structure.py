@@ -5,6 +5,7 @@ from random import Random
 
 import pytest
 
+from agent.controller import HeardSummary
 from agent.messages import Place
 from agent.schemes.former_q_structure import (
     REPULSION_HZ,
@@ -92,6 +93,27 @@ def test_the_trench_draws_to_the_queue_and_ranks_by_who_is_ahead():
     intent = decided(1, (-1.0, 2.0, 1.4), others)
     assert intent.place == Place(0, 2)
     assert intent.wanted[1] < 0.0
+
+
+def test_the_vertex_agent_counts_and_the_last_of_a_full_queue_leaves_it_in_its_turn():
+    queue = [(-0.5 * k, 0.5 * k, 0.5 * k) for k in range(4)]
+    others = [heard(k, queue[k], Place(0, k)) for k in (1, 2, 3)]
+    vertex, last, middle = (FormerQStructure(setup(own)) for own in (0, 3, 2))
+    told = [vertex.decide(senses(queue[0], others, now_s)) for now_s in (0.0, 1.0, 1.05)]
+    assert [each.words.summary is not None for each in told] == [False, True, False]
+    summary = told[1].words.summary
+    assert summary.trees[0].down.counts == (3, 0, 0, 0)
+    moved = {}
+    for controller, own in ((last, 3), (middle, 2)):
+        around = [heard(k, queue[k], APEX if k == 0 else Place(0, k)) for k in range(4) if k != own]
+        for tick in range(40):
+            now_s = 0.05 * tick
+            news = (HeardSummary(0, now_s, summary),) if tick % 5 == 0 else ()
+            place = controller.decide(senses(queue[own], around, now_s, summaries=news)).place
+            moved.setdefault(own, []).append(place.queue if place else None)
+    assert moved[3][29] == 0
+    assert moved[3][30:] == [1] * 10
+    assert 1 not in moved[2]
 
 
 def test_it_needs_its_queue_and_the_vertex_agent():

@@ -9,16 +9,8 @@ from agent.guidance.cone import Cone
 from agent.guidance.potential import Potential
 from agent.messages import DISTRESS, MEMBER, SUB_VERTEX, VERTEX, Place
 from agent.schemes.links import Situation
-from agent.schemes.printed_q_structure import (
-    CastZone,
-    PrintedQStructure,
-    bobber,
-    links_needed,
-    omega,
-    queue_of,
-    roles,
-    slope,
-)
+from agent.schemes.printed_equations import CastZone, bobber, omega, slope
+from agent.schemes.printed_q_structure import PrintedQStructure, links_needed, queue_of, roles
 from tests.laws import literal
 from tests.schemes.situations import WEDGE, heard, senses, setup
 
