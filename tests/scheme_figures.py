@@ -168,7 +168,9 @@ def scenario_of(
         **dict((*SCHEMES[scheme].keys, *flown.keys, *SITUATIONS[situation])),
     }
     if situation == "apex leaves":
-        keys["event"] = f"[{{ at_s = {flown.leaves_s}, leave = ['vertex:V1'] }}]"
+        # By the printed algorithm many agents hold the apex at a time.
+        who = "0" if scheme == "printed_q_structure" else "'vertex:V1'"
+        keys["event"] = f"[{{ at_s = {flown.leaves_s}, leave = [{who}] }}]"
         keys["duration_s"] = str(flown.leaves_s + flown.lasts_s)
     return load(find_scenario(flown.scenario), keys)
 

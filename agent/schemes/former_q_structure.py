@@ -21,7 +21,7 @@ Our choices, where the paper is silent:
 - An agent joins the nearest queue. The vertex agent counts the members of each queue and tells the
   counts (``queue_counts``). The last member of a queue leaves it for another one that would then
   still be emptier for its capacity, each agent at a time of its own.
-- Distances are those of open queues; on a closed one members stand too near to its first vertex.
+- On a closed queue members stand too near to its first vertex.
 """
 
 from math import dist, hypot, inf
@@ -150,6 +150,8 @@ class FormerQStructure:
         claims = [each.place for each in others if each.place is not None and each.place != main]
         queues = range(len(mission.formation.queues))
         counts = [sum(each.queue == j for each in claims) for j in queues]
+        if len(mission.formation.queues_of(main)) == 1:
+            counts[main.queue] += 1  # no other queue begins at its vertex
         return Words(summary=counts_told(mission.key, self._id, now_s, counts))
 
     def _choose_queue(

@@ -17,7 +17,7 @@ from agent.schemes.former_q_structure import (
 )
 from agent.schemes.links import NOBODY, Situation
 from agent.schemes.queue_points import nearest, on_sphere
-from tests.schemes.situations import WEDGE, heard, senses, setup
+from tests.schemes.situations import LINES, WEDGE, heard, senses, setup
 
 APEX = WEDGE.layout(9).places[0]
 FAR_UP = (-4.0, 4.0, 4.0)
@@ -114,6 +114,16 @@ def test_the_vertex_agent_counts_and_the_last_of_a_full_queue_leaves_it_in_its_t
     assert moved[3][29] == 0
     assert moved[3][30:] == [1] * 10
     assert 1 not in moved[2]
+
+
+def test_a_vertex_agent_counts_in_the_queue_that_alone_begins_at_its_vertex():
+    layout = LINES.layout(6)
+    apart = [layout.slots[place].point for place in layout.places]
+    others = [heard(k, apart[k], layout.places[k]) for k in range(1, 6)]
+    vertex = FormerQStructure(setup(0))
+    for now_s in (0.0, 1.0):
+        said = vertex.decide(senses(apart[0], others, now_s, formation=LINES)).words.summary
+    assert said.trees[0].down.counts == (2, 2, 2)
 
 
 def test_it_needs_its_queue_and_the_vertex_agent():
