@@ -4,6 +4,7 @@ from pathlib import Path
 
 from agent.config import AgentSetup, Comms, Control, Vehicle
 from agent.controller import Flown, Heard, Peer, Senses
+from agent.heard_beacon import HeardStanding
 from agent.qstructure.formation import formation_of
 from agent.qstructure.target_frame import Frame
 from worldsim.scenario.file import load
@@ -32,7 +33,8 @@ def setup(own, team=9):
 
 
 def heard(own, position, place=None, velocity=(0.0, 0.0, 0.0), target=None, standing=None):
-    return Heard(own, 0.05, position, velocity, target or position, place, standing=standing)
+    said = HeardStanding(standing) if standing is not None else None
+    return Heard(own, 0.05, position, velocity, target or position, place, standing=said)
 
 
 def senses(

@@ -26,6 +26,7 @@ class Literal(Potential):
     slope = literal.slope_two_sided
 
 
+@pytest.mark.pure
 def test_omega_is_that_of_the_literal_forms():
     random, printed = Random(1), Literal(0.25)
     for _ in range(200):
@@ -36,6 +37,7 @@ def test_omega_is_that_of_the_literal_forms():
         )
 
 
+@pytest.mark.pure
 def test_the_slope_is_that_of_23_and_never_overflows():
     for u, u_tg in ((0.3, 0.5), (0.5, 0.5), (0.9, 0.5)):
         value = [literal.value_two_sided(Literal(0.25), u + d, u_tg) for d in (-1e-6, 1e-6)]
