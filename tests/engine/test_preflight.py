@@ -81,7 +81,7 @@ class Tuned:
 class Mistaken(Tuned):
     """A controller whose parameters are no structure."""
 
-    Parameters = dict  # type: ignore[assignment]
+    Parameters = list  # type: ignore[assignment]
 
 
 def tuned(controller: str = "Tuned", **parameters: str) -> Scenario:
