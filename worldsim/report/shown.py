@@ -9,11 +9,14 @@ from numpy.typing import NDArray
 from agent.guidance.cone import cone_of
 from worldsim.judge.event_text import WARNINGS
 from worldsim.judge.phase import Phase
+from worldsim.judge.run_events import Joined, Left, Restarted
 from worldsim.recording.layout import agent_name
 from worldsim.results.run import Run
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
 
+SLACK_S = 1e-6
+"""Times of events are rounded to the microsecond."""
 SHORTEST_S = 0.25
 """A fault of less time is drawn as long as this [s]."""
 
@@ -56,6 +59,8 @@ class Shown:
         self.turn_left_deg, self.turn_right_deg = cones.T
         """(N,): the limits of each vehicle [deg]"""
         self.faults = list(self._faults())
+        changes = Joined | Left | Restarted
+        self._changes = [each for each in run.run_events if isinstance(each, changes)]
 
     @property
     def until_s(self) -> float:
@@ -80,6 +85,17 @@ class Shown:
     def tick_at(self, time_s: float) -> int:
         """Return the index of the tick nearest to a time [s]."""
         return int(np.argmin(np.abs(self.times_s - time_s)))
+
+    def members_at(self, time_s: float) -> NDArray[np.bool_]:
+        """Return who belongs to the fleet at a time [s] (N,): who began with it or joined.
+
+        An agent that left does not, until it is restarted. Rows that are spare never do.
+        """
+        member = np.arange(self.agents) < self.scenario.fleet.agents
+        for event in self._changes:
+            if event.agent is not None and event.t_s <= time_s + SLACK_S:
+                member[event.agent] = not isinstance(event, Left)
+        return member
 
     def _rows(self, each: Sequence[NDArray[Any]], width: int = 0) -> Floats:
         shape = (len(each), self.agents, *([width] if width else []))

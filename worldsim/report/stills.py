@@ -91,9 +91,10 @@ def facts(shown: Shown, row: int) -> list[str]:
     separation = shown.separation[row]
     if not np.isnan(separation).all():
         found.append(f"nearest pair {np.nanmin(separation):.2f} m")
+    members = int(np.count_nonzero(shown.members_at(time_s)))
     running = int(np.count_nonzero(shown.run.ticks[row].alive))
-    if running < shown.agents:
-        found.append(f"{running} of {shown.agents} agents running")
+    if running < members:
+        found.append(f"{running} of {members} agents running")
     kinds = dict.fromkeys(
         fault.kind for fault in shown.faults if fault.from_s <= time_s < fault.to_s
     )
