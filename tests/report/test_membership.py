@@ -1,12 +1,16 @@
 """Agents that join, leave or may join: shown as what they are, and no others counted."""
 
+import numpy as np
 import pytest
 
 import worldsim.results
 from tests.small_scenario import SMALL
 from worldsim.commands.app import command
-from worldsim.report.shown import Shown
-from worldsim.report.stills import facts
+from worldsim.report import style
+from worldsim.report.network import draw_network
+from worldsim.report.shown import ABSENT, DOWN, RUNNING, STARTING, Shown
+from worldsim.report.stills import Stills, facts
+from worldsim.report.views import colours_of, moment_region
 
 CHANGING = (
     SMALL.replace("agents = 2", "agents = 2\nspare = 1").replace("5.0", "6.0")
@@ -47,3 +51,40 @@ def test_a_still_counts_those_who_belong_to_the_fleet_by_then(shown: Shown) -> N
     assert _agents_told(shown, 3.5) == ["2 of 3 agents running"]
     assert _agents_told(shown, 4.5) == []
     assert _agents_told(shown, 5.5) == []  # both who are left run
+
+
+def test_a_newcomer_is_absent_then_starting_then_running(shown: Shown) -> None:
+    newcomer = {time_s: int(shown.states[shown.tick_at(time_s), 2]) for time_s in (2.9, 3.5, 4.5)}
+    assert newcomer == {2.9: ABSENT, 3.5: STARTING, 4.5: RUNNING}
+    assert (shown.states[:, 3] == ABSENT).all()
+    assert shown.states[shown.tick_at(1.2), 1] == DOWN
+    assert shown.states[shown.tick_at(2.0), 1] == STARTING  # it was restarted
+    assert shown.states[-1, 0] == ABSENT  # it left
+    booting = shown.tick_at(3.5)
+    assert colours_of(shown, booting)[2] == style.STARTING
+    assert colours_of(shown, shown.tick_at(1.2))[1] == style.STOPPED
+    assert "1 starting" in facts(shown, booting)
+
+
+def test_a_join_is_marked_on_the_bar_of_a_still(shown: Shown) -> None:
+    stills = Stills(shown)
+    with style.drawing():
+        stills.draw(0, moment_region(shown, 0))
+    _, *marks = stills.figure.axes[-1].patches
+    assert [round(mark.get_x(), 3) for mark in marks] == [1.0, 3.0, 5.0]  # type: ignore[attr-defined]
+    (legend,) = stills.figure.legends
+    assert "process starting" in [text.get_text() for text in legend.get_texts()]
+
+
+def test_the_network_figure_shows_joins_and_no_lane_of_the_absent(shown: Shown) -> None:
+    with style.drawing():
+        figure = draw_network(shown)
+    _, roles, changes = figure.axes
+    assert changes.get_title(loc="left") == "faults and joins"
+    assert [text.get_text() for text in changes.texts] == ["kill", "join", "leave"]
+    lanes = [np.asarray(each.get_facecolor()) for each in roles.collections]
+    assert not lanes[3].any()  # the spare's lane has no colour
+    told = roles.get_legend()
+    assert told is not None
+    assert {"starting", "not running"} <= {text.get_text() for text in told.get_texts()}
+    assert "not in the world" not in {text.get_text() for text in told.get_texts()}

@@ -132,8 +132,8 @@ BEFORE_OBSTACLES = (
         "The team in space",
         "Vehicles in the colour of their queue, with the trails of the last seconds. Rings are the"
         " slots that agents claim, thin grey lines the links between agents that hear each other."
-        " A vehicle without a place is grey, one whose process has stopped is dark. (As in Figs. 9"
-        " and 13 of the paper.)",
+        " A vehicle without a place is grey, one whose process is stopped is dark, one whose"
+        " process is starting is pale. (As in Figs. 9 and 13 of the paper.)",
         draw_moments,
     ),
     _Recipe(
@@ -186,7 +186,8 @@ AFTER_OBSTACLES = (
         "The network and its faults",
         "Above, how many others an agent hears directly, on average, and the strength of the"
         " network, its algebraic connectivity: zero means that the team is parted. Below, the"
-        " role of each agent and the times at which faults were in force.",
+        " role of each agent while its vehicle is in the world, the times at which faults were in"
+        " force, and those from a join until its agents run.",
         network.draw_network,
     ),
 )

@@ -10,14 +10,14 @@ from matplotlib.ticker import MaxNLocator
 
 from worldsim.judge.network_strength import algebraic_connectivity
 from worldsim.judge.tick import Tick
+from worldsim.report import style
 from worldsim.report.curves import mark_times
-from worldsim.report.shown import Fault, Shown
+from worldsim.report.shown import ABSENT, DOWN, STARTING, Fault, Shown
 from worldsim.report.style import (
     ACCENT,
     FAINT,
     INK,
     MUTED,
-    STOPPED,
     UNPLACED,
     new_figure,
     time_axis,
@@ -41,7 +41,12 @@ ROLES = {
     "distress": ("distress", "#e39a8f"),
     "": ("no role yet", "#eceff3"),
 }
-NOT_RUNNING = ("not running", STOPPED)
+IDLE = {
+    DOWN: ("not running", style.STOPPED),
+    STARTING: ("starting", style.STARTING),
+    ABSENT: ("not in the world", "none"),
+}
+"""The words and colour of an agent that does not run."""
 MAX_LANES = 30
 """Of more agents or faults, no lanes are drawn."""
 
@@ -84,11 +89,11 @@ def _rates(shown: Shown) -> tuple[Floats, dict[str, Floats]]:
 
 
 def draw_network(shown: Shown) -> Figure:
-    """Draw the network's strength, each agent's role, and every fault, over time."""
+    """Draw the network's strength, each agent's role, and every fault and join, over time."""
     lanes = shown.agents <= MAX_LANES
-    faults = shown.faults[:MAX_LANES]
+    changes = shown.changes[:MAX_LANES]
     heights = [1.5, *([0.19 * shown.agents + 0.2] if lanes else [])]
-    heights += [0.24 * len(faults) + 0.3] if faults else []
+    heights += [0.24 * len(changes) + 0.3] if changes else []
     figure = new_figure(0.7 + 1.08 * sum(heights))
     panels = figure.subplots(
         len(heights), 1, sharex=True, height_ratios=heights, squeeze=False
@@ -96,8 +101,8 @@ def draw_network(shown: Shown) -> Figure:
     _draw_strength(panels[0], shown)
     if lanes:
         _draw_roles(panels[1], shown)
-    if faults:
-        _draw_faults(panels[-1], shown, faults)
+    if changes:
+        _draw_changes(panels[-1], shown, changes)
     for axes in panels:
         time_axis(axes, shown.until_s)
         axes.label_outer()
@@ -152,11 +157,12 @@ def _draw_strength(axes: Axes, shown: Shown) -> None:
 
 
 def _draw_roles(axes: Axes, shown: Shown) -> None:
-    places, poses = shown.run.places, shown.run.poses
-    shape = (len(shown.times_s), shown.agents)
-    states = np.where(poses["running"], places["role"], "not running").reshape(shape)
-    words = {**ROLES, "not running": NOT_RUNNING}
-    present = [name for name in words if (states == name).any()]
+    states = shown.run.places["role"].reshape(len(shown.times_s), shown.agents).astype(object)
+    for state, (name, _) in IDLE.items():
+        states[shown.states == state] = name
+    words = {**ROLES, **{name: (name, colour) for name, colour in IDLE.values()}}
+    absent = IDLE[ABSENT][0]
+    present = [name for name in words if name != absent and (states == name).any()]
     ends_s = np.append(shown.times_s, shown.until_s)
     for agent, column in enumerate(states.T):
         changes = np.flatnonzero(column[1:] != column[:-1]) + 1
@@ -177,10 +183,10 @@ def _draw_roles(axes: Axes, shown: Shown) -> None:
     )
 
 
-def _draw_faults(axes: Axes, shown: Shown, faults: list[Fault]) -> None:
-    for row, fault in enumerate(faults):
+def _draw_changes(axes: Axes, shown: Shown, changes: list[Fault]) -> None:
+    for row, fault in enumerate(changes):
         length_s = fault.to_s - fault.from_s
-        axes.barh(row, length_s, left=fault.from_s, height=0.7, color="#e6b980", linewidth=0.0)
+        axes.barh(row, length_s, left=fault.from_s, height=0.7, color=fault.colour, linewidth=0.0)
         late = fault.from_s > 0.75 * shown.until_s
         axes.annotate(
             fault.kind,
@@ -193,8 +199,9 @@ def _draw_faults(axes: Axes, shown: Shown, faults: list[Fault]) -> None:
             color=INK,
         )
     axes.set_yticks([])
-    axes.set_ylim(len(faults) - 0.4, -0.6)
+    axes.set_ylim(len(changes) - 0.4, -0.6)
     axes.grid(visible=False, axis="y")
-    more = len(shown.faults) - len(faults)
-    axes.set_title(f"faults{f' (the first {len(faults)}; {more} more)' if more else ''}")
+    more = len(shown.changes) - len(changes)
+    what = "faults" if len(shown.changes) == len(shown.faults) else "faults and joins"
+    axes.set_title(f"{what}{f' (the first {len(changes)}; {more} more)' if more else ''}")
     axes.tick_params(colors=MUTED)

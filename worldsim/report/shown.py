@@ -1,5 +1,6 @@
 """What the figures of a run show, as arrays: rows of ticks, columns of agents."""
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -9,8 +10,9 @@ from numpy.typing import NDArray
 from agent.guidance.cone import cone_of
 from worldsim.judge.event_text import WARNINGS
 from worldsim.judge.phase import Phase
-from worldsim.judge.run_events import Joined, Left, Restarted
+from worldsim.judge.run_events import Joined, Left, LossEvent, Restarted, ReturnEvent
 from worldsim.recording.layout import agent_name
+from worldsim.report.style import FAULT_BAR, JOIN_BAR
 from worldsim.results.run import Run
 from worldsim.truth.obstacles import Obstacles
 from worldsim.truth.vehicle import Floats
@@ -21,12 +23,22 @@ SHORTEST_S = 0.25
 """A fault of less time is drawn as long as this [s]."""
 
 
+JOIN = "join"
+ABSENT, STARTING, DOWN, RUNNING = range(4)
+"""What an agent is: without a vehicle in the world, or its process boots, is stopped, or runs."""
+
+
 class Fault(NamedTuple):
-    """A fault and when it was in force."""
+    """A fault and when it was in force; or a join, until its agents run."""
 
     kind: str
     from_s: float
     to_s: float
+
+    @property
+    def colour(self) -> str:
+        """The colour of its bar."""
+        return JOIN_BAR if self.kind == JOIN else FAULT_BAR
 
 
 class Shown:
@@ -61,6 +73,10 @@ class Shown:
         self.faults = list(self._faults())
         changes = Joined | Left | Restarted
         self._changes = [each for each in run.run_events if isinstance(each, changes)]
+        self.states = self._states()
+        """(T, N): ABSENT, STARTING, DOWN or RUNNING"""
+        self.changes = sorted([*self.faults, *self._joins()], key=lambda each: each.from_s)
+        """Faults and joins, in the order in which they began."""
 
     @property
     def until_s(self) -> float:
@@ -96,6 +112,32 @@ class Shown:
             if event.agent is not None and event.t_s <= time_s + SLACK_S:
                 member[event.agent] = not isinstance(event, Left)
         return member
+
+    def _states(self) -> NDArray[np.int8]:
+        """Return what each agent is at each tick: a process that nothing stopped is starting."""
+        ticks = self.run.ticks
+        down = np.zeros((len(ticks), self.agents), dtype=np.bool_)
+        for event in self.run.run_events:
+            if isinstance(event, LossEvent | ReturnEvent) and event.agent is not None:
+                first = int(np.searchsorted(self.times_s, event.t_s - SLACK_S))
+                down[first:, event.agent] = isinstance(event, LossEvent)
+        alive = np.array([tick.alive for tick in ticks], dtype=np.bool_).reshape(down.shape)
+        present = ~np.isnan(self.position).any(axis=2)
+        chosen = (alive, ~present, down)
+        states: NDArray[np.int8] = np.select(chosen, (RUNNING, ABSENT, DOWN), STARTING)
+        return states.astype(np.int8)
+
+    def _joins(self) -> Iterator[Fault]:
+        """Yield the joins, those of one time as one, each until the last of its agents runs."""
+        joined: dict[float, list[int]] = defaultdict(list)
+        for event in self._changes:
+            if isinstance(event, Joined) and event.agent is not None:
+                joined[event.t_s].append(event.agent)
+        for from_s, agents in joined.items():
+            after = np.flatnonzero(self.times_s >= from_s - SLACK_S)
+            runs = (self.states[after][:, agents] == RUNNING).all(axis=1)
+            to_s = float(self.times_s[after[np.argmax(runs)]]) if runs.any() else self.until_s
+            yield Fault(JOIN, from_s, max(to_s, from_s + SHORTEST_S))
 
     def _rows(self, each: Sequence[NDArray[Any]], width: int = 0) -> Floats:
         shape = (len(each), self.agents, *([width] if width else []))

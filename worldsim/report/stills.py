@@ -7,9 +7,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from worldsim.report import style
 from worldsim.report.figures import moments_s
-from worldsim.report.shown import Shown
-from worldsim.report.style import ACCENT, FAINT, INK, MUTED, STOPPED, UNPLACED, drawing
+from worldsim.report.shown import STARTING, Shown
+from worldsim.report.style import ACCENT, FAINT, INK, MUTED, UNPLACED, drawing
 from worldsim.report.views import (
     FROM_ABOVE,
     FROM_THE_SIDE,
@@ -30,7 +31,6 @@ FLAT = (
 )
 MARKS = 1.5
 """Scale of marks and names in 3D, beside those of a report."""
-FAULT_BAR = "#e6b980"
 
 
 class Stills:
@@ -63,7 +63,9 @@ class Stills:
         phase = shown.phase_at(time_s)
         named = [(queue_colour(k), q.name) for k, q in enumerate(phase.formation.queues)]
         used = named if shown.forms else []
-        states = [*used, (UNPLACED, "no place"), (STOPPED, "process stopped")]
+        states = [*used, (UNPLACED, "no place"), (style.STOPPED, "process stopped")]
+        if (shown.states == STARTING).any():
+            states.append((style.STARTING, "process starting"))
         handles = [
             Line2D([], [], marker="o", linestyle="", color=colour, label=name)
             for colour, name in states
@@ -71,12 +73,12 @@ class Stills:
         figure.legend(handles=handles, loc="lower center", ncols=len(handles), borderpad=0.1)
 
     def _draw_bar(self, row: int) -> None:
-        """Draw how far the run is, with the times of faults and of new formations."""
+        """Draw how far the run is, with the times of faults, joins and new formations."""
         shown = self.shown
         axes = self.figure.add_axes(BAR)
         axes.axvspan(0.0, shown.until_s, color="#eef1f5", linewidth=0.0)
-        for fault in shown.faults:
-            axes.axvspan(fault.from_s, fault.to_s, color=FAULT_BAR, linewidth=0.0)
+        for change in shown.changes:
+            axes.axvspan(change.from_s, change.to_s, color=change.colour, linewidth=0.0)
         for phase in shown.phases[1:]:
             axes.axvline(phase.from_s, color=FAINT, linewidth=2.0)
         axes.axvline(shown.times_s[row], color=ACCENT, linewidth=3.0)
@@ -95,6 +97,8 @@ def facts(shown: Shown, row: int) -> list[str]:
     running = int(np.count_nonzero(shown.run.ticks[row].alive))
     if running < members:
         found.append(f"{running} of {members} agents running")
+    if starting := int(np.count_nonzero(shown.states[row] == STARTING)):
+        found.append(f"{starting} starting")
     kinds = dict.fromkeys(
         fault.kind for fault in shown.faults if fault.from_s <= time_s < fault.to_s
     )

@@ -16,7 +16,8 @@ ACCENT, LIMIT, FAULT = "#0b6e99", "#c0392b", "#fbf1e2"
 """What a figure is about; limits that must be kept; times at which a fault was in force."""
 QUEUES = (ACCENT, "#d9822b", "#5b8c5a", "#a05195", "#c9a227", "#c94f4f", "#5f6caf", "#7a6a58")
 """A colour for each queue; they repeat."""
-UNPLACED, STOPPED, SOLID = "#8a94a3", "#3a3f47", "#b9ada0"
+UNPLACED, STOPPED, STARTING, SOLID = "#8a94a3", "#3a3f47", "#e3c1dd", "#b9ada0"
+FAULT_BAR, JOIN_BAR = "#e6b980", STARTING
 WIDTH_IN = 9.2
 PNG_DPI = 150
 RASTER_DPI = 170

@@ -14,8 +14,9 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from agent.qstructure.formation import Slot
 from worldsim.judge.tick import Tick
-from worldsim.report.shown import Shown
-from worldsim.report.style import FAINT, INK, MUTED, QUEUES, SOLID, STOPPED, UNPLACED
+from worldsim.report import style
+from worldsim.report.shown import DOWN, STARTING, Shown
+from worldsim.report.style import FAINT, INK, MUTED, QUEUES, SOLID, UNPLACED
 from worldsim.truth.vehicle import Floats
 
 CURVE_STEPS = 24
@@ -85,7 +86,7 @@ def draw_moment(axes: Space, shown: Shown, row: int, seen: Region, scale: float 
     for colour, curve in _queue_curves(shown, tick):
         axes.plot(*curve.T, color=colour, linewidth=1.0, alpha=0.55)
     _draw_lines(axes, _link_lines(tick), FAINT, 0.4)
-    colours = _colours(tick)
+    colours = colours_of(shown, row)
     for agent, colour in enumerate(colours):
         axes.plot(*_trail(shown, agent, row, trail_s).T, color=colour, linewidth=0.8, alpha=0.6)
     for point, colour in _slots(shown, tick).values():
@@ -111,7 +112,7 @@ def draw_flat(
     links = LineCollection(flat, colors=FAINT, linewidths=0.5, alpha=0.5)
     links.set_rasterized(len(flat) > MAX_VECTOR_LINES)
     axes.add_collection(links)
-    colours = _colours(tick)
+    colours = colours_of(shown, row)
     for agent, colour in enumerate(colours):
         trail = _trail(shown, agent, row, trail_s)[:, keep]
         axes.plot(*trail.T, color=colour, linewidth=0.9, alpha=0.65)
@@ -141,11 +142,16 @@ def _name_flat(axes: Axes, shown: Shown, place: Floats) -> None:
         axes.annotate(text, at, (5, 4), textcoords="offset points", fontsize=7.0, color=INK)
 
 
-def _colours(tick: Tick) -> list[str]:
-    """Return the colour of each vehicle: its queue's; others without a place, or stopped."""
-    found = [queue_colour(queue) for queue in tick.place[:, 0].tolist()]
+def colours_of(shown: Shown, row: int) -> list[str]:
+    """Return the colour of each vehicle at a tick.
+
+    It is its queue's; others are for one without a place, and for one whose process is stopped or
+    starting.
+    """
+    queues, states = shown.run.ticks[row].place[:, 0].tolist(), shown.states[row].tolist()
+    idle = {DOWN: style.STOPPED, STARTING: style.STARTING}
     return [
-        colour if runs else STOPPED for colour, runs in zip(found, tick.alive.tolist(), strict=True)
+        idle.get(state, queue_colour(queue)) for queue, state in zip(queues, states, strict=True)
     ]
 
 
