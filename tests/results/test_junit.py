@@ -155,3 +155,16 @@ def test_a_file_that_cannot_be_written_or_is_something_else_is_refused(
         with pytest.raises(RunDirectoryError):
             refuse(tmp_path / name)
     assert (tmp_path / "scenario.toml").read_text() == 'name = "mine"'
+
+
+def test_nothing_passes_in_a_run_that_ended_before_it_flew(tmp_path: Path) -> None:
+    scenario = parse(SMALL)
+    flight = fly(scenario, should_stop=lambda: True)
+    summary = summarise(scenario, finished(flight, scenario))
+    assert (summary["duration_s"], summary["trace_sha256"]) == (0.0, None)
+    root = written(tmp_path, run(summary))
+    found = findings(root)
+    assert found.pop("outcome") == ("error", "interrupted after 0.0 s")
+    assert {tag for tag, _ in found.values()} == {"skipped"}
+    tests, *_ = counts(root)
+    assert tests == str(1 + len(found))

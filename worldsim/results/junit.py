@@ -1,7 +1,8 @@
 """A JUnit file of runs: for each run a case for its outcome, each expectation and each invariant.
 
 A run that is not judged must not look like one that passed, so the case of its outcome is an error.
-What such a run missed, and what it could not test, is skipped: it says nothing of the fleet.
+What such a run missed, and what it could not test, is skipped: it says nothing of the fleet. So is
+all that a run met that ended before it flew.
 """
 
 import os
@@ -143,15 +144,20 @@ def _outcome(run: Made) -> _Finding | None:
 def _cases(summary: Summary) -> Iterator[tuple[str, _Finding | None]]:
     """Yield each expectation and each invariant, by a name of its own in the run."""
     conclusive = summary["outcome"] != "inconclusive"
+    met = (
+        None
+        if summary["duration_s"] > 0.0
+        else _Finding("skipped", "not judged: nothing was flown")
+    )
     rows = summary["expectations"]
     seen: Counter[str] = Counter()
     for row, text in zip(rows, expectation_texts(rows, circumstances(summary)), strict=True):
         seen[row["name"]] += 1
         count = seen[row["name"]]
         name = row["name"] if count == 1 else f"{row['name']} ({count})"
-        yield name, _of_expectation(row, text, conclusive=conclusive)
+        yield name, _of_expectation(row, text, conclusive=conclusive) or met
     for name, tally in summary["invariants"].items():
-        yield f"invariant {name}", _of_invariant(name, tally, conclusive=conclusive)
+        yield f"invariant {name}", _of_invariant(name, tally, conclusive=conclusive) or met
 
 
 def _of_expectation(row: ExpectationRow, text: str, *, conclusive: bool) -> _Finding | None:

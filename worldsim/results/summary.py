@@ -240,11 +240,17 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "real_time_factor": run.real_time_factor,
         "overload": run.overload,
         "resources": run.resources,
-        "trace_sha256": None if run.mode == "processes" else run.loop.trace.sha256,
+        "trace_sha256": _trace_sha256(run),
         **provenance(),
     }
     plain: Summary = _finite(summary)
     return plain
+
+
+def _trace_sha256(run: FinishedRun) -> str | None:
+    """Return the hash of a trace; None where no slot was flown: it would be that of nothing."""
+    repeatable = run.mode != "processes"
+    return run.loop.trace.sha256 if repeatable and run.loop.world.slot > 0 else None
 
 
 def _fault_rows(run: FinishedRun) -> list[FaultRow]:
