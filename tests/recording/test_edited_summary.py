@@ -5,6 +5,7 @@ A bad recording, of any kind, never ends the process that reads it.
 
 import json
 import random
+import shutil
 from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import replace
@@ -19,6 +20,7 @@ from worldsim.campaign.pool import Job, simulate
 from worldsim.recording.comparison import ADDED_LATER, COUNTS, SCHEMA, UNRECORDED, is_idle
 from worldsim.recording.verify import Verification, compared, judged_again, verify
 from worldsim.results.fault_rows import idle_text
+from worldsim.results.verdict_text import verified
 from worldsim.scenario.file import parse
 
 SCENARIO = """
@@ -277,3 +279,61 @@ def test_a_failure_that_the_recording_does_not_show_is_no_pass(
     summary = json.loads((run / "summary.json").read_text()) | {"outcome": "fail"}
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     assert compared(judged, tmp_path / "summary.json").exit_status == 3
+
+
+@pytest.fixture
+def copied(run: Path, tmp_path: Path) -> Path:
+    """A copy of the run to edit."""
+    return Path(shutil.copytree(run, tmp_path / "copied"))
+
+
+def edit(file: Path, before: str, after: str) -> None:
+    text = file.read_text()
+    assert before in text
+    file.write_text(text.replace(before, after, 1))
+
+
+def differing(folder: Path) -> list[tuple[str, Any, Any]]:
+    found = verify(folder)
+    assert not found.differences
+    assert found.exit_status == (3 if found.file_differences else 0)
+    return [(each.key, each.summary, each.recording) for each in found.file_differences]
+
+
+def test_an_edited_scenario_is_named(copied: Path) -> None:
+    assert differing(copied) == []
+    edit(copied / "scenario.toml", "agents = 3", "agents = 4")
+    assert differing(copied) == [("fleet.agents", 4, 3)]
+    verification = verify(copied)
+    assert verification.inconclusive == "scenario.toml differs in fleet.agents"
+    told = verified(verification)
+    assert "  DIFFERS  fleet.agents: 4 in scenario.toml, 3 in the recording" in told.splitlines()
+    (copied / "scenario.toml").write_text("[")
+    ((key, why, _),) = differing(copied)
+    assert key == "all of it"
+    assert why.startswith("not readable (")
+    (copied / "scenario.toml").unlink()
+    assert differing(copied) == []
+
+
+def test_an_edited_event_is_named(copied: Path) -> None:
+    events = copied / "events.jsonl"
+    lines = events.read_text().splitlines(keepends=True)
+    assert any('"kill"' in line for line in lines)
+    events.write_text("".join(line for line in lines if '"kill"' not in line))
+    assert differing(copied) == [("kill of a2 at 2 s", 0, 1)]
+    events.write_text("".join([*lines, lines[0], "[1\n"]))
+    twice = json.loads(lines[0])
+    name = f"{twice['kind']} of a{twice['agent']} at {twice['t_s']:g} s"
+    assert differing(copied) == [
+        (f"line {len(lines) + 1 + 1}", "not readable", "readable"),
+        (name, 2, 1),
+    ]
+
+
+def test_events_lost_on_a_full_disk_are_no_difference(copied: Path) -> None:
+    edit(copied / "summary.json", '"reason": null', '"reason": "results were lost: disk"')
+    edit(copied / "summary.json", '"outcome": "pass"', '"outcome": "inconclusive"')
+    (copied / "events.jsonl").write_text("")
+    found = verify(copied)
+    assert (found.differences, found.file_differences) == ((), ())

@@ -15,7 +15,8 @@ commands = typer.Typer()
 def verify(run: RunFolder) -> int:
     """Recompute the verdict of a run from its recording alone.
 
-    The figures are compared with summary.json; any difference is printed. A run that has not
+    The figures are compared with summary.json, scenario.toml and events.jsonl with the recording;
+    any difference is printed. A run that has not
     finished, that proves nothing, is damaged, or differs is inconclusive: exit status 3.
     """
     from worldsim.recording.verify import verify as verify_run

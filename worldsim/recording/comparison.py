@@ -61,11 +61,12 @@ TIME_SLACK_S = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A figure of which summary and recording give different values."""
+    """A figure of which a file of the run, summary.json first of all, and recording differ."""
 
     key: str  # the path in summary.json, joined by dots
     summary: Any
     recording: Any
+    file: str = "summary.json"
 
 
 class Shown(NamedTuple):
@@ -99,7 +100,7 @@ def differences(summary: Any, shown: Shown) -> Iterator[Difference]:
         if key == "faults":
             operated = shown.figures["mode"] != "virtual"
             summarised = _comparable(summarised, recorded, operated)
-        yield from _unequal(key, summarised, recorded, shown.exact)
+        yield from unequal(key, summarised, recorded, shown.exact)
     outcome = value_at(summary, "outcome")
     if not _may_be(outcome, summary, shown):
         yield Difference("outcome", outcome, shown.outcome)
@@ -112,7 +113,7 @@ def differences_in_part(summary: Any, shown: Shown, longest_s: float) -> Iterato
     """
     yield from _form_differences(summary, shown)
     for key in FIXED:
-        yield from _unequal(key, value_at(summary, key), shown.figures[key], shown.exact)
+        yield from unequal(key, value_at(summary, key), shown.figures[key], shown.exact)
     duration_s = value_at(summary, "duration_s")
     if not _is_number(duration_s) or not shown.until_s <= duration_s + TIME_SLACK_S <= (
         longest_s + 2 * TIME_SLACK_S
@@ -202,7 +203,7 @@ def _faults_over(faults: Any, shown: Shown) -> Iterator[Difference]:
     if isinstance(faults, list):
         named = [each for each in faults if isinstance(each, dict)]
         faults = [each for each in named if str(each.get("number")) in over]
-    yield from _unequal("faults", _comparable(faults, over, operated=False), over, shown.exact)
+    yield from unequal("faults", _comparable(faults, over, operated=False), over, shown.exact)
 
 
 def _comparable_packets(
@@ -238,7 +239,7 @@ def _comparable(faults: Any, recorded: dict[str, Any], operated: bool) -> Any:
     return found
 
 
-def _unequal(key: str, summarised: Any, recorded: Any, exact: bool) -> Iterator[Difference]:
+def unequal(key: str, summarised: Any, recorded: Any, exact: bool) -> Iterator[Difference]:
     """Yield the differences of two values and of all that they hold."""
     if summarised == ABSENT and not exact and key.rpartition(".")[2] in ADDED_LATER:
         return
@@ -250,7 +251,7 @@ def _unequal(key: str, summarised: Any, recorded: Any, exact: bool) -> Iterator[
         return
     for name in dict.fromkeys((*after, *(before or {}))):
         inner, shown = (before or {}).get(name, ABSENT), after.get(name, ABSENT)
-        yield from _unequal(f"{key}.{name}", inner, shown, exact)
+        yield from unequal(f"{key}.{name}", inner, shown, exact)
 
 
 def _items(value: Any) -> dict[str, Any] | None:

@@ -33,6 +33,7 @@ from worldsim.recording.isolated_reader import read_run_apart
 from worldsim.recording.layout import RECORDING_FILE, SUMMARY_FILE
 from worldsim.recording.readback import DamagedError, Readback, RecordingError
 from worldsim.recording.rejudged import in_order, rejudge
+from worldsim.recording.run_files import file_differences
 
 Figure = float | None
 HELD, NOT_HELD, UNREADABLE, INCONCLUSIVE = 0, 1, 2, 3
@@ -104,6 +105,8 @@ class Verification:
     differences: tuple[Difference, ...] = ()
     contradictions: tuple[str, ...] = ()
     """Where the summary contradicts itself, in words."""
+    file_differences: tuple[Difference, ...] = ()
+    """Where scenario.toml or events.jsonl differs."""
 
     @property
     def whole(self) -> bool:
@@ -127,16 +130,16 @@ class Verification:
         A summary that is not true comes first: then its own reason is in doubt, too.
         """
         if self.differences:
-            keys = ", ".join(each.key for each in self.differences[:MAX_NAMED])
-            more = f" and {len(self.differences) - MAX_NAMED} more"
-            return f"{SUMMARY_FILE} differs in {keys}{more * (len(self.differences) > MAX_NAMED)}"
+            return _differing(self.differences)
         if self.contradictions:
             return f"{SUMMARY_FILE} contradicts itself: {self.contradictions[0]}"
+        if self.file_differences:
+            return _differing(self.file_differences)
         return self.doubt or self.cut
 
     @property
     def held(self) -> bool:
-        """Whether the recorded run passes, and no figure differs from the summary's."""
+        """Whether the recorded run passes, and no file of it differs from its recording."""
         return self.problem is None and self.inconclusive is None and self.passes
 
     @property
@@ -155,7 +158,12 @@ def verify(run: Path) -> Verification:
     if not recording.is_file() and any(run.glob("*/scenario.toml")):
         return Verification(run, problem=f"{run}: a folder of many runs; name one of them")
     try:
-        return compared(judged_again(run, recording), recording.with_name(SUMMARY_FILE))
+        readback = read_run_apart(recording)
+        judged = verification_of(run, readback, rejudge(readback).judge)
+        judged = compared(judged, recording.with_name(SUMMARY_FILE))
+        summary = _read(recording.with_name(SUMMARY_FILE)) if judged.summary else None
+        found = file_differences(recording.parent, readback, summary)
+        return replace(judged, file_differences=tuple(found))
     except DamagedError as error:
         return Verification(run, problem=f"inconclusive: {_one_line(str(error))}", damaged=True)
     except RecordingError as error:
@@ -274,7 +282,7 @@ def compared(judged: Verification, file: Path) -> Verification:
         doubt = f"no {SUMMARY_FILE}: the run has not finished, or was ended by force"
         return replace(judged, doubt=doubt)
     try:
-        summary = json.loads(file.read_text("utf-8"))
+        summary = _read(file)
     except (OSError, ValueError, RecursionError) as error:
         return replace(judged, doubt=f"{SUMMARY_FILE} cannot be read: {error}")
     shown = _shown(judged)
@@ -292,6 +300,10 @@ def compared(judged: Verification, file: Path) -> Verification:
         differences=tuple(found),
         contradictions=tuple(contradictions(summary, shown, judged.idle_faults)),
     )
+
+
+def _read(summary: Path) -> Any:
+    return json.loads(summary.read_text("utf-8"))
 
 
 def _shown(judged: Verification) -> Shown | None:
@@ -326,6 +338,14 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list):
         return [_finite(inner) for inner in value]
     return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def _differing(differences: tuple[Difference, ...]) -> str:
+    """Return which file differs in which figures: those of the first file."""
+    file = differences[0].file
+    keys = [each.key for each in differences if each.file == file]
+    more = f" and {len(keys) - MAX_NAMED} more" if len(keys) > MAX_NAMED else ""
+    return f"{file} differs in {', '.join(keys[:MAX_NAMED])}{more}"
 
 
 def _one_line(text: str) -> str:

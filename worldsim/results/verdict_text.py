@@ -21,6 +21,7 @@ from worldsim.results.overall import Overall, Row, ScenarioRow
 from worldsim.results.summary import INVARIANT_WORDS, DeliveryRow, InvariantRow, Summary
 
 if TYPE_CHECKING:
+    from worldsim.recording.comparison import Difference
     from worldsim.recording.verify import Verification
 
 MODE_WORDS = {"processes": "processes", "lockstep": "lockstep", "virtual": "virtual time"}
@@ -117,16 +118,21 @@ def verified(verification: "Verification") -> str:
 
 def _agreement(verification: "Verification") -> list[str]:
     """Return where summary.json differs, or contradicts itself, or else how far it agrees."""
+    others = [_differing(each) for each in verification.file_differences]
     if not verification.summary:
-        return [f"  no {SUMMARY_FILE} to compare with"]
-    wrong = [
-        f"  DIFFERS  {each.key}: {each.summary} in summary.json, {each.recording} in the recording"
-        for each in verification.differences
-    ] + [f"  CONTRADICTS  {SUMMARY_FILE}: {each}" for each in verification.contradictions]
+        return [f"  no {SUMMARY_FILE} to compare with", *others]
+    wrong = [_differing(each) for each in verification.differences] + others
+    wrong += [f"  CONTRADICTS  {SUMMARY_FILE}: {each}" for each in verification.contradictions]
     if verification.uncompared is None:
         return wrong or [f"  {SUMMARY_FILE} agrees"]
     rest = "" if wrong else "; what does not depend on its length agrees"
     return [*wrong, f"  {SUMMARY_FILE} not compared: {verification.uncompared}{rest}"]
+
+
+def _differing(each: "Difference") -> str:
+    return (
+        f"  DIFFERS  {each.key}: {each.summary} in {each.file}, {each.recording} in the recording"
+    )
 
 
 def _verified_outcome(verification: "Verification") -> str:
