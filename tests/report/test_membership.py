@@ -1,5 +1,7 @@
 """Agents that join, leave or may join: shown as what they are, and no others counted."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,9 @@ import worldsim.results
 from tests.small_scenario import SMALL
 from worldsim.commands.app import command
 from worldsim.report import style
+from worldsim.report.figures import moments_s
 from worldsim.report.network import draw_network
-from worldsim.report.shown import ABSENT, DOWN, RUNNING, STARTING, Shown
+from worldsim.report.shown import ABSENT, DOWN, RUNNING, STARTING, Fault, Shown
 from worldsim.report.stills import Stills, facts
 from worldsim.report.views import colours_of, moment_region
 
@@ -88,3 +91,22 @@ def test_the_network_figure_shows_joins_and_no_lane_of_the_absent(shown: Shown) 
     assert told is not None
     assert {"starting", "not running"} <= {text.get_text() for text in told.get_texts()}
     assert "not in the world" not in {text.get_text() for text in told.get_texts()}
+
+
+def test_snapshots_show_every_fault_and_join_of_a_few(shown: Shown) -> None:
+    times_s = moments_s(shown)
+    assert times_s == sorted(set(times_s))
+    assert len(times_s) <= 9
+    for change in shown.changes:
+        assert any(change.from_s < time_s < change.to_s for time_s in times_s), change
+
+
+def test_snapshots_of_many_faults_are_spread_over_them(
+    shown: Shown, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    many = [Fault("jam", 0.1 * k, 0.1 * k + 0.09) for k in range(1, 58)]
+    monkeypatch.setattr(shown, "changes", many)
+    times_s = moments_s(shown)
+    assert len(times_s) == 9
+    gaps = [after - before for before, after in pairwise(times_s)]
+    assert max(gaps) < 0.3 * shown.until_s

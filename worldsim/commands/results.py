@@ -139,7 +139,7 @@ def picture(
         typer.Option(
             metavar="T,T,...",
             help="Simulated times [s].",
-            show_default="start, convergence, changes, faults, end",
+            show_default="up to 9: start, convergence, changes, faults, joins, end",
         ),
     ] = None,
     out: Annotated[

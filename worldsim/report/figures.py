@@ -1,6 +1,6 @@
 """The figures of a report: which there are, their captions, and how they are drawn."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -8,10 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from worldsim.report import curves, network, views
-from worldsim.report.shown import Shown
+from worldsim.report.shown import Fault, Shown
 from worldsim.report.style import drawing, new_figure, png_of, svg_of
 
-MOMENTS = 6
+MOMENTS, MAX_MOMENTS = 6, 9
+"""So many snapshots there are; where more goes on, up to the greater number."""
 COLUMNS = 3
 AFTER_S = 1.0
 """So long after a new formation or a fault's end, its effect is shown [s]."""
@@ -47,22 +48,26 @@ def drawn_figures(shown: Shown, progress: Callable[[str], None]) -> Iterator[Dra
 
 
 def moments_s(shown: Shown) -> list[float]:
-    """Return the times of the snapshots [s]: start, convergence, changes, end, and in between."""
-    chosen = {0.0, shown.until_s}
-    wanted = [
+    """Return the times of the snapshots [s], at most MAX_MOMENTS, spread over what goes on.
+
+    They are the start, the end, formations (soon after each is asked for, and when it stands), and
+    times amid faults and joins; then what is left when faults are over; then times in between.
+    """
+    chosen, inside = {0.0, shown.until_s}, _Inside(shown.until_s)
+    formed = inside.of(
         time_s
         for phase in shown.phases
         for time_s in (
             phase.from_s + AFTER_S if phase.from_s > 0.0 else 0.0,
-            None if phase.converge_s is None else phase.from_s + phase.converge_s,
+            0.0 if phase.converge_s is None else phase.from_s + phase.converge_s,
         )
-        if time_s is not None
-    ]
-    wanted += [0.5 * (fault.from_s + fault.to_s) for fault in shown.faults]
-    wanted += [fault.to_s + AFTER_S for fault in shown.faults]
-    for time_s in wanted:
-        if len(chosen) < MOMENTS and 0.0 < time_s < shown.until_s:
-            chosen.add(time_s)
+    )
+    struck = _amid(shown.changes, inside)
+    room = MAX_MOMENTS - len(chosen)
+    chosen.update(_spread(formed, max(room // 2, room - len(struck))))
+    chosen.update(struck[: MAX_MOMENTS - len(chosen)])
+    after = inside.of(fault.to_s + AFTER_S for fault in shown.faults)
+    chosen.update(_spread(after, MOMENTS - len(chosen)))
     first = shown.phases[0].converge_s
     if first is not None and len(chosen) < MOMENTS:
         chosen.add(0.5 * first)
@@ -72,6 +77,48 @@ def moments_s(shown: Shown) -> list[float]:
         widest = int(np.argmax(gaps))
         chosen.add(ordered[widest] + 0.5 * gaps[widest])
     return sorted(chosen)
+
+
+class _Inside(NamedTuple):
+    """What lies between start and end."""
+
+    until_s: float
+
+    def of(self, times_s: Iterable[float]) -> list[float]:
+        """Return the times between start and end, each once, in order [s]."""
+        return sorted({time_s for time_s in times_s if 0.0 < time_s < self.until_s})
+
+
+def _amid(changes: Sequence[Fault], inside: _Inside) -> list[float]:
+    """Return times amid faults and joins [s], those first that show the most not shown before.
+
+    Of those that show as many, the one comes first that is farthest from the others.
+    """
+    middles = inside.of(0.5 * (each.from_s + each.to_s) for each in changes)
+    left, found = list(changes), list[float]()
+    while left and middles and len(found) < MAX_MOMENTS:
+        others = (0.0, inside.until_s, *found)
+        best = max(
+            middles,
+            key=lambda time_s: (
+                sum(each.from_s < time_s < each.to_s for each in left),
+                min(abs(time_s - other) for other in others),
+            ),
+        )
+        rest = [each for each in left if not each.from_s < best < each.to_s]
+        if len(rest) == len(left):
+            break
+        left = rest
+        found.append(best)
+    return found
+
+
+def _spread(times_s: Sequence[float], room: int) -> list[float]:
+    """Return as many of some times as there is room for, from the first to the last [s]."""
+    if len(times_s) <= room:
+        return list(times_s)
+    picked = np.linspace(0, len(times_s) - 1, max(room, 0)).round().astype(int)
+    return [times_s[index] for index in picked.tolist()]
 
 
 def draw_moments(shown: Shown) -> Figure:
