@@ -1,7 +1,9 @@
 """Agents that join, leave or may join: shown as what they are, and no others counted."""
 
+from io import BytesIO
 from itertools import pairwise
 
+import matplotlib.image
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ import worldsim.results
 from tests.small_scenario import SMALL
 from worldsim.commands.app import command
 from worldsim.report import style
-from worldsim.report.figures import moments_s
+from worldsim.report.figures import draw_moments, moments_s
 from worldsim.report.network import draw_network
 from worldsim.report.shown import ABSENT, DOWN, RUNNING, STARTING, Fault, Shown
 from worldsim.report.stills import Stills, facts
@@ -110,3 +112,12 @@ def test_snapshots_of_many_faults_are_spread_over_them(
     assert len(times_s) == 9
     gaps = [after - before for before, after in pairwise(times_s)]
     assert max(gaps) < 0.3 * shown.until_s
+
+
+def test_labels_of_snapshots_are_inside_the_figure(shown: Shown) -> None:
+    with style.drawing():
+        figure = draw_moments(shown)
+        png = style.png_of(figure)
+    darkest = matplotlib.image.imread(BytesIO(png))[..., :3].min(axis=(0, 2))
+    assert darkest[-8:].min() == 1.0  # nothing is cut off at the right edge
+    assert not any(axes.patch.get_visible() for axes in figure.axes)  # nor by the next column

@@ -16,6 +16,8 @@ MOMENTS, MAX_MOMENTS = 6, 9
 COLUMNS = 3
 AFTER_S = 1.0
 """So long after a new formation or a fault's end, its effect is shown [s]."""
+RIGHT_END = 0.97
+"""Snapshots take so much of the width: labels of axes in 3D are not counted in their layout."""
 MAX_WIDE = 1.8
 """A flight that is wider than so many times its breadth is drawn with one view below the other."""
 
@@ -126,6 +128,9 @@ def draw_moments(shown: Shown) -> Figure:
     times_s = moments_s(shown)
     lines, forms = -(-len(times_s) // COLUMNS), shown.forms
     figure = new_figure(3.05 * lines)
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.set(rect=(0.0, 0.0, RIGHT_END, 1.0))  # type: ignore[call-arg]
     rows = [shown.tick_at(time_s) for time_s in times_s]
     regions = [views.moment_region(shown, row) for row in rows]
     size = np.max([region.size for region in regions], axis=0)

@@ -229,6 +229,7 @@ def _frame(axes: Space, region: Region) -> None:
         zlim=(region.low[2], region.high[2]),
     )
     axes.set_box_aspect(region.size.tolist(), zoom=0.92)
+    axes.patch.set_visible(False)  # it would hide the label of the axes to the left
     axes.view_init(elev=ELEVATION_DEG, azim=AZIMUTH_DEG)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_pane_color("#f7f8fa")
