@@ -15,7 +15,7 @@ from worldsim.report.figures import draw_moments, moments_s
 from worldsim.report.network import draw_network
 from worldsim.report.shown import ABSENT, DOWN, RUNNING, STARTING, Fault, Shown
 from worldsim.report.stills import Stills, facts
-from worldsim.report.views import colours_of, moment_region
+from worldsim.report.views import colours_of, link_lines, moment_region
 
 CHANGING = (
     SMALL.replace("agents = 2", "agents = 2\nspare = 1").replace("5.0", "6.0")
@@ -121,3 +121,15 @@ def test_labels_of_snapshots_are_inside_the_figure(shown: Shown) -> None:
     darkest = matplotlib.image.imread(BytesIO(png))[..., :3].min(axis=(0, 2))
     assert darkest[-8:].min() == 1.0  # nothing is cut off at the right edge
     assert not any(axes.patch.get_visible() for axes in figure.axes)  # nor by the next column
+
+
+def test_links_of_a_large_team_are_left_out_and_it_is_said(
+    shown: Shown, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = shown.tick_at(0.8)
+    assert link_lines(shown, shown.run.ticks[row])
+    assert not any("links" in fact for fact in facts(shown, row))
+    monkeypatch.setattr(shown, "agents", 31)
+    assert link_lines(shown, shown.run.ticks[row]) == []
+    told = [fact for fact in facts(shown, row) if "links" in fact]
+    assert told == ["links not drawn (more than 30 agents)"]

@@ -183,7 +183,8 @@ BEFORE_OBSTACLES = (
         "snapshots",
         "The team in space",
         "Vehicles in the colour of their queue, with the trails of the last seconds. Rings are the"
-        " slots that agents claim, thin grey lines the links between agents that hear each other."
+        " slots that agents claim, thin grey lines the links between agents that hear each other"
+        f" (not drawn of more than {views.MAX_LINKED} agents)."
         " A vehicle without a place is grey, one whose process is stopped is dark, one whose"
         " process is starting is pale. (As in Figs. 9 and 13 of the paper.)",
         draw_moments,

@@ -14,6 +14,7 @@ from worldsim.report.style import ACCENT, FAINT, INK, MUTED, UNPLACED, drawing
 from worldsim.report.views import (
     FROM_ABOVE,
     FROM_THE_SIDE,
+    MAX_LINKED,
     Region,
     Space,
     draw_flat,
@@ -102,6 +103,8 @@ def facts(shown: Shown, row: int) -> list[str]:
     kinds = dict.fromkeys(
         fault.kind for fault in shown.faults if fault.from_s <= time_s < fault.to_s
     )
+    if shown.agents > MAX_LINKED:
+        found.append(f"links not drawn (more than {MAX_LINKED} agents)")
     return found + ([f"in force: {', '.join(kinds)}"] if kinds else [])
 
 

@@ -25,6 +25,8 @@ ELEVATION_DEG, AZIMUTH_DEG = 24.0, -58.0
 LEAST_SIZE_M = 2.0
 MAX_NAMED = 20
 """With more agents, vehicles have no names."""
+MAX_LINKED = 30
+"""Of more agents, no links are drawn."""
 TRAIL_S = 6.0
 """A trail shows so much of the past [s]."""
 MAX_TRAIL_POINTS = 160
@@ -85,7 +87,7 @@ def draw_moment(axes: Space, shown: Shown, row: int, seen: Region, scale: float 
     _draw_solids(axes, shown, tick.time_s, seen)
     for colour, curve in _queue_curves(shown, tick):
         axes.plot(*curve.T, color=colour, linewidth=1.0, alpha=0.55)
-    _draw_lines(axes, _link_lines(tick), FAINT, 0.4)
+    _draw_lines(axes, link_lines(shown, tick), FAINT, 0.4)
     colours = colours_of(shown, row)
     for agent, colour in enumerate(colours):
         axes.plot(*_trail(shown, agent, row, trail_s).T, color=colour, linewidth=0.8, alpha=0.6)
@@ -108,7 +110,7 @@ def draw_flat(
         _draw_outlines(axes, shown, tick.time_s)
     for colour, curve in _queue_curves(shown, tick):
         axes.plot(*curve[:, keep].T, color=colour, linewidth=1.2, alpha=0.5)
-    flat = [line[:, keep] for line in _link_lines(tick)]
+    flat = [line[:, keep] for line in link_lines(shown, tick)]
     links = LineCollection(flat, colors=FAINT, linewidths=0.5, alpha=0.5)
     links.set_rasterized(len(flat) > MAX_VECTOR_LINES)
     axes.add_collection(links)
@@ -188,7 +190,13 @@ def _queue_curves(shown: Shown, tick: Tick) -> list[tuple[str, Floats]]:
     return found
 
 
-def _link_lines(tick: Tick) -> list[Floats]:
+def link_lines(shown: Shown, tick: Tick) -> list[Floats]:
+    """Return the links to draw, each as (2, 3) [m; world frame]; none of a large team.
+
+    There they would be a grey mass that hides the team.
+    """
+    if shown.agents > MAX_LINKED:
+        return []
     pairs = sorted({(min(pair), max(pair)) for pair in tick.links.tolist()})
     lines = [tick.position[list(pair)] for pair in pairs]
     return [line for line in lines if not np.isnan(line).any()]
