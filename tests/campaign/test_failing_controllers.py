@@ -213,3 +213,14 @@ def test_a_module_that_cannot_be_imported_is_bad_input(
     (shown,) = ended.err.splitlines()
     assert shown.startswith(f"{small}: control.controller: '{name}:Own'")
     assert IMPORTS[line] in shown
+
+
+@pytest.mark.usefixtures("small")
+def test_what_a_process_holds_before_it_flies_does_not_count(
+    monkeypatch: pytest.MonkeyPatch,
+    qswarm: Command,  # noqa: F811
+) -> None:
+    monkeypatch.setattr(flight, "MEMORY_B", 300 * 1024**2)
+    held = bytearray(400 * 1024**2)
+    assert qswarm(*flown("Hovers", "--no-recording")).status == 0
+    assert len(held) > flight.MEMORY_B

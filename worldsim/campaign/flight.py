@@ -11,6 +11,7 @@ import signal
 import sys
 import traceback
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from agent.checked_controller import described
@@ -127,10 +128,23 @@ def _traceback_of(error: BaseException) -> str:
 
 
 def _limit_memory() -> None:
-    """Let an allocation beyond MEMORY_B raise MemoryError, where the limit is not lower."""
+    """Let an allocation of MEMORY_B raise MemoryError, where the limit is not lower.
+
+    What the process that flies holds from the start does not count.
+    """
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    if hard == resource.RLIM_INFINITY or hard > MEMORY_B:
-        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_B, hard))
+    most_b = _data_b() + MEMORY_B
+    if hard == resource.RLIM_INFINITY or hard > most_b:
+        resource.setrlimit(resource.RLIMIT_DATA, (most_b, hard))
+
+
+def _data_b() -> int:
+    """Return the size of what RLIMIT_DATA counts of this process [bytes]; 0 where it is unknown."""
+    try:
+        pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[5]
+    except OSError:
+        return 0
+    return int(pages) * resource.getpagesize()
 
 
 def _lift_memory_limit() -> None:
