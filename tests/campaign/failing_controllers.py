@@ -222,6 +222,12 @@ class Breaks(Once):
         print("agent", self.agent, answer)
 
 
+class TakesSome(Hovers):
+    def decide(self, senses: Senses) -> Intent:
+        assert len(bytearray(100 * 1024**2)) > 0
+        return super().decide(senses)
+
+
 class Prints(Hovers):
     def decide(self, senses: Senses) -> Intent:
         print("x" * 100_000)
