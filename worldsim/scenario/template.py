@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import msgspec
 from msgspec import NODEFAULT, inspect
 
+from agent.config import Control
 from worldsim.scenario.allowed_values import allowed_by
 from worldsim.scenario.decoding import decode
 from worldsim.scenario.events import Name
@@ -49,7 +50,6 @@ EXAMPLES: Given = {
     "agent.ids": [0],
     "agent.vehicle.max_speed_mps": 0.3,
     "control.cast_far_m": 0.5,
-    "control.command": ["./my_controller", "--gain", "2"],
     "event.at_s": 10.0,
     "event.kill": [4],
     "expect.reform_within_s": 10.0,
@@ -90,8 +90,11 @@ EXAMPLES: Given = {
     "vehicle.max_turn_left_deg": 45.0,
     "vehicle.max_turn_right_deg": 45.0,
 }
+OF_OWN_CONTROLLERS = ("command", "parameters")
+"""Keys of [control] that the template's controller does not take; see docs/controllers.md."""
 BRIEF: Mapping[str, tuple[str, ...]] = {
     "agent.vehicle": ("max_speed_mps",),
+    "control": tuple(key for key in Control.__struct_fields__ if key not in OF_OWN_CONTROLLERS),
     "event": ("at_s", "kill"),
     "formation.queue.orientation": ("yaw_deg",),
     "frame": ("waypoints_m", "start_s", "pauses_s", "yaw", "yaw_deg", "turn_dps"),
