@@ -51,6 +51,8 @@ class Child:
         self._errors_open = True
         self._owed = 0
         """Answers that have not come."""
+        self.answered = 0
+        """Answers that have come, the late ones too."""
         try:
             self._process = subprocess.Popen(
                 [sys.executable, "-I", "-S", "-c", _DIES_WITH_PARENT, str(os.getpid()), *command],
@@ -107,6 +109,7 @@ class Child:
                 return None
         line, self._output = self._output[:end], self._output[end + 1 :]
         self._owed -= 1
+        self.answered += 1
         return line
 
     def _end_of_line(self) -> int:

@@ -36,8 +36,10 @@ class CommandController:
         self._within_s = SHARE_OF_TICK / setup.tick_hz if self._real_time else ANSWER_WITHIN_S
         self._lines = SensesLines(setup.team)
         self._missed = 0
-        self._silent_from_s: float | None = None
-        """Since when the child owes an answer; None while it answers."""
+        self._answered = 0
+        """How many answers had come when one was last missed."""
+        self._silent_from_s = 0.0
+        """Since when no answer has come."""
         self._child = Child(setup.control.command or ())
         self._child.tell(setup_line(setup), START_WITHIN_S)
 
@@ -45,7 +47,6 @@ class CommandController:
         """Return what the child wants; where it is late, to stop."""
         answer = self._child.ask(self._lines.line(senses), self._within_s)
         if answer is not None:
-            self._silent_from_s = None
             return intent_of(answer, senses)
         if not self._real_time:
             raise NoAnswerError(f"no answer within {self._within_s:g} s")
@@ -55,11 +56,11 @@ class CommandController:
     def _count_missed(self, now_s: float) -> None:
         """Count a tick without an answer, and tell of the 1st, 10th, 100th ... in the agent's log.
 
-        Raises NoAnswerError where none has come for SILENT_S.
+        Raises NoAnswerError where none has come for SILENT_S, not even a late one.
         """
         self._missed += 1
-        if self._silent_from_s is None:
-            self._silent_from_s = now_s
+        if self._missed == 1 or self._child.answered != self._answered:
+            self._answered, self._silent_from_s = self._child.answered, now_s
         if now_s - self._silent_from_s >= SILENT_S:
             raise NoAnswerError(f"no answer since {self._silent_from_s:.2f} s")
         if str(self._missed).rstrip("0") == "1":

@@ -168,7 +168,7 @@ class Control(Table, frozen=True):
     keeps. ``cast_far_m`` left out follows from the range heard (E20).
     gather: whether the members of a queue form its line where they are, before it flies to its
     vertex; for the controller "q_structure" under the allocation "structure".
-    parameters: those of a controller of one's own; see ``agent.parameters``.
+    parameters: what a user's own controller takes; see ``agent.parameters``.
     command: a program and its arguments that decides instead, in any language (docs/lines.md);
     ``controller`` is then "command".
     """

@@ -1,6 +1,6 @@
 """What the schemes share below their targets: the vehicle's limits, turns, and ways past others.
 
-So a comparison of schemes compares who needs to know what of whom, not how well a vehicle is flown.
+So schemes differ in what an agent has to know of which others, not in how it flies its vehicle.
 """
 
 from math import hypot

@@ -37,7 +37,7 @@ from agent.schemes.queue_counts import counts_heard, counts_told
 from agent.schemes.queue_points import end_m, nearest, point
 
 LISTEN_S: Final = 1.0
-"""Before it claims anything, an agent hears who is there."""
+"""For so long an agent listens for others before it claims a place."""
 NEARER_M: Final = 0.05
 SLOPE_MPS: Final = 0.15
 REPULSION_HZ: Final = 8.0

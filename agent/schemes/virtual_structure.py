@@ -9,7 +9,7 @@ off their points (formation feedback). The paper's [8, 7].
 Each agent fits translation and yaw of the body to the positions of all members, lets the body go
 on towards the target's frame, the slower the worse the fit, and flies to its own point. It needs
 everybody: who misses one member fits another body (``links_needed``). Where agents relay records of
-all members (``[control] allocation = "assignment"``) it takes those of whom it does not hear.
+all members (``[control] allocation = "assignment"``), it uses records where it hears no beacon.
 
 Our choices, where the sources are silent:
 

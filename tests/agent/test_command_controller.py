@@ -1,11 +1,13 @@
 """A program as a controller: whether time waits for it, and what becomes of one that is silent."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import msgspec
 import pytest
 
+from agent import command_controller
 from agent.checked_controller import CheckedController
 from agent.config import AgentSetup
 from agent.controller import FailedProgramError, Senses
@@ -71,6 +73,26 @@ def test_one_that_stays_silent_in_real_time_fails(script: str) -> None:
     assert str(failed.value).startswith("controller 'sh' of agent 0 failed at ")
     assert "NoAnswerError" not in str(failed.value)
     assert "no answer since" in str(failed.value)
+
+
+class AlwaysLate:
+    """A child each of whose answers comes, but after its tick."""
+
+    def __init__(self, command: Sequence[str]) -> None:
+        self.answered = 0
+
+    def tell(self, line: bytes, within_s: float) -> None:
+        """Take the setup."""
+
+    def ask(self, line: bytes, within_s: float) -> None:
+        """Drop the answer to the line before."""
+        self.answered += 1
+
+
+def test_one_that_is_always_late_does_not_fail(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(command_controller, "Child", AlwaysLate)
+    asked = program(ECHO, real_time=True)
+    assert [asked.at(float(second)) for second in range(20)] == [0.0] * 20
 
 
 def test_a_program_that_fails_has_no_trace_of_python() -> None:
