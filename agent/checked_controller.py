@@ -2,8 +2,9 @@
 
 import signal
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from math import isfinite
+from re import fullmatch
 from typing import Final
 
 from msgspec.structs import replace
@@ -15,17 +16,33 @@ from agent.controller import (
     FailedProgramError,
     FaultyControllerError,
     Intent,
+    Outgoing,
     Senses,
     load,
 )
-from agent.messages import MAX_ANGLE_RAD, MAX_FORCE, MAX_M, MAX_SPEED_MPS, Vector
+from agent.controller_log import Logging, LogLimiter
+from agent.messages import (
+    MAX_ANGLE_RAD,
+    MAX_DATAGRAM_B,
+    MAX_FORCE,
+    MAX_M,
+    MAX_SIGNAL,
+    MAX_SIGNALS,
+    MAX_SPEED_MPS,
+    SIGNAL_NAME,
+    Vector,
+)
 from agent.parameters import made
 from netem.compiled import UnloadableError
+from netem.wire.channels import CHANNELS
 
 NUMBERS: Final = 13
 """Numbers in an intent besides its target: three vectors, two tilt angles, yaw and force."""
 SMALL = min(MAX_SPEED_MPS, MAX_ANGLE_RAD)
 """Numbers whose absolute values add up to no more than this are within every bound."""
+
+MAX_DATAGRAMS: Final = 8
+"""Most datagrams that a controller sends in one tick."""
 
 MAX_ERROR_TEXT: Final = 2000
 """Characters of an error's text that are kept."""
@@ -50,6 +67,8 @@ class CheckedController:
             raise self._program_fault("at its start", error) from None
         except BaseException as error:
             raise self._fault("in its constructor", error) from error
+        logs = isinstance(self._controller, Logging)
+        self._limiter = LogLimiter() if logs else None
 
     def decide(self, senses: Senses) -> Intent:
         """Return the controller's intent, in plain floats within the bounds of a command."""
@@ -59,6 +78,12 @@ class CheckedController:
             raise self._program_fault(f"at {senses.now_s:g} s", error) from None
         except BaseException as error:
             raise self._fault(f"at {senses.now_s:g} s", error) from error
+
+    def log(self, now_s: float) -> tuple[str, ...]:
+        """Return the lines that the controller has written, no more than may be told now."""
+        if self._limiter is None:
+            return ()
+        return self._limiter.limited(self._controller.take_log(), now_s)  # type: ignore[attr-defined]
 
     def _program_fault(self, when: str, error: ProgramError) -> FailedProgramError:
         return FailedProgramError(f"{self._label} failed {when}: {error}")
@@ -96,6 +121,10 @@ def plain(intent: Intent) -> Intent:
     # isinstance() alone is slow for structures of msgspec.
     if type(intent) is not Intent and not isinstance(intent, Intent):
         raise TypeError(f"decide returned {type(intent).__name__}, not an Intent")
+    if intent.messages or intent.signals:
+        intent = replace(
+            intent, messages=_messages(intent.messages), signals=_signals(intent.signals)
+        )
     numbers = (
         *intent.wanted,
         *intent.velocity,
@@ -125,6 +154,38 @@ def _converted(intent: Intent) -> Intent:
         target=None if intent.target is None else _vector("target", intent.target, MAX_M),
         tilt=(pitch, roll),
     )
+
+
+def _messages(given: Iterable[Outgoing]) -> tuple[Outgoing, ...]:
+    """Return an intent's messages as bytes on a known channel; others' buffers are copied."""
+    messages = []
+    for channel, data in given:
+        if channel not in CHANNELS:
+            raise ValueError(f"the channel {channel!r} of a message is none of {CHANNELS}")
+        if not isinstance(data, bytes | bytearray | memoryview):
+            raise TypeError(f"a message holds {type(data).__name__}, not bytes")
+        if len(data) > MAX_DATAGRAM_B:
+            raise ValueError(f"a message has {len(data)} B; at most {MAX_DATAGRAM_B} B are allowed")
+        messages.append(Outgoing(channel, bytes(data)))
+    if len(messages) > MAX_DATAGRAMS:
+        raise ValueError(f"{len(messages)} messages in one tick; at most {MAX_DATAGRAMS}")
+    return tuple(messages)
+
+
+def _signals(given: Mapping[str, float]) -> dict[str, float]:
+    """Return an intent's signals as plain floats by name."""
+    if len(given) > MAX_SIGNALS:
+        raise ValueError(f"{len(given)} signals; at most {MAX_SIGNALS} are allowed")
+    signals = {}
+    for name, value in given.items():
+        if not isinstance(name, str) or fullmatch(SIGNAL_NAME, name) is None:
+            detail = "lower-case letters, digits and _, at most 32, a letter first"
+            raise ValueError(f"{name!r} is no name of a signal: {detail}")
+        number = float(value)
+        if not isfinite(number) or abs(number) > MAX_SIGNAL:
+            raise ValueError(f"the signal {name!r} is {number:g}; at most {MAX_SIGNAL:g}")
+        signals[name] = number
+    return signals
 
 
 def _vector(name: str, given: Iterable[float], bound: float) -> Vector:

@@ -11,7 +11,16 @@ import msgpack
 import msgspec
 
 from agent.heard_beacon import HeardBeacon
-from agent.messages import MAX_PIECES, PIECE_B, Beacon, Command, Gossip, Observation, Summary
+from agent.messages import (
+    MAX_PIECES,
+    PIECE_B,
+    Beacon,
+    Command,
+    Datagram,
+    Gossip,
+    Observation,
+    Summary,
+)
 from agent.qstructure.expression import MAX_EXPRESSION_LENGTH
 from agent.qstructure.formation import FormationSpec
 from agent.rejection import RejectedError
@@ -19,6 +28,10 @@ from netem.wire.channels import MAX_PAYLOAD_B
 
 CHECKSUM_B: Final = 4
 MAX_MESSAGE_B: Final = 4096
+MAX_COMMAND_B: Final = 8192
+"""A command, with the telemetry of an agent that has much to tell."""
+DATAGRAM_MARK: Final = 0x92
+"""First byte of a frame that holds a datagram: msgpack's mark of an array of two fields."""
 MAX_OBSERVATION_B: Final = 65536
 """Sensed vehicles, scans, and with them a mission: its formation and its frame's path."""
 
@@ -101,6 +114,7 @@ def decode_formation(data: bytes) -> FormationSpec:
 
 _beacon = msgspec.msgpack.Decoder(Beacon).decode
 _gossip = msgspec.msgpack.Decoder(Gossip).decode
+_datagram = msgspec.msgpack.Decoder(Datagram).decode
 _observation = msgspec.msgpack.Decoder(Observation).decode
 _command = msgspec.msgpack.Decoder(Command).decode
 
@@ -120,6 +134,16 @@ def decode_gossip(payload: bytes) -> Gossip:
     return _typed(strip_checksum(payload), _gossip, MAX_PAYLOAD_B)
 
 
+def holds_datagram(payload: bytes) -> bool:
+    """Return whether a payload, of either channel, holds a controller's datagram."""
+    return len(payload) > 0 and payload[0] == DATAGRAM_MARK
+
+
+def decode_datagram(payload: bytes) -> Datagram:
+    """Decode a controller's datagram, or raise :class:`RejectedError`."""
+    return _typed(strip_checksum(payload), _datagram, MAX_PAYLOAD_B)
+
+
 def decode_observation(data: bytes) -> Observation:
     """Decode the world's message to an agent, or raise :class:`RejectedError`."""
     return _typed(data, _observation, MAX_OBSERVATION_B)
@@ -127,7 +151,7 @@ def decode_observation(data: bytes) -> Observation:
 
 def decode_command(data: bytes) -> Command:
     """Decode an agent's message to the world, or raise :class:`RejectedError`."""
-    return _typed(data, _command, MAX_MESSAGE_B)
+    return _typed(data, _command, MAX_COMMAND_B)
 
 
 def _typed(data: bytes, decode_typed: Callable[[bytes], _T], max_bytes: int) -> _T:

@@ -14,6 +14,7 @@ from agent.messages import (
     FramePath,
 )
 from agent.qstructure.formation import FormationSpec
+from agent.services import Service
 
 LEAST = 0.001
 """Least value of a quantity that must be above 0, in the unit of its key: smaller ones have no use,
@@ -24,6 +25,7 @@ FrameSpeed = Annotated[float, Meta(ge=LEAST, le=MAX_SPEED_MPS)]
 Noise = Annotated[float, Meta(ge=0, le=1)]
 VehicleKind = Literal["kinematic", "accelerating", "forward"]
 AvoidanceKind = Literal["constellation", "direct", "none"]
+FilterMode = Literal["on", "watch", "off"]
 
 
 ScannerKind = Literal["laser", "sonar"]
@@ -169,6 +171,9 @@ class Control(Table, frozen=True):
     gather: whether the members of a queue form its line where they are, before it flies to its
     vertex; for the controller "q_structure" under the allocation "structure".
     parameters: what a user's own controller takes; see ``agent.parameters``.
+    services: what the agent does beside the controller, instead of what that asks for; see
+    ``agent.services``. safety_filter: "watch" computes what the filter would change, and flies what
+    the controller wants; "off" computes nothing.
     command: a program and its arguments that decides instead, in any language (docs/lines.md);
     ``controller`` is then "command".
     """
@@ -184,6 +189,8 @@ class Control(Table, frozen=True):
     allocation: AllocationKind = "structure"
     gather: bool = False
     parameters: dict[str, Any] = {}
+    services: tuple[Service, ...] | None = None
+    safety_filter: FilterMode = "on"
     command: Annotated[tuple[Argument, ...], Meta(min_length=1, max_length=64)] | None = None
 
 

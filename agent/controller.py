@@ -6,8 +6,10 @@ tracks the neighbours, applies the safety filter to the intent, and talks to the
 vehicle.
 """
 
+from collections.abc import Mapping
 from importlib import import_module
 from importlib.metadata import entry_points
+from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 import msgspec
@@ -22,8 +24,10 @@ from agent.senses import (
     HeardSummary,
     Link,
     Peer,
+    Received,
     Senses,
 )
+from netem.wire.channels import ChannelName
 
 __all__ = [
     "BUILT_IN",
@@ -39,7 +43,9 @@ __all__ = [
     "HeardSummary",
     "Intent",
     "Link",
+    "Outgoing",
     "Peer",
+    "Received",
     "Senses",
     "Words",
     "load",
@@ -87,6 +93,16 @@ NO_WORDS = Words()
 """Of a controller without a Q-structure."""
 
 
+class Outgoing(NamedTuple):
+    """A datagram to the controllers of all agents in range, which may lose it or get it late."""
+
+    channel: ChannelName
+    data: bytes  # at most MAX_DATAGRAM_B
+
+
+NO_SIGNALS: Mapping[str, float] = MappingProxyType({})
+
+
 class Intent(msgspec.Struct, frozen=True, gc=False):
     """What a controller wants, before the safety filter."""
 
@@ -103,6 +119,9 @@ class Intent(msgspec.Struct, frozen=True, gc=False):
     vertex: bool = False  # whether the agent is a queue-vertex agent at its place
     blocked: tuple[Place, ...] = ()  # places seen taken by an unidentified vehicle (E18)
     words: Words = NO_WORDS
+    messages: tuple[Outgoing, ...] = ()  # to send now, at most MAX_DATAGRAMS
+    signals: Mapping[str, float] = NO_SIGNALS
+    """Numbers of its own to record as series, by name: at most MAX_SIGNALS."""
 
 
 class Controller(Protocol):

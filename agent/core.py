@@ -13,8 +13,9 @@ from typing import Final, NamedTuple, assert_never, final
 import msgspec
 
 from agent.checked_controller import CheckedController
-from agent.codec import decode_gossip, hear_beacon
+from agent.codec import decode_gossip, hear_beacon, holds_datagram
 from agent.comms.broadcast import Broadcast, OwnState
+from agent.comms.datagrams import Datagrams
 from agent.comms.gossip import RecordTable
 from agent.comms.mission import Missions
 from agent.comms.neighbours import MAX_AGE_S, Neighbours
@@ -26,7 +27,15 @@ from agent.comms.unidentified_vehicles import (
     UnidentifiedVehicles,
 )
 from agent.config import AgentSetup
-from agent.controller import UNHEARD, HeardSummary, Intent, Peer, Senses
+from agent.controller import (
+    UNHEARD,
+    ControllerError,
+    HeardSummary,
+    Intent,
+    Peer,
+    Senses,
+    load,
+)
 from agent.guidance.safety_monitor import SafetyMonitor
 from agent.heard_beacon import HeardBeacon
 from agent.messages import (
@@ -42,6 +51,7 @@ from agent.messages import (
     Mission,
     Observation,
     Place,
+    Report,
     Telemetry,
     Vector,
 )
@@ -49,6 +59,7 @@ from agent.places.place_points import PlacePoints
 from agent.rejection import RejectedError
 from agent.sensing.obstacle_perception import ObstaclePerception
 from agent.sensing.own_pose import OwnPose
+from agent.services import Services, ServicesError, services_of
 from netem.wire.channels import LOCAL, MULTIHOP, Channel
 
 MAX_SUMMARIES: Final = 8
@@ -102,9 +113,15 @@ class Agent:
         ticks = max(1, round(BELIEF_S * setup.tick_hz)) if setup.ids <= BELIEFS_OF else 0
         self._slots_per_belief = ticks * setup.slots_per_tick  # 0: it tells nothing of them
         round_s = 1.0 / comms.multihop_hz if comms.multihop_hz > 0.0 else inf
+        self._services = services = _services_of(setup)
         self._broadcast = Broadcast(
-            setup.id, setup.incarnation, 1.0 / comms.local_hz, round_s, setup.relays
+            setup.id,
+            setup.incarnation,
+            1.0 / comms.local_hz,
+            round_s,
+            setup.relays and services.records,
         )
+        self._datagrams = Datagrams(self._slack_s, round_s)
         self._missions = Missions(
             setup.id,
             setup.formation,
@@ -117,6 +134,7 @@ class Agent:
         self._blocks_within_m = 0.5 * setup.control.spacing_m + SAME_VEHICLE_M
         self._pose = OwnPose(setup.vehicle, tick_s / setup.slots_per_tick)
         self._clock = OwnClock(tick_s / setup.slots_per_tick, self._slack_s)
+        self._filters = setup.control.safety_filter == "on"
         self._begin(setup.incarnation > 0)
 
     def _begin(self, restarted: bool) -> None:
@@ -148,7 +166,12 @@ class Agent:
     def receive(self, source: int, channel: Channel, payload: bytes, now_s: float) -> None:
         """Take a frame heard from ``source``; a rejected one is counted by its cause."""
         try:
-            if channel == LOCAL:
+            if holds_datagram(payload):
+                self._datagrams.receive(source, channel, payload, now_s)
+                self._clock.confirm(now_s)
+            elif not self._services.beacons:
+                return
+            elif channel == LOCAL:
                 self._receive_beacon(source, payload, now_s)
             elif channel == MULTIHOP:
                 self._receive_gossip(source, payload, now_s)
@@ -174,18 +197,36 @@ class Agent:
             self._accept_order(mission)
         senses = self._senses(observation)
         intent = self._intent = self._decide(senses)
-        velocity = self._safety_monitor.safe_velocity(intent.velocity, senses)
+        safe = self._safe_velocity(observation, senses, intent.velocity)
+        velocity = safe if self._filters else intent.velocity
         wrong_clock = self._clock.is_behind(senses.now_s)
-        if not self._perception.sensor_health.update(observation) or wrong_clock:
+        if wrong_clock:
             velocity = ZERO
-        command = self._command(senses, observation.slot, intent, velocity)
+        command = self._command(senses, observation.slot, intent, velocity, safe)
         if wrong_clock:
             return Outbox(command, ())
+        return Outbox(command=command, frames=self._frames(senses, velocity, intent))
+
+    def _safe_velocity(self, observation: Observation, senses: Senses, wanted: Vector) -> Vector:
+        """Return the velocity that the safety filter allows [m/s; world frame]."""
+        healthy = self._perception.sensor_health.update(observation)
+        if self._setup.control.safety_filter == "off":
+            return wanted
+        safe = self._safety_monitor.safe_velocity(wanted, senses)
+        return safe if healthy else ZERO
+
+    def _frames(
+        self, senses: Senses, velocity: Vector, intent: Intent
+    ) -> tuple[tuple[Channel, bytes], ...]:
+        """Return what the agent says now: by itself, and for its controller."""
+        said = self._datagrams.frames(senses.now_s, intent.messages) if intent.messages else ()
+        if not self._services.beacons:
+            return said
         own = self._own_state(senses, velocity, intent)
-        pieces = self._missions.pieces() if self._neighbour_lacks_mission else ()
+        lacking = self._neighbour_lacks_mission and self._services.missions
+        pieces = self._missions.pieces() if lacking else ()
         echoes = self._neighbours.echoes()
-        frames = self._broadcast.frames(senses.now_s, own, echoes, self._table, pieces)
-        return Outbox(command=command, frames=frames)
+        return self._broadcast.frames(senses.now_s, own, echoes, self._table, pieces) + said
 
     def _decide(self, senses: Senses) -> Intent:
         """Return the controller's intent; without a mission there is no place to claim."""
@@ -202,16 +243,22 @@ class Agent:
             velocity=velocity,
             heading_for=intent.heading_for,
             place=intent.place,
-            speed_cap=self._safety_monitor.speed_cap,
+            speed_cap=self._speed_cap(),
             mission=missions.key,
             frame_key=missions.frame_key,
             frame=frame,
             drift=drift,
             blocked=intent.blocked,
             cost_mm=min(round(1000.0 * intent.cost_m), MAX_COST_MM),
-            standing=intent.words.standing,
-            summary=intent.words.summary,
+            standing=intent.words.standing if self._services.hierarchy else None,
+            summary=intent.words.summary if self._services.hierarchy else None,
         )
+
+    def _speed_cap(self) -> float:
+        """Return the speed that the agent promises [m/s]; no filter keeps it unless it is on."""
+        if self._filters:
+            return self._safety_monitor.speed_cap
+        return self._setup.vehicle.max_speed_mps
 
     def _accept_order(self, mission: Mission) -> None:
         try:
@@ -249,13 +296,13 @@ class Agent:
             elif len(heard) == MAX_SUMMARIES:
                 del heard[0]
             heard.append(HeardSummary(source, gossip.stamp_s, gossip.summary))
-        if gossip.piece is not None:
+        if gossip.piece is not None and self._services.missions:
             self._missions.receive(gossip.piece, source, now_s)
 
     def _senses(self, observation: Observation) -> Senses:
         now_s = observation.time_s
         mission, key = self._missions.flown_at(now_s), self._missions.key
-        if now_s >= self._housekeeping_at_s:
+        if now_s >= self._housekeeping_at_s and self._services.beacons:
             self._housekeeping_at_s = now_s + HOUSEKEEPING_S
             self._do_housekeeping(observation)
         if key != self._blocked_in:
@@ -279,6 +326,7 @@ class Agent:
             summaries=tuple([each for heard in summaries.values() for each in heard]),
             obstacles=self._obstacles(observation),
             heard_frame=self._missions.heard_frame_at(now_s),
+            inbox=self._datagrams.take(now_s),
         )
 
     def _obstacles(self, observation: Observation) -> tuple[Vector, ...]:
@@ -350,7 +398,27 @@ class Agent:
         near = [each for each in senses.neighbours[:MAX_HEARD] if _is_sendable(each.position)]
         return tuple([(each.id, each.position) for each in near])
 
-    def _command(self, senses: Senses, slot: int, intent: Intent, velocity: Vector) -> Command:
+    def _report(self, senses: Senses, intent: Intent) -> Report | None:
+        """Return what the controller has to tell, and count its datagrams; None for nothing."""
+        log = self._controller.log(senses.now_s)
+        inbox, messages = senses.inbox, intent.messages
+        if not (log or inbox or messages or intent.signals):
+            return None
+        oldest_s = 0.0
+        for each in inbox:
+            oldest_s = max(oldest_s, each.age_s)
+        return Report(
+            signals=tuple(intent.signals.items()),
+            log=log,
+            sent=(len(messages), sum([len(data) for _, data in messages])),
+            received=(len(inbox), sum([len(each.data) for each in inbox])),
+            oldest_s=oldest_s,
+        )
+
+    def _command(
+        self, senses: Senses, slot: int, intent: Intent, velocity: Vector, safe: Vector
+    ) -> Command:
+        """Return the command. safe: the velocity that the safety filter allows."""
         rejected: tuple[tuple[int, int], ...] = ()
         if self.rejected:
             counts = sorted(self.rejected.items())
@@ -368,6 +436,8 @@ class Agent:
             role=intent.words.role,
             record_age_s=self._record_age_s,
             believed=self._believed(senses, slot),
+            filter_mps=dist(safe, intent.velocity),
+            report=self._report(senses, intent),
         )
         return Command(
             slot=slot,
@@ -378,6 +448,15 @@ class Agent:
             tilt=intent.tilt,
             telemetry=telemetry,
         )
+
+
+def _services_of(setup: AgentSetup) -> Services:
+    """Return the services that an agent's controller asks for. Raises ControllerError."""
+    control = setup.control
+    try:
+        return services_of(load(control.controller), control.services)
+    except ServicesError as error:
+        raise ControllerError(f"services of {control.controller!r}: {error}") from error
 
 
 def _is_sendable(position: Vector) -> bool:

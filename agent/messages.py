@@ -10,6 +10,8 @@ from typing import Annotated, Final, Literal, NamedTuple
 import msgspec
 from msgspec import Meta
 
+from netem.wire.channels import MAX_PAYLOAD_B
+
 AllocationKind = Literal["structure", "assignment"]
 """Who takes which place; see agent.config.Control."""
 
@@ -25,6 +27,8 @@ FLIGHT_M: Final = 985e3
 """The world's edge, along each axis [m]: vehicles start within it and cannot fly past it. It leaves
 room up to MAX_M for targets ahead of a vehicle."""
 LEAST_SPEED_MPS: Final = 1e-3
+MAX_COMMAND_MPS: Final = 174.0
+"""The longest velocity whose components are within MAX_SPEED_MPS [m/s]."""
 MAX_COST_MM = 2**31 - 1
 MAX_HEARD: Final = 256
 """Most neighbours in one telemetry, and most vehicles in one observation."""
@@ -76,7 +80,7 @@ MEMBER, SUB_VERTEX, VERTEX, DISTRESS = range(len(ROLES))
 
 CAUSES = (
     *("oversize", "corrupt", "garbage", "invalid", "spoofed", "replay", "future", "old", "offset"),
-    *("mission", "observation", "batch", "speed"),
+    *("mission", "observation", "batch", "speed", "overflow"),
 )
 """Causes for which an agent rejects a message; see RejectedError."""
 CauseIndex = Annotated[int, Meta(ge=0, lt=len(CAUSES))]
@@ -203,6 +207,30 @@ Believed = tuple[tuple[AgentId, Position], ...]
 """Neighbours and where an agent takes them to be [m; world frame]."""
 
 
+MAX_SIGNALS: Final = 16
+"""Most signals of one controller."""
+MAX_SIGNAL: Final = 1e12
+"""Largest absolute value of a signal."""
+SIGNAL_NAME: Final = "^[a-z][a-z0-9_]{0,31}$"
+SignalName = Annotated[str, Meta(pattern=SIGNAL_NAME)]
+Signal = Annotated[float, Meta(ge=-MAX_SIGNAL, le=MAX_SIGNAL)]
+MAX_LOG_LINES: Final = 4
+"""Most log lines in one telemetry."""
+MAX_LOG_CHARACTERS: Final = 200
+LogLine = Annotated[str, Meta(max_length=MAX_LOG_CHARACTERS)]
+
+
+class Report(Message, frozen=True):
+    """What an agent's controller tells of itself, and of the datagrams of one tick."""
+
+    signals: Annotated[tuple[tuple[SignalName, Signal], ...], Meta(max_length=MAX_SIGNALS)]
+    """Its own series, by name."""
+    log: Annotated[tuple[LogLine, ...], Meta(max_length=MAX_LOG_LINES)]
+    sent: tuple[Count, Count]  # datagrams of its own, and their bytes
+    received: tuple[Count, Count]  # the same, of others
+    oldest_s: Seconds  # age of the oldest one received [s]; 0 for none
+
+
 class Telemetry(Message, frozen=True):
     """An agent's internal state, for the recording and the judge."""
 
@@ -218,6 +246,9 @@ class Telemetry(Message, frozen=True):
     role: Annotated[int, Meta(ge=0, lt=len(ROLES))]  # index of ROLES
     record_age_s: Seconds = 0.0  # age of the oldest team record at the last housekeeping [s]
     believed: Annotated[Believed, Meta(max_length=MAX_HEARD)] = ()  # told now and then
+    filter_mps: Annotated[float, Meta(ge=0, le=2 * MAX_COMMAND_MPS)] = 0.0
+    """By how much the safety filter changes the velocity, or would change it [m/s]."""
+    report: Report | None = None  # of a controller that has something to tell
 
 
 class Command(Message, frozen=True):
@@ -452,6 +483,19 @@ class MissionData(Message, frozen=True):
 
     frame: FramePath
     formation: bytes  # a FormationSpec as msgpack
+
+
+DATAGRAM_HEAD_B: Final = 17
+"""Bytes of a frame beside its datagram's own: see Datagram, and the checksum."""
+MAX_DATAGRAM_B: Final = MAX_PAYLOAD_B - DATAGRAM_HEAD_B
+"""Longest datagram of a controller [B]."""
+
+
+class Datagram(Message, frozen=True):
+    """Words of a controller to its like, on either channel: never forwarded, perhaps lost."""
+
+    stamp_s: Seconds  # the sender's Observation time [s]
+    data: Annotated[bytes, Meta(max_length=MAX_DATAGRAM_B)]
 
 
 class Gossip(Message, frozen=True):

@@ -12,6 +12,7 @@ from agent.heard_beacon import HeardStanding
 from agent.messages import Place, Summary, Vector
 from agent.qstructure.formation import Formation
 from agent.qstructure.target_frame import Frame
+from netem.wire.channels import ChannelName
 
 
 @final
@@ -106,6 +107,15 @@ class HeardFrame(NamedTuple):
     frame: Frame  # at present
 
 
+class Received(NamedTuple):
+    """A datagram of another agent's controller; see agent.controller.Outgoing."""
+
+    source: int  # id of the agent that sent it
+    channel: ChannelName
+    age_s: float  # since it was sent [s]
+    data: bytes
+
+
 @final
 @dataclass(init=False)
 class Senses:
@@ -129,6 +139,8 @@ class Senses:
     """Near points of obstacles, relative to the own centre [m; world axes]."""
     heard_frame: HeardFrame | None
     """Without a mission: the frame that a neighbour with a tier reported last, for up to 5 s."""
+    inbox: tuple[Received, ...]
+    """Datagrams heard since the last step, sorted by source, channel and time of sending."""
 
     def __init__(  # noqa: PLR0913, PLR0917
         self,
@@ -146,6 +158,7 @@ class Senses:
         summaries: tuple[HeardSummary, ...] = (),
         obstacles: tuple[Vector, ...] = (),
         heard_frame: HeardFrame | None = None,
+        inbox: tuple[Received, ...] = (),
     ) -> None:
         self.now_s = now_s
         self.position = position
@@ -161,3 +174,4 @@ class Senses:
         self.summaries = summaries
         self.obstacles = obstacles
         self.heard_frame = heard_frame
+        self.inbox = inbox

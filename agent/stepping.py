@@ -1,5 +1,6 @@
 """One step of an agent: frames and an observation in, a command and a transmission out."""
 
+import sys
 import time
 
 from agent.codec import encode
@@ -13,7 +14,7 @@ from netem.wire.frame import Batch, Outgoing, Transmission, pack
 
 
 class AgentStepper:
-    """Runs an agent's core and publishes its commands and transmissions."""
+    """Runs an agent's core, publishes what it says, and prints its controller's log."""
 
     def __init__(
         self, setup: AgentSetup, command: Put, radio: Put, guard: StepGuard | None = None
@@ -41,6 +42,9 @@ class AgentStepper:
         self._guard.enter()
         outbox = self.core.step(observation)
         self._guard.leave()
+        report = outbox.command.telemetry.report
+        for line in report.log if report is not None else ():
+            print(f"{observation.time_s:.2f} s: {line}", file=sys.stderr)
         said, slot = outbox.frames, observation.slot
         if self._late is not None:
             said = self._late.sent(said, observation.late_slots > 0)

@@ -11,7 +11,8 @@ LOCAL: Final = 0
 MULTIHOP: Final = 1
 """Low-frequency, long-term channel: records that agents pass on (paper, Sec. 3 (i))."""
 NUMBERS: tuple[Channel, ...] = (LOCAL, MULTIHOP)
-CHANNELS = ("local", "multihop")
+ChannelName = Literal["local", "multihop"]
+CHANNELS: tuple[ChannelName, ChannelName] = ("local", "multihop")
 """Names of the channels, by channel number."""
 
 MAX_PAYLOAD_B = 1200

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from agent.codec import (
     CHECKSUM_B,
-    MAX_MESSAGE_B,
+    MAX_COMMAND_B,
     MAX_OBSERVATION_B,
     add_checksum,
     decode_beacon,
@@ -186,7 +186,7 @@ DECODE = {
 }
 LIMIT_B = {
     Observation: MAX_OBSERVATION_B,
-    Command: MAX_MESSAGE_B,
+    Command: MAX_COMMAND_B,
     Beacon: MAX_PAYLOAD_B - CHECKSUM_B,
     Gossip: MAX_PAYLOAD_B - CHECKSUM_B,
 }

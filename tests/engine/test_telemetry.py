@@ -60,8 +60,8 @@ def test_reasons_are_told_where_ticks_are_recorded() -> None:
 
 def test_what_the_safety_filter_does_is_told_where_ticks_are_recorded() -> None:
     telemetry = FleetTelemetry(2)
-    said = msgspec.structs.replace(NO_TELEMETRY, wanted=(0.5, 0.0, 0.0))
-    telemetry.update(1, said, heading=0.0, flown=(0.2, 0.4, 0.0))
+    said = msgspec.structs.replace(NO_TELEMETRY, filter_mps=0.5)
+    telemetry.update(1, said, heading=0.0)
     assert tick(telemetry, BOTH).filtered_mps is None
     filtered = tick(telemetry, BOTH, recorded=True).filtered_mps
     assert filtered is not None

@@ -53,7 +53,7 @@ def keys(plain: Any) -> Iterator[str]:
 def test_drafts_use_every_key_of_a_scenario() -> None:
     known = {key for each in schema()["$defs"].values() for key in each.get("properties", ())}
     drafts = [draft(Draw("keys", number), SHORT) for number in range(100)]
-    # A draft flies controllers of this project, which take neither command nor parameters.
+    # A draft flies controllers of this project, which need none of these.
     spared = {"schema", *OF_OWN_CONTROLLERS}
     assert known - {key for each in drafts for key in keys(each)} == spared
 

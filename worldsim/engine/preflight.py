@@ -15,6 +15,7 @@ from agent.checked_controller import described
 from agent.controller import ControllerError
 from agent.controller import load as load_controller
 from agent.parameters import ParametersError, parameters_type, takes_any, unknown_parameters
+from agent.services import ServicesError, services_of
 from netem.compiled import UnloadableError
 from netem.faults import Outage
 from worldsim.scenario.decoding import decode, unknown_key
@@ -47,6 +48,7 @@ def admit(
         speed_problem(scenario, command_ticks)
         or (_launcher(scenario) if by_hand else None)
         or _controller(scenario)
+        or _services(scenario)
         or _room(scenario)
         or _joining_room(scenario)
     )
@@ -78,6 +80,25 @@ def _controller(scenario: Scenario) -> Problem | None:
         return Problem(
             "control.controller",
             f"{name!r} cannot be imported: {described(error)}",
+        )
+    return None
+
+
+def _services(scenario: Scenario) -> Problem | None:
+    """Return a problem of the services that the controller asks for, or the scenario for it."""
+    control = scenario.control
+    key = "control.controller" if control.services is None else "control.services"
+    try:
+        services = services_of(load_controller(control.controller), control.services)
+    except (ServicesError, TypeError) as error:
+        return Problem(key, f"services of {control.controller!r}: {error}")
+    blind = [i for i, each in enumerate(scenario.vehicles) if "proximity" not in each.sensors]
+    if not services.beacons and blind and control.safety_filter == "on" and scenario.rows > 1:
+        return Problem(
+            key,
+            f"without the service 'beacons', agent {blind[0]} knows no other vehicle: it has no"
+            " proximity sensor, and the safety filter would let it stand; give it the sensor, or"
+            ' set control.safety_filter = "off"',
         )
     return None
 

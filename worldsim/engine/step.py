@@ -12,7 +12,8 @@ from typing import Protocol, final
 import msgspec
 import numpy as np
 
-from agent.messages import ROLES, Believed, Command, Mission, Observation, Vector
+from agent.messages import ROLES, Believed, Command, Mission, Observation, Report, Vector
+from worldsim.engine.controller_counters import ControllerCounters
 from worldsim.engine.counters import RadioUse, RejectionCounters
 from worldsim.engine.operations import (
     FillDisk,
@@ -25,7 +26,13 @@ from worldsim.engine.telemetry import FleetTelemetry
 from worldsim.engine.timeline_effects import TimelineEffects
 from worldsim.engine.trace import Trace
 from worldsim.judge.event import By
-from worldsim.judge.run_events import QueueChanged, RoleChanged, RunEvent, SlotChanged
+from worldsim.judge.run_events import (
+    ControllerLogged,
+    QueueChanged,
+    RoleChanged,
+    RunEvent,
+    SlotChanged,
+)
 from worldsim.judge.tick import Packets, Tick
 from worldsim.judge.verdict import Figures, Judge
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
@@ -52,6 +59,9 @@ class Recorder(Protocol):
 
     def believe(self, agent: int, slot: int, believed: Believed) -> None:
         """Record where an agent takes its neighbours to be at a slot."""
+
+    def report(self, agent: int, slot: int, report: Report) -> None:
+        """Record what an agent's controller tells at a slot."""
 
     def event(self, event: RunEvent) -> None:
         """Record one event."""
@@ -133,6 +143,7 @@ class SlotLoop:
         self.network = self.effects.network
         self._slow = self.effects.slow
         self.radio_use = RadioUse(scenario.rows, scenario.fleet.tick_hz)
+        self.controllers = ControllerCounters(scenario.rows)
         self._queue_neighbours = QueueNeighbours(scenario.rows, self.judge.phases)
         self.rejections = RejectionCounters()
         self._recorder = recorder
@@ -216,7 +227,8 @@ class SlotLoop:
         if accepted or self._slow.is_late(agent, self.world.slot):
             telemetry = command.telemetry
             heading = self._headings[agent]
-            self._telemetry.update(agent, telemetry, heading, command.velocity)
+            self._telemetry.update(agent, telemetry, heading)
+            self.controllers.count(agent, telemetry)
             needed = self._queue_neighbours.count(agent, telemetry)
             self.radio_use.count_step(agent, len(telemetry.heard), needed)
             self.effects.missions.report(agent, telemetry.mission, self.world.time_s)
@@ -224,6 +236,8 @@ class SlotLoop:
             self._report_role(agent, telemetry.role)
             if telemetry.believed and self._recorder is not None and self._records_ticks:
                 self._recorder.believe(agent, command.slot, telemetry.believed)
+            if telemetry.report is not None:
+                self._tell(agent, command.slot, telemetry.report)
             if telemetry.rejected:
                 self.rejections.update(agent, command)
 
@@ -301,6 +315,14 @@ class SlotLoop:
         return tuple(
             position if lives else None for position, lives in zip(positions, alive, strict=True)
         )
+
+    def _tell(self, agent: int, slot: int, report: Report) -> None:
+        """Pass on what an agent's controller tells at a slot."""
+        t_s = round(self.world.time_s, 6)
+        for line in report.log:
+            self.emit(ControllerLogged(t_s=t_s, agent=agent, text=line))
+        if self._recorder is not None and self._records_ticks:
+            self._recorder.report(agent, slot, report)
 
     def _report_place(self, agent: int, now: tuple[int, int] | None) -> None:
         """Emit events for a change of the place that an agent claims."""

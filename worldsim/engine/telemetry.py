@@ -1,14 +1,14 @@
 """The newest telemetry of each agent, and the tick that truth and telemetry make together."""
 
 from array import array
-from math import atan2, degrees, dist, hypot, nan, pi
+from math import atan2, degrees, hypot, nan, pi
 from typing import Final, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agent.messages import NO_MISSION, Telemetry, Vector
-from worldsim.judge.tick import HierarchyRows, Packets, Tick
+from worldsim.judge.tick import NO_SIGNALS, HierarchyRows, Packets, Tick
 from worldsim.truth.world import World
 
 _Row = TypeVar("_Row")
@@ -29,6 +29,7 @@ NO_TELEMETRY = Telemetry(
     parent=-1,
     role=-1,
     record_age_s=nan,
+    filter_mps=nan,
 )
 """The row of an agent that has sent none."""
 
@@ -57,31 +58,31 @@ class FleetTelemetry:
     def __init__(self, rows: int) -> None:
         self._newest = [NO_TELEMETRY] * rows
         self._turn_deg = [nan] * rows
-        self._filtered_mps = [nan] * rows
+        self._reporting: set[int] = set()
+        """The agents whose controllers state signals."""
         self._claims: _Claims | None = None
         """None once an agent claims another place or mission."""
         self._no_reasons = np.full((rows, 4), nan, dtype=np.float32)
 
-    def update(
-        self, agent: int, telemetry: Telemetry, heading: float, flown: Vector | None = None
-    ) -> None:
-        """Keep an agent's telemetry.
-
-        heading: the yaw that it observed [rad; world frame]. flown: the velocity that it commands
-        [m/s; world frame].
-        """
+    def update(self, agent: int, telemetry: Telemetry, heading: float) -> None:
+        """Keep an agent's telemetry. heading: the yaw that it observed [rad; world frame]."""
         last = self._newest[agent]
         if telemetry.place != last.place or telemetry.mission != last.mission:
             self._claims = None
         self._newest[agent] = telemetry
         self._turn_deg[agent] = _turn_deg(telemetry.wanted, heading)
-        self._filtered_mps[agent] = nan if flown is None else dist(flown, telemetry.wanted)
+        report = telemetry.report
+        if report is not None and report.signals:
+            self._reporting.add(agent)
+        elif self._reporting:
+            self._reporting.discard(agent)
 
     def forget(self, agent: int) -> None:
         """Drop the telemetry of an agent's earlier incarnation."""
         self._claims = None
         self._newest[agent] = NO_TELEMETRY
-        self._turn_deg[agent] = self._filtered_mps[agent] = nan
+        self._turn_deg[agent] = nan
+        self._reporting.discard(agent)
 
     def tick(
         self, world: World, running: NDArray[np.bool_], recorded: bool, packets: Packets
@@ -108,12 +109,20 @@ class FleetTelemetry:
             links=_links(rows) if recorded else NO_LINKS,
             packets=packets,
             hierarchy=_hierarchy_rows(rows) if recorded else None,
-            filtered_mps=self._filtered(claims) if recorded else None,
+            filtered_mps=_filtered_mps(rows) if recorded else None,
+            signals=self._signals(claims.up) if self._reporting else NO_SIGNALS,
         )
 
-    def _filtered(self, claims: _Claims) -> NDArray[np.float32]:
-        """Return by how much each agent's safety filter changes its velocity (N,) [m/s]."""
-        return np.array(claims.among(self._filtered_mps, nan), dtype=np.float32)
+    def _signals(self, up: list[bool]) -> dict[str, NDArray[np.float64]]:
+        """Return the signals of the agents that are running, each (N,)."""
+        signals: dict[str, NDArray[np.float64]] = {}
+        for agent in sorted(self._reporting):
+            report = self._newest[agent].report
+            for name, value in report.signals if report is not None and up[agent] else ():
+                if name not in signals:
+                    signals[name] = np.full(len(up), nan)
+                signals[name][agent] = value
+        return signals
 
     def _claims_of(self, running: NDArray[np.bool_]) -> _Claims:
         claims = self._claims
@@ -125,6 +134,11 @@ class FleetTelemetry:
 def _reasons(rows: list[Telemetry]) -> NDArray[np.float32]:
     """Return each agent's target-on-queue and force (N, 4)."""
     return np.array([(*(row.target or NO_TARGET), row.force) for row in rows], dtype=np.float32)
+
+
+def _filtered_mps(rows: list[Telemetry]) -> NDArray[np.float32]:
+    """Return by how much each agent's safety filter changes its velocity, or would (N,) [m/s]."""
+    return np.array([row.filter_mps for row in rows], dtype=np.float32)
 
 
 def _attitude(world: World) -> NDArray[np.float32]:

@@ -7,6 +7,7 @@ from worldsim.fleet.ipc import Progress
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.judge.event_text import sentence
 from worldsim.judge.run_events import (
+    ControllerLogged,
     Killed,
     Left,
     QueueChanged,
@@ -85,7 +86,7 @@ def _is_told(event: RunEvent) -> bool:
     """
     if isinstance(event, Killed | Left):
         return event.by is not None or event.nobody is not None
-    return not isinstance(event, SlotChanged | QueueChanged | RoleChanged)
+    return not isinstance(event, SlotChanged | QueueChanged | RoleChanged | ControllerLogged)
 
 
 class StallReporter:

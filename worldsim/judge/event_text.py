@@ -17,6 +17,7 @@ from worldsim.judge.radio_events import (
 from worldsim.judge.run_events import (
     AgentFaultRunEvent,
     ClockChanged,
+    ControllerLogged,
     DiskFilled,
     FormationGiven,
     FrameGiven,
@@ -92,8 +93,8 @@ def _words(event: RunEvent, queues: Queues) -> str:
             words = _agent_fault(event)
         case FormationGiven() | FrameGiven():
             words = _mission(event)
-        case SlotChanged() | QueueChanged() | RoleChanged():
-            words = _place(event, queues)
+        case SlotChanged() | QueueChanged() | RoleChanged() | ControllerLogged():
+            words = _told_by_agent(event, queues)
         case LateStart() | WorldStopped() | Reconnected() | DiskFilled():
             words = _of_processes(event)
         case _:
@@ -195,7 +196,9 @@ def _mission(event: MissionRunEvent) -> str:
     assert_never(event)
 
 
-def _place(event: SlotChanged | QueueChanged | RoleChanged, queues: Queues) -> str:
+def _told_by_agent(
+    event: SlotChanged | QueueChanged | RoleChanged | ControllerLogged, queues: Queues
+) -> str:
     agent = f"a{event.agent}"
     match event:
         case SlotChanged():
@@ -207,6 +210,8 @@ def _place(event: SlotChanged | QueueChanged | RoleChanged, queues: Queues) -> s
             return f"{agent} leaves its queue"
         case RoleChanged(role=role):
             return f"{agent} {ROLE_WORDS[role]}"
+        case ControllerLogged(text=text):
+            return f"{agent} says: {text}"
     assert_never(event)
 
 

@@ -37,6 +37,7 @@ from worldsim.judge.radio_events import NetemOutage, RadioRunEvent, Sabotaged
 from worldsim.judge.radio_load import RadioLoad
 from worldsim.judge.run_events import (
     ClockChanged,
+    ControllerLogged,
     DiskFilled,
     FormationGiven,
     FrameGiven,
@@ -143,6 +144,7 @@ class Invariants:
                 | Intruded()
                 | LateStart()
                 | DiskFilled()
+                | ControllerLogged()
             ):
                 pass
             case _:

@@ -189,6 +189,12 @@ class RoleChanged(Event, frozen=True, kw_only=True, tag="role"):
     role: Role
 
 
+class ControllerLogged(Event, frozen=True, kw_only=True, tag="log"):
+    """A controller wrote a line into its log."""
+
+    text: str
+
+
 class WorldStopped(PlannedEvent, frozen=True, kw_only=True, tag="world_outage"):
     """The world's process was stopped: simulated time stands still, or the run ends."""
 
@@ -239,6 +245,7 @@ RunEvent = (
     | SlotChanged
     | QueueChanged
     | RoleChanged
+    | ControllerLogged
     | LateStart
     | WorldStopped
     | DiskFilled

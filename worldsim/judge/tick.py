@@ -5,6 +5,7 @@ exact far from the origin as at it. A verdict recomputed from the recording ther
 numbers of the first one.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Final, final
 
@@ -16,6 +17,7 @@ from worldsim.truth.vehicle import Floats
 Float32s = NDArray[np.float32]
 Packets = dict[str, int]
 """Counters of the medium by name, as in summary.json."""
+NO_SIGNALS: Mapping[str, Floats] = {}
 NO_ROLE: Final = -1
 """The role of an agent that is not running (dead, paused or booting)."""
 
@@ -61,8 +63,10 @@ class Tick:
     hierarchy: HierarchyRows | None
     """None where ticks are not recorded."""
     filtered_mps: Float32s | None
-    """(N,), the difference between each agent's wanted and commanded velocity [m/s]: what its
-    safety filter does. Not judged; None where ticks are not recorded."""
+    """(N,), by how much each agent's safety filter changes its velocity, or would [m/s]. Not
+    judged; None where ticks are not recorded."""
+    signals: Mapping[str, Floats]
+    """The controllers' own numbers by name, each (N,); NaN for an agent that does not state it."""
 
     def __init__(  # noqa: PLR0913, PLR0917
         self,
@@ -80,6 +84,7 @@ class Tick:
         packets: Packets | None = None,
         hierarchy: HierarchyRows | None = None,
         filtered_mps: Float32s | None = None,
+        signals: Mapping[str, Floats] = NO_SIGNALS,
     ) -> None:
         self.index = index
         self.time_s = time_s
@@ -95,6 +100,7 @@ class Tick:
         self.packets = packets if packets is not None else {}
         self.hierarchy = hierarchy
         self.filtered_mps = filtered_mps
+        self.signals = signals
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Tick, _values(self)

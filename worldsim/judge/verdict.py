@@ -32,6 +32,7 @@ from worldsim.judge.run_events import (
     NOBODY_TO_RESTART,
     AgentFaultRunEvent,
     ClockChanged,
+    ControllerLogged,
     DiskFilled,
     FormationGiven,
     FrameGiven,
@@ -170,6 +171,7 @@ class Judge:
                 | Intruded()
                 | LateStart()
                 | DiskFilled()
+                | ControllerLogged()
             ):
                 pass
             case _:

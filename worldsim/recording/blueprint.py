@@ -66,9 +66,10 @@ SHOWN = {
 
 def blueprint_of(scenario: Scenario) -> rrb.Blueprint:
     """Return the viewer's default layout of a scenario's run."""
+    forms = scenario.control.controller == FORMING
     tabs = {
-        MOTION: _motion(bool(scenario.obstacle), scenario.control.controller == FORMING),
-        NETWORK: _network(records=scenario.control.allocation == "assignment"),
+        MOTION: _motion(bool(scenario.obstacle), forms),
+        NETWORK: _network(scenario.control.allocation == "assignment", forms),
         STRUCTURE: _structure(),
         FAULTS: _faults(),
     }
@@ -150,14 +151,18 @@ def _motion(obstacles: bool, forms: bool) -> list[Plot]:
         *(distance if obstacles else ()),
         *(slots if forms else ()),
         rrb.Tabs(
+            *(() if forms else (_signals(),)),
             _series("Control force |u| [m/s]", layout.FORCE),
             _series("Wanted turn [deg], left positive", layout.TURN_DEG),
         ),
     ]
 
 
-def _network(records: bool) -> list[Plot]:
-    """Return plots of the network; records: whether agents keep records of their team."""
+def _network(records: bool, forms: bool) -> list[Plot]:
+    """Return plots of the network.
+
+    records: whether agents keep records of their team. forms: whether the Q-structure flies.
+    """
     ages = [_series("Age of oldest team record [s]", layout.RECORD_AGE)]
     return [
         _series("Pairs of agents by link", layout.LINK_COUNTS, named=True),
@@ -168,6 +173,7 @@ def _network(records: bool) -> list[Plot]:
                 "Farthest that a neighbour is from where it is believed [m]", layout.BELIEF_ERROR
             ),
             *(ages if records else ()),
+            *(() if forms else (_series("Age of datagrams received [s]", layout.DATAGRAM_AGE),)),
             _series("Frames of the radio, from the start", layout.PACKETS, named=True),
         ),
     ]
@@ -249,6 +255,16 @@ def _event_view(levels: Sequence[str], root: str = "") -> rrb.TextLogView:
     listed = rrb.TextLogRows(filter_by_log_level=list(levels))
     name = "Events" if levels == ALL_EVENTS else "Faults and changes of the radio"
     return rrb.TextLogView(origin=root + layout.EVENTS, name=name, columns=columns, rows=listed)
+
+
+def _signals() -> rrb.TimeSeriesView:
+    """Return the curves of all that controllers state of themselves."""
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=f"{layout.SIGNALS}/**",
+        name="Signals of the controllers",
+        plot_legend=rrb.PlotLegend(visible=True),
+    )
 
 
 def _series(name: str, origin: str, named: bool = False) -> rrb.TimeSeriesView:

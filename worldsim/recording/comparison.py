@@ -28,10 +28,13 @@ ADDED_LATER = (
     "in_place_from_s",
     "changed",
     "settings",
+    "datagrams",
+    "safety_filter",
 )
 """Keys that the summary of an older recording lacks."""
 UNRECORDED = (
     *("reason", "rejected_by_cause", "direct_links", "needed_links", "bytes_per_s"),
+    *("datagrams", "safety_filter"),
     *("delivery", "delivery_late_ms", "late_tick_fraction", "real_time_factor", "overload"),
     *("resources", "trace_sha256", "version", "commit", "commit_dirty", "python", "packages"),
     "host",

@@ -61,6 +61,12 @@ PACKETS = f"{METRICS}/packets"
 LAMBDA2 = f"{METRICS}/lambda2"
 LINK_COUNTS = f"{METRICS}/links"
 
+SIGNALS = "/signals"
+"""Below it: what controllers state of themselves, by its name."""
+DATAGRAMS_SENT = f"{METRICS}/datagrams/sent"
+DATAGRAMS_RECEIVED = f"{METRICS}/datagrams/received"
+DATAGRAM_AGE = f"{METRICS}/datagrams/age"
+
 EVENTS = "/log/events"
 ROLES = "/roles"
 PHASE = "/phase"
@@ -129,6 +135,17 @@ def panel_entity(question: str) -> str:
 def limit_entity(metric: str) -> str:
     """Return the entity that holds a metric's reference lines."""
     return f"{metric}/limit"
+
+
+def signal_entity(name: str) -> str:
+    """Return the entity that holds one of the controllers' signals."""
+    return f"{SIGNALS}/{name}"
+
+
+def signal_name(entity: str) -> str | None:
+    """Return the name of the signal that an entity holds; None for other entities."""
+    prefix = f"{SIGNALS}/"
+    return entity.removeprefix(prefix) if entity.startswith(prefix) else None
 
 
 def packet_entity(counter: str) -> str:

@@ -6,7 +6,7 @@ there.
 
 import json
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -130,6 +130,11 @@ class _RecordedColumns:
         named = {layout.packet_counter(entity): each for (entity, _), each in self._columns.items()}
         return {name: column for name, column in named.items() if name is not None}
 
+    def signals(self) -> dict[str, Column]:
+        """Return the columns of the controllers' signals, by name."""
+        found = {layout.signal_name(entity): each for (entity, _), each in self._columns.items()}
+        return {name: column for name, column in found.items() if name is not None}
+
     def _read(self, chunk: Chunk) -> None:
         batch = chunk.to_record_batch()
         if chunk.entity_path == layout.SCENARIO:
@@ -195,6 +200,7 @@ def _ticks(columns: _RecordedColumns, scenario: Scenario, positions: tuple[str, 
     missions = columns.column(layout.MISSION_STATE, layout.MISSION)
     mission = _latest(missions, complete, np.zeros(agents))
     packets = _packets(columns.packet_counters(), complete)
+    signals = columns.signals()
     return [
         Tick(
             index=index,
@@ -209,6 +215,7 @@ def _ticks(columns: _RecordedColumns, scenario: Scenario, positions: tuple[str, 
             links=_links(hears[row], agents),
             mission=mission[row].astype(np.int64).reshape(agents),
             packets=packets[row],
+            signals=_signals(signals, index, agents),
         )
         for row, index in enumerate(complete)
     ]
@@ -229,6 +236,15 @@ def _packets(counters: dict[str, Column], ticks: Sequence[int]) -> list[Packets]
         {name: int(values[row][0]) for name, values in latest.items() if len(values[row])}
         for row in range(len(ticks))
     ]
+
+
+def _signals(columns: Mapping[str, Column], tick: int, agents: int) -> dict[str, NDArray[Any]]:
+    """Return the signals of a tick, each (N,)."""
+    return {
+        name: column[tick].astype(np.float64).reshape(agents)
+        for name, column in columns.items()
+        if tick in column
+    }
 
 
 def _links(bits: NDArray[np.uint8], agents: int) -> NDArray[np.int32]:

@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from agent.messages import ROLES, VERTEX, Believed, Observation
+from agent.messages import ROLES, VERTEX, Believed, Observation, Report
 from agent.qstructure.formation import Formation, FormationSpec
 from worldsim.judge.event_text import WARNINGS, sentence
 from worldsim.judge.run_events import (
+    ControllerLogged,
     FormationGiven,
     FrameGiven,
     MissionRunEvent,
@@ -36,6 +37,7 @@ from worldsim.recording.belief_columns import BeliefColumns
 from worldsim.recording.blueprint import blueprint_of
 from worldsim.recording.columns import ColumnBlock, Entity, merged
 from worldsim.recording.components import LOG_LEVELS, LOG_TEXTS
+from worldsim.recording.controller_columns import ControllerColumns
 from worldsim.recording.fault_columns import FaultColumns
 from worldsim.recording.formation_entities import FormationEntities
 from worldsim.recording.guidance_columns import GuidanceColumns
@@ -122,6 +124,7 @@ class RunRecorder:
         self._guidance = GuidanceColumns(scenario) if forms else None
         self._sensing = SensingColumns(scenario)
         self._beliefs = BeliefColumns(scenario.rows)
+        self._controllers = ControllerColumns(scenario.rows)
         self._team_view = TeamView(1.0 / tick_hz)
         self._ticks_per_block = max(1, round(tick_hz * BLOCK_S))
         self._blocks_sent = 0
@@ -151,6 +154,11 @@ class RunRecorder:
         """Record where an agent takes its neighbours to be at a slot."""
         if self._working:
             self._beliefs.keep(agent, slot, believed)
+
+    def report(self, agent: int, slot: int, report: Report) -> None:
+        """Record what an agent's controller tells at a slot."""
+        if self._working:
+            self._controllers.keep(agent, slot, report)
 
     def event(self, event: RunEvent) -> None:
         """Record one event."""
@@ -261,6 +269,7 @@ class RunRecorder:
             yield from self._guidance.blocks(ticks)
         yield from self._sensing.blocks(ticks)
         yield from self._beliefs.blocks(ticks)
+        yield from self._controllers.datagrams(ticks)
 
     def _blocks(self) -> Iterator[ColumnBlock]:
         situations = [self._situations.at(tick) for tick in self._ticks]
@@ -270,6 +279,7 @@ class RunRecorder:
         yield from self._fault_columns.blocks(self._ticks, situations)
         yield from self._obstacles.blocks(self._ticks)
         yield from self._team_view.blocks(self._ticks)
+        yield from self._controllers.signals(self._ticks)
 
     def _log_formation(self) -> None:
         """Log the formation's changes and the frame's motion, in the order of time."""
@@ -356,7 +366,7 @@ def _level(event: RunEvent) -> str:
         return "WARN"
     if isinstance(event, RoleChanged):
         return "INFO" if event.role == ROLES[VERTEX] else "DEBUG"
-    return "DEBUG" if isinstance(event, QueueChanged) else "INFO"
+    return "DEBUG" if isinstance(event, QueueChanged | ControllerLogged) else "INFO"
 
 
 def _document(text: str) -> rr.TextDocument:

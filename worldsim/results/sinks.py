@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from agent.messages import Believed, Observation
+from agent.messages import Believed, Observation, Report
 from worldsim.engine.step import Recorder
 from worldsim.judge.run_events import RunEvent, as_row
 from worldsim.judge.tick import Tick
@@ -47,6 +47,11 @@ class Sinks:
         """Record where an agent takes its neighbours to be at a slot."""
         if self._recorder is not None:
             self._recorder.believe(agent, slot, believed)
+
+    def report(self, agent: int, slot: int, report: Report) -> None:
+        """Record what an agent's controller tells at a slot."""
+        if self._recorder is not None:
+            self._recorder.report(agent, slot, report)
 
     def fill_disk(self, full: bool) -> None:
         """Let every write of events and recorder fail as on a full disk, or no longer."""

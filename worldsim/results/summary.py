@@ -16,6 +16,7 @@ from worldsim.engine.step import SlotLoop
 from worldsim.judge.finding import ExpectationRow
 from worldsim.judge.sub_formations import SubFormationsRow
 from worldsim.judge.verdict import Judge
+from worldsim.results.controller_rows import DatagramRow, FilterRow, datagram_row, filter_row
 from worldsim.results.expectation_text import (
     Circumstances,
     EncounterRow,
@@ -183,6 +184,8 @@ class Summary(Provenance):
     direct_links: LinksRow  # agents heard
     needed_links: LinksRow  # those of them that are of the own queue: N_c,i
     bytes_per_s: dict[str, list[float | None]] | None  # by channel, of each agent
+    datagrams: DatagramRow | None  # None where no controller says anything
+    safety_filter: FilterRow | None  # None where it is off
     invariants: dict[str, InvariantRow]
     delivery: DeliveryRow | None
     delivery_late_ms: dict[str, float] | None  # how late the radio's batches left
@@ -230,6 +233,8 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "direct_links": _links_row(use.heard()),
         "needed_links": _links_row(use.needed()),
         "bytes_per_s": use.bytes_per_s(counters),
+        "datagrams": datagram_row(run.loop.controllers),
+        "safety_filter": filter_row(scenario.control.safety_filter, run.loop.controllers),
         "invariants": {
             name: {"ticks": tally.ticks, "violations": tally.violations}
             for name, tally in invariants.items()

@@ -90,8 +90,8 @@ EXAMPLES: Given = {
     "vehicle.max_turn_left_deg": 45.0,
     "vehicle.max_turn_right_deg": 45.0,
 }
-OF_OWN_CONTROLLERS = ("command", "parameters")
-"""Keys of [control] that the template's controller does not take; see docs/controllers.md."""
+OF_OWN_CONTROLLERS = ("command", "parameters", "services", "safety_filter")
+"""Keys of [control] that serve controllers of one's own; see docs/controllers.md."""
 BRIEF: Mapping[str, tuple[str, ...]] = {
     "agent.vehicle": ("max_speed_mps",),
     "control": tuple(key for key in Control.__struct_fields__ if key not in OF_OWN_CONTROLLERS),
