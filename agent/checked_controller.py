@@ -13,6 +13,7 @@ from agent.child import ProgramError
 from agent.config import AgentSetup
 from agent.controller import (
     Controller,
+    Decide,
     FailedProgramError,
     FaultyControllerError,
     Intent,
@@ -53,10 +54,10 @@ class CheckedController:
 
     Any error of the controller's constructor or ``decide`` is raised as FaultyControllerError,
     SystemExit and KeyboardInterrupt included; Ctrl-C passes, and so does compiled code that cannot
-    be loaded.
+    be loaded. decide: how it is asked; None: directly.
     """
 
-    def __init__(self, setup: AgentSetup) -> None:
+    def __init__(self, setup: AgentSetup, decide: Decide | None = None) -> None:
         control = setup.control
         name = control.command[0] if control.command else control.controller
         self._label = f"controller {name!r} of agent {setup.id}"
@@ -67,12 +68,15 @@ class CheckedController:
             raise self._program_fault("at its start", error) from None
         except BaseException as error:
             raise self._fault("in its constructor", error) from error
+        self._decide = decide
         logs = isinstance(self._controller, Logging)
         self._limiter = LogLimiter() if logs else None
 
     def decide(self, senses: Senses) -> Intent:
         """Return the controller's intent, in plain floats within the bounds of a command."""
         try:
+            if self._decide is not None:
+                return plain(self._decide(self._controller, senses))
             return plain(self._controller.decide(senses))
         except ProgramError as error:
             raise self._program_fault(f"at {senses.now_s:g} s", error) from None

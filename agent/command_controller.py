@@ -9,6 +9,7 @@ import sys
 from agent.child import Child, ProgramError
 from agent.config import AgentSetup
 from agent.controller import Intent, Senses
+from agent.controller_log import Logging
 from agent.lines import SensesLines, hover, intent_of, setup_line
 
 START_WITHIN_S = 5.0
@@ -25,7 +26,7 @@ class NoAnswerError(ProgramError):
     """A child that does not answer."""
 
 
-class CommandController:
+class CommandController(Logging):
     """Asks a child for one agent's intents."""
 
     Parameters = dict
@@ -47,7 +48,10 @@ class CommandController:
         """Return what the child wants; where it is late, to stop."""
         answer = self._child.ask(self._lines.line(senses), self._within_s)
         if answer is not None:
-            return intent_of(answer, senses)
+            intent, lines = intent_of(answer, senses)
+            for line in lines:
+                self.log(line)
+            return intent
         if not self._real_time:
             raise NoAnswerError(f"no answer within {self._within_s:g} s")
         self._count_missed(senses.now_s)

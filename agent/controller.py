@@ -6,7 +6,7 @@ tracks the neighbours, applies the safety filter to the intent, and talks to the
 vehicle.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from importlib.metadata import entry_points
 from types import MappingProxyType
@@ -131,6 +131,10 @@ class Controller(Protocol):
 
     def decide(self, senses: Senses) -> Intent:
         """Return the intent for this tick."""
+
+
+Decide = Callable[[Controller, Senses], Intent]
+"""How a controller is asked: a debugger stands between."""
 
 
 def load(name: str) -> type[Controller]:

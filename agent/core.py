@@ -30,6 +30,7 @@ from agent.config import AgentSetup
 from agent.controller import (
     UNHEARD,
     ControllerError,
+    Decide,
     HeardSummary,
     Intent,
     Peer,
@@ -96,14 +97,22 @@ class Decoders(NamedTuple):
 
 
 class Agent:
-    """One agent of the team. Raises ControllerError if its controller cannot be loaded."""
+    """One agent of the team. Raises ControllerError if its controller cannot be loaded.
 
-    def __init__(self, setup: AgentSetup, decoders: Decoders = Decoders()) -> None:  # noqa: B008
+    decide: how its controller is asked; None: directly.
+    """
+
+    def __init__(
+        self,
+        setup: AgentSetup,
+        decoders: Decoders = Decoders(),  # noqa: B008
+        decide: Decide | None = None,
+    ) -> None:
         tick_s = 1.0 / setup.tick_hz
         comms = setup.comms
         self.id = setup.id
         self.rejected: Counter[str] = Counter()
-        self._setup = setup
+        self._setup, self._decide_with = setup, decide
         self._incarnation = setup.incarnation
         self._hear_beacon, self._decode_gossip = decoders.beacon, decoders.gossip
         self._slack_s = 2.0 * tick_s
@@ -143,7 +152,7 @@ class Agent:
         restarted: whether the agent may have made promises before.
         """
         setup, comms = self._setup, self._setup.comms
-        self._controller = CheckedController(setup)
+        self._controller = CheckedController(setup, self._decide_with)
         self._neighbours = Neighbours(setup.id, comms.local_hz, self._slack_s)
         self._table = RecordTable(setup.id, comms.multihop_hz, setup.ids)
         self._safety_monitor = SafetyMonitor(setup, restarted)

@@ -14,10 +14,11 @@ from msgspec import Meta
 
 from agent.child import ProgramError
 from agent.config import AgentSetup
-from agent.controller import Intent, Senses
+from agent.controller import NO_SIGNALS, Intent, Outgoing, Received, Senses
 from agent.messages import Place, Vector
 from agent.qstructure.formation import Formation
 from agent.senses import Flown, Heard
+from netem.wire.channels import ChannelName
 
 PROTOCOL = 1
 """The version of these lines; it grows when a controller has to change."""
@@ -62,6 +63,16 @@ class MissionRow(msgspec.Struct, frozen=True):
     slots: list[SlotRow] | None  # told once, where the key is new; else null
 
 
+class ReceivedRow(msgspec.Struct, frozen=True):
+    """A datagram of another agent's controller; see agent.senses.Received."""
+
+    source: int
+    channel: ChannelName
+    age_s: float
+    text: str | None  # null where the bytes are no text in UTF-8
+    data: bytes | None  # in base64; null where they are
+
+
 class SensesLine(msgspec.Struct, frozen=True):
     """What the agent senses; see agent.senses.Senses."""
 
@@ -76,6 +87,15 @@ class SensesLine(msgspec.Struct, frozen=True):
     loss: float  # share of beacons lost
     latency_s: float  # mean delay of beacons [s]
     reach_m: float | None  # from how far two neighbours were heard [m]; null before any
+    inbox: list[ReceivedRow]  # datagrams heard since the last line
+
+
+class MessageRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A datagram to send; see agent.controller.Outgoing. It has a text or data, not both."""
+
+    channel: ChannelName
+    text: str | None = None  # sent in UTF-8
+    data: bytes | None = None  # in base64
 
 
 class IntentLine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -90,6 +110,9 @@ class IntentLine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     place: tuple[int, int] | None = None  # the queue and rank that it claims
     cost_m: Annotated[float, Meta(ge=0)] = 0.0
     tilt: tuple[float, float] = (0.0, 0.0)  # pitch and roll [rad]
+    messages: list[MessageRow] = []  # to send now
+    signals: dict[str, float] = {}  # numbers to record, by name
+    log: list[str] = []  # lines for the agent's log
 
 
 class LineError(ProgramError):
@@ -128,6 +151,7 @@ class SensesLines:
                 loss=senses.link.loss,
                 latency_s=senses.link.latency_s,
                 reach_m=senses.link.reach_m if isfinite(senses.link.reach_m) else None,
+                inbox=[_received(each) for each in senses.inbox],
             )
         )
 
@@ -144,8 +168,8 @@ class SensesLines:
         )
 
 
-def intent_of(line: bytes, senses: Senses) -> Intent:
-    """Return the intent that a line asks for. Raises LineError."""
+def intent_of(line: bytes, senses: Senses) -> tuple[Intent, list[str]]:
+    """Return the intent that a line asks for, and its lines for the log. Raises LineError."""
     if not line.strip():
         raise LineError("an empty line instead of an intent")
     try:
@@ -155,7 +179,7 @@ def intent_of(line: bytes, senses: Senses) -> Intent:
     wanted = said.velocity if said.wanted is None else said.wanted
     x, y, z = senses.position
     u, v, w = wanted
-    return Intent(
+    intent = Intent(
         wanted=wanted,
         velocity=said.velocity,
         yaw=senses.yaw if said.yaw is None else said.yaw,
@@ -165,7 +189,10 @@ def intent_of(line: bytes, senses: Senses) -> Intent:
         place=None if said.place is None else Place(*said.place),
         cost_m=said.cost_m,
         tilt=said.tilt,
+        messages=tuple(map(_outgoing, said.messages)),
+        signals=said.signals or NO_SIGNALS,
     )
+    return intent, said.log
 
 
 def hover(senses: Senses) -> Intent:
@@ -196,6 +223,23 @@ def _neighbour(heard: Heard) -> NeighbourRow:
         place=heard.place,
         hears_me=heard.hears_me,
     )
+
+
+def _received(received: Received) -> ReceivedRow:
+    source, channel, age_s, data = received
+    try:
+        return ReceivedRow(source, channel, age_s, text=data.decode(), data=None)
+    except UnicodeDecodeError:
+        return ReceivedRow(source, channel, age_s, text=None, data=data)
+
+
+def _outgoing(row: MessageRow) -> Outgoing:
+    """Return the datagram of a row. Raises LineError where it has not one of text and data."""
+    if row.text is not None and row.data is None:
+        return Outgoing(row.channel, row.text.encode())
+    if row.data is not None and row.text is None:
+        return Outgoing(row.channel, row.data)
+    raise LineError("a message has either a text or data")
 
 
 def _slots(formation: Formation, team: int) -> list[SlotRow]:

@@ -40,5 +40,5 @@ def services_of(controller: type, chosen: tuple[str, ...] | None) -> Services:
         if name not in SERVICES:
             raise ServicesError(f"{name!r} is no service; allowed: {', '.join(SERVICES)}")
     if names and "beacons" not in names:
-        raise ServicesError(f"{', '.join(sorted(names))} needs the service 'beacons' too")
+        raise ServicesError(f"without 'beacons' there are no {', '.join(sorted(names))}")
     return Services(*(name in names for name in SERVICES))

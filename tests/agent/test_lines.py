@@ -5,7 +5,7 @@ import json
 import msgspec
 import pytest
 
-from agent.controller import Intent, Link, Senses
+from agent.controller import Intent, Link, Outgoing, Received, Senses
 from agent.lines import LineError, SensesLines, hover, intent_of, line_schema, setup_line
 from agent.messages import Place
 from agent.qstructure.formation import Formation
@@ -64,7 +64,8 @@ def test_slots_are_told_once_for_each_mission() -> None:
 
 
 def test_only_the_velocity_must_be_given() -> None:
-    said = intent_of(b'{"velocity":[3,0,4]}', senses())
+    said, log = intent_of(b'{"velocity":[3,0,4]}', senses())
+    assert log == []
     assert said == Intent(
         wanted=(3.0, 0.0, 4.0),
         velocity=(3.0, 0.0, 4.0),
@@ -72,7 +73,7 @@ def test_only_the_velocity_must_be_given() -> None:
         force=5.0,
         heading_for=(3.1, 0.2, 4.3),
     )
-    more = intent_of(
+    more, _ = intent_of(
         b'{"velocity":[0,0,0],"wanted":[1,0,0],"yaw":1,"force":0.5,"heading_for":[1,2,3],'
         b'"target":[4,5,6],"place":[1,2],"cost_m":7,"tilt":[0.1,0.2]}',
         senses(),
@@ -83,11 +84,33 @@ def test_only_the_velocity_must_be_given() -> None:
     )
 
 
+def test_words_signals_and_log_go_both_ways() -> None:
+    inbox = (
+        Received(4, "local", 0.1, "grüße".encode()),
+        Received(5, "multihop", 0.2, b"\xff\x00"),
+    )
+    heard = json.loads(SensesLines(2).line(senses(inbox=inbox)))["inbox"]
+    assert heard == [
+        {"source": 4, "channel": "local", "age_s": 0.1, "text": "grüße", "data": None},
+        {"source": 5, "channel": "multihop", "age_s": 0.2, "text": None, "data": "/wA="},
+    ]
+    said, log = intent_of(
+        b'{"velocity":[0,0,0],"messages":[{"channel":"local","text":"hi"},'
+        b'{"channel":"multihop","data":"/wA="}],"signals":{"gap":1.5},"log":["one","two"]}',
+        senses(),
+    )
+    assert said.messages == (Outgoing("local", b"hi"), Outgoing("multihop", b"\xff\x00"))
+    assert said.signals == {"gap": 1.5}
+    assert log == ["one", "two"]
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [
         (b"", "an empty line"),
         (b"hello", "the line: 'hello'"),
+        (b'{"velocity":[0,0,0],"messages":[{"channel":"local"}]}', "either a text or data"),
+        (b'{"velocity":[0,0,0],"messages":[{"channel":"loud","text":""}]}', "loud"),
         (b"{}", "missing required field `velocity`"),
         (b'{"velocity":[1,2]}', "length 3"),
         (b'{"velocity":[1,2,"3"]}', "`float`, got `str`"),

@@ -72,7 +72,7 @@ def test_a_scenario_may_switch_services_off_and_on() -> None:
     assert [holds_datagram(payload) for _, payload in spoken] == [False, True, True]
     silent = Agent(replace(AGENT_SETUP, control=Control(services=())))
     assert silent.step(observation(0)).frames == ()
-    with pytest.raises(ControllerError, match="missions needs the service 'beacons'"):
+    with pytest.raises(ControllerError, match="without 'beacons' there are no missions"):
         agent(services=("missions",))
 
 

@@ -51,6 +51,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     recorder, ticks = RunRecorder(file, scenario, "flown", mode="virtual"), []
     for tick in straight_flight(scenario):
         ticks.append(tick)
+        tick.signals = {"gap": np.array([0.1, np.nan, -3.0, 1e9, tick.time_s])}
         if tick.index > 10:
             tick.position[0] = tick.target[0] = np.nan
     recorder.event(RoleChanged(t_s=0.05, agent=1, role="member"))

@@ -7,13 +7,14 @@ they go through the codec too, as between processes, and must come out equal.
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from time import perf_counter, process_time
 from typing import Final, Protocol, TypeVar, assert_never
 
 from agent.codec import decode_command, decode_gossip, decode_observation, encode, hear_beacon
+from agent.config import AgentSetup
 from agent.core import Agent, Decoders
 from agent.late_frames import LateFrames
 from agent.messages import Observation
@@ -85,6 +86,18 @@ class StepWatch(Protocol):
         """Note that it has returned."""
 
 
+class InputTap(Protocol):
+    """Learns what one agent is given: all that it decides on."""
+
+    agent: int
+
+    def begin(self, setup: AgentSetup) -> None:
+        """Note that a process of the agent starts."""
+
+    def step(self, frames: Sequence[Frame], observation: Observation) -> None:
+        """Note the frames that the agent hears before it steps, and the observation."""
+
+
 class VirtualFleet:
     """A fleet, its radio and its world, stepped slot by slot."""
 
@@ -93,7 +106,9 @@ class VirtualFleet:
         scenario: Scenario,
         recorder: Recorder | None = None,
         watch: StepWatch | None = None,
+        tap: InputTap | None = None,
     ) -> None:
+        self._tap = tap
         self.ended_by: str | None = None
         """What in the scenario ends the run before its time; None: nothing so far."""
         self._watch = watch
@@ -165,6 +180,8 @@ class VirtualFleet:
     def _new_agent(self, agent: int, incarnation: int) -> Agent:
         self._late[agent] = LateFrames()
         setup = self._scenario.agent_setup(agent, incarnation, VIRTUAL_COMMAND_TICKS)
+        if self._tap is not None and self._tap.agent == agent:
+            self._tap.begin(setup)
         if self._watch is None:
             return Agent(setup, self._decoders)
         self._watch.enter(agent, self._slot)
@@ -178,6 +195,8 @@ class VirtualFleet:
         if checks:
             _check_codec(observation, decode_observation(encode(observation)))
         inbox = self._inboxes[agent]
+        if self._tap is not None and self._tap.agent == agent:
+            self._tap.step([frame for batch in inbox for frame in batch], observation)
         while inbox:
             for frame in inbox.popleft():
                 core.receive(frame.source, frame.channel, frame.payload, observation.time_s)

@@ -50,3 +50,19 @@ def filter_row(mode: FilterMode, controllers: ControllerCounters) -> FilterRow |
         "mean_mps": use.mean_mps,
         "most_mps": use.most_mps,
     }
+
+
+def filter_texts(row: FilterRow | None) -> list[str]:
+    """Return a line on what the safety filter changed, or would have changed; none for nothing."""
+    if row is None:
+        return ["the safety filter was off"]
+    acted = [share or 0.0 for share in row["acted_fraction"]]
+    if not any(acted):
+        return ["the safety filter would have changed nothing"] if row["mode"] == "watch" else []
+    most = max(range(len(acted)), key=acted.__getitem__)
+    changed_mps = max(each or 0.0 for each in row["most_mps"])
+    acts = "would have changed" if row["mode"] == "watch" else "changed"
+    return [
+        f"the safety filter {acts} {100 * sum(acted) / len(acted):.1f} % of the velocities, by at"
+        f" most {changed_mps:.2f} m/s; most often those of agent {most} ({100 * acted[most]:.1f} %)"
+    ]

@@ -111,6 +111,11 @@ class Run:
         return self._table("metrics")
 
     @property
+    def signals(self) -> Table:
+        """What the controllers state of themselves, of each agent at each tick."""
+        return self._table("signals")
+
+    @property
     def packets(self) -> Table:
         """The radio's counters at each tick."""
         return self._table("packets")

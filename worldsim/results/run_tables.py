@@ -6,6 +6,7 @@ and the exported files take names, units, frames and meanings from LAYOUTS.
 
 import json
 from collections.abc import Iterable, Sequence
+from math import isnan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -132,6 +133,14 @@ LAYOUTS: dict[str, Layout] = {
                 "",
                 "least distance since the last tick, centre to surface",
             ),
+        ),
+    ),
+    "signals": Layout(
+        "a row for each tick, signal and agent at which the agent's controller states it",
+        (
+            *_ROW,
+            Column("signal", "text", "", "", "its name, as in Intent.signals"),
+            Column("value", "number", "", "", "what it states, in a unit of its own"),
         ),
     ),
     "packets": Layout(
@@ -261,6 +270,18 @@ def metrics(rows: RunRows, figures: Sequence[Figures]) -> Table:
         _stacked(rows, [tick.turn_deg for tick in rows.ticks]),
         _stacked(rows, [nothing if each is None else each for each in distances]),
     )
+
+
+def signals(rows: RunRows) -> Table:
+    """Return the table of what controllers state of themselves."""
+    found = [
+        (tick.time_s, tick.index, agent, name, value)
+        for tick in rows.ticks
+        for name, series in sorted(tick.signals.items())
+        for agent, value in enumerate(series.tolist())
+        if not isnan(value)
+    ]
+    return _table("signals", *zip(*found, strict=True) if found else [()] * 5)
 
 
 def packets(rows: RunRows) -> Table:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from worldsim.judge.finding import ExpectationRow
 from worldsim.judge.sub_formations import SubFormationsRow
 from worldsim.recording.layout import SUMMARY_FILE
+from worldsim.results.controller_rows import filter_texts
 from worldsim.results.expectation_text import (
     Circumstances,
     EncounterRow,
@@ -61,6 +62,7 @@ def remarks(summary: Summary) -> list[str]:
         *_encounters(summary["encounters"]),
         *(f"  {text}" for text in fault_texts(summary["faults"])),
         f"  {_accuracy(summary)}",
+        *(f"  {text}" for text in filter_texts(summary["safety_filter"])),
         *_sub_formations(summary["sub_formations"]),
         *_delivery(summary["delivery"]),
         *_rejected(summary["rejected_by_cause"]),
@@ -194,9 +196,13 @@ def _mark(row: ExpectationRow) -> str:
 
 
 def _accuracy(summary: Summary) -> str:
-    error = _slot_error(summary["phases"][-1]["residual_m"], "not every agent has a place")
-    turns = summary["turns_over_limit_fraction"]
-    return f"largest slot error at the end: {error}; steps over the turn limit: {_percent(turns)}"
+    residual_m, turns = summary["phases"][-1]["residual_m"], summary["turns_over_limit_fraction"]
+    told = f"steps over the turn limit: {_percent(turns)}"
+    forms = any(row["name"].startswith("converge") for row in summary["expectations"])
+    if residual_m is None and not forms:
+        return told  # who forms nothing has no slots
+    error = _slot_error(residual_m, "not every agent has a place")
+    return f"largest slot error at the end: {error}; {told}"
 
 
 def _sub_formations(rows: list[SubFormationsRow]) -> list[str]:
