@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.processes.harness import QSWARM, Started
+from tests.tutorial.meeting import assert_agreed, save_files, trace_of
 
 pytestmark = [pytest.mark.processes, pytest.mark.real_time]
 
@@ -64,6 +65,25 @@ def test_a_failing_controller_is_named_and_its_vehicle_hovers(start: Start, tmp_
     assert "(not scheduled); its vehicle stops and hovers" in fleet.text
     kills = [json.loads(line) for line in (run / "events.jsonl").read_text().splitlines()]
     assert [(kill["kind"], kill["agent"], kill["status"]) for kill in kills] == [("kill", 2, 1)]
+
+
+def test_controllers_agree_in_their_own_words_under_each_clock(
+    start: Start, tmp_path: Path
+) -> None:
+    save_files(tmp_path)
+    meeting = str(tmp_path / "meeting.toml")
+    flights = {
+        "virtual": ("sim", "--duration", "4"),
+        "lockstep": ("run", "--lockstep", "--duration", "4"),
+        "processes": ("run", "--duration", "5"),
+    }
+    for name, (kind, *options) in flights.items():
+        run = tmp_path / name
+        fleet = start(*QSWARM, kind, meeting, "--out", str(run), *options)
+        assert fleet.status(40.0) == 0, fleet.text
+        assert_agreed(run)
+    assert trace_of(tmp_path / "lockstep") == trace_of(tmp_path / "virtual")
+    assert "knows of 9" in (tmp_path / "processes" / "logs" / "agent-4.log").read_text()
 
 
 SLOW = """

@@ -21,6 +21,7 @@ from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.phase import ConvergenceTimer, Phase
 from worldsim.judge.radio_events import Healed, Partitioned, RadioRunEvent
 from worldsim.judge.run_events import (
+    ControllerLogged,
     FormationGiven,
     FrameGiven,
     Joined,
@@ -130,7 +131,9 @@ class Watcher:
                 self._change_team(event.kind, event.t_s, event.agent, runs=True)
             case SlotChanged():
                 self._note_move(event)
-            case SensorChanged() | QueueChanged() | RoleChanged() | LateStart():
+            case (
+                SensorChanged() | QueueChanged() | RoleChanged() | LateStart() | ControllerLogged()
+            ):
                 pass
             case _:
                 assert_never(event)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from agent.controller import Flown, Heard, Intent, Peer, Senses
+from agent.controller import Flown, Heard, Intent, Outgoing, Peer, Received, Senses
 from tests.tutorial.bench import ROOT, set_up
 from tests.tutorial.page import Newcomer, blocks
 
@@ -26,7 +26,9 @@ def test_followed_word_for_word_it_works(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "table", [Senses, Heard, Peer, Flown, Intent], ids=lambda table: table.__name__
+    "table",
+    [Senses, Heard, Peer, Flown, Received, Intent, Outgoing],
+    ids=lambda table: table.__name__,
 )
 def test_every_field_is_told(table: Any) -> None:
     names = inspect.signature(table).parameters

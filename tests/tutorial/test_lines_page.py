@@ -54,8 +54,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         found = NAMED.match(block.text)
         if found is not None:
             (base / found[1]).write_text(block.text)
-    assert {each.name for each in base.iterdir()} == {"ring.toml", "ring.c", "ring.pl"}
+    assert {each.name for each in base.iterdir()} == {"ring.toml", "ring.c", "ring.pl", "meeting.c"}
     return base
+
+
+def build(program: str, folder: Path) -> None:
+    """Compile a program of the page as it says."""
+    lines = [line for block in blocks(PAGE.read_text()) for line in block.text.splitlines()]
+    (said,) = [line for line in lines if line.startswith("gcc") and f"-o {program} " in line]
+    subprocess.run(said, shell=True, check=True, cwd=folder)
 
 
 def trace_of(folder: Path, control: str, radius_m: float = 3.0) -> str:
@@ -73,8 +80,7 @@ def trace_of(folder: Path, control: str, radius_m: float = 3.0) -> str:
 def test_a_program_in_c_flies_as_the_same_controller_in_python(folder: Path) -> None:
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not installed")
-    (build,) = [b.text for b in blocks(PAGE.read_text()) if b.text.startswith("gcc")]
-    subprocess.run(build.splitlines()[0], shell=True, check=True, cwd=folder)
+    build("ring", folder)
     own = 'command = ["./ring"]'
     same = trace_of(folder, own)
     assert same == trace_of(folder, f'controller = "{__name__}:Ring"')

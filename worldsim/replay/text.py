@@ -17,10 +17,9 @@ LEAST_MPS = 1e-3
 def step_text(step: Step) -> str:
     """Return what an agent sensed and wanted at a step, in a few lines."""
     senses, intent = step.senses, step.intent
-    heard = ", ".join(f"a{each.id} {each.age_s:.2f} s" for each in senses.neighbours) or "nobody"
     lines = [
         f"{senses.now_s:.3f} s  at {_point(senses.position)}, heading {senses.yaw:.2f} rad",
-        f"  hears  {heard}",
+        f"  hears  {_heard(step)}",
         *_inbox(step),
         f"  wants  {_point(intent.velocity)} m/s{_claim(step)}",
         *_filtered(step),
@@ -56,11 +55,21 @@ def step_json(step: Step, lines: SensesLines) -> str:
     return msgspec.json.encode(said).decode()
 
 
+def _heard(step: Step) -> str:
+    """Return the neighbours, the nearest first, with their distance and the age of the news."""
+    at = step.senses.position
+    near = sorted((dist(at, each.position), each.id, each.age_s) for each in step.senses.neighbours)
+    told = [f"a{other} {away_m:.2f} m ({age_s:.2f} s old)" for away_m, other, age_s in near]
+    return ", ".join(told) or "nobody"
+
+
 def _inbox(step: Step) -> Sequence[str]:
     inbox = step.senses.inbox
     if not inbox:
         return ()
-    sizes = ", ".join(f"a{each.source} {len(each.data)} B, {each.age_s:.2f} s" for each in inbox)
+    sizes = ", ".join(
+        f"a{each.source} {len(each.data)} B ({each.age_s:.2f} s old)" for each in inbox
+    )
     return (f"  inbox  {sizes}",)
 
 
