@@ -157,6 +157,8 @@ DEFAULT_CAST_FAR_M = 0.5
 
 
 Argument = Annotated[str, Meta(min_length=1, max_length=4096)]
+ProgramCommand = Annotated[tuple[Argument, ...], Meta(min_length=1, max_length=64)]
+"""A program and its arguments."""
 
 
 class Control(Table, frozen=True):
@@ -191,7 +193,7 @@ class Control(Table, frozen=True):
     parameters: dict[str, Any] = {}
     services: tuple[Service, ...] | None = None
     safety_filter: FilterMode = "on"
-    command: Annotated[tuple[Argument, ...], Meta(min_length=1, max_length=64)] | None = None
+    command: ProgramCommand | None = None
 
 
 class Comms(Table, frozen=True):

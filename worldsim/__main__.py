@@ -72,7 +72,7 @@ def main(arguments: list[str] | None = None) -> int:
     prepare_environment()
     try:
         file = find_scenario(options.scenario)
-        scenario = admit(load(file), file, PROCESS_COMMAND_TICKS, by_hand=True)
+        scenario = admit(load(file), file, PROCESS_COMMAND_TICKS, "by hand")
     except ScenarioError as error:
         print(f"world: {error}", file=sys.stderr)
         return 2

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 if TYPE_CHECKING:
+    from worldsim.engine.preflight import Processes
     from worldsim.live.live_view import LiveView
     from worldsim.scenario.tables import Scenario
 
@@ -169,10 +170,12 @@ JUnit = Annotated[
 ]
 
 
-def load_scenario(given: str, overrides: Mapping[str, str], command_ticks: int) -> "Scenario":
+def load_scenario(
+    given: str, overrides: Mapping[str, str], command_ticks: int, processes: "Processes" = "none"
+) -> "Scenario":
     """Return a scenario, given by path or name, that may run where a command lives so long [ticks].
 
-    Raises ScenarioError.
+    processes: how they are started. Raises ScenarioError.
     """
     from worldsim.engine.preflight import admit
     from worldsim.fleet.import_probe import import_problem
@@ -186,7 +189,7 @@ def load_scenario(given: str, overrides: Mapping[str, str], command_ticks: int) 
     if problem is not None:
         name = scenario.control.controller
         raise ScenarioError(file, "control.controller", f"{name!r}: {problem}")
-    return admit(scenario, file, command_ticks)
+    return admit(scenario, file, command_ticks, processes)
 
 
 def warn(given: str, scenario: "Scenario") -> None:

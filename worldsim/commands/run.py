@@ -85,7 +85,7 @@ def run(
     check_lockstep(lockstep, speed, shards, on_overload)
     overrides = overrides_of(settings, agents, seed, duration)
     command_ticks = VIRTUAL_COMMAND_TICKS if lockstep else PROCESS_COMMAND_TICKS
-    loaded = load_scenario(scenario, overrides, command_ticks)
+    loaded = load_scenario(scenario, overrides, command_ticks, "launched")
     warn(scenario, loaded)
     output = Output(quiet, json, junit)
     output.check(out)

@@ -59,18 +59,25 @@ def check(
 
     Warnings go to stderr. Nothing is started.
     """
-    from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
+    from worldsim.engine.preflight import (
+        PROCESS_COMMAND_TICKS,
+        VIRTUAL_COMMAND_TICKS,
+        foreign_problem,
+    )
     from worldsim.engine.start_reach import start_warnings
     from worldsim.scenario.file import dump
     from worldsim.scenario.rules import speed_problem
 
     overrides = overrides_of(settings, agents, seed, duration)
-    loaded = load_scenario(scenario, overrides, VIRTUAL_COMMAND_TICKS)
+    loaded = load_scenario(scenario, overrides, VIRTUAL_COMMAND_TICKS, "launched")
     warn(scenario, loaded)
     for caution in start_warnings(loaded):
         complain(f"{scenario}: {caution.key}: warning: {caution.detail}")
     outrun = speed_problem(loaded, PROCESS_COMMAND_TICKS)
     if outrun is not None:
         complain(f"{scenario}: {outrun.key}: warning: 'qswarm run' rejects this: {outrun.detail}")
+    foreign = foreign_problem(loaded, "none")
+    if foreign is not None:
+        complain(f"{scenario}: {foreign.key}: warning: 'qswarm sim' rejects this: {foreign.detail}")
     sys.stdout.write(dump(loaded))
     return PASS

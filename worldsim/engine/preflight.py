@@ -6,7 +6,7 @@ the vehicles apart under the run's clock.
 
 import shutil
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 import msgspec
 from msgspec.structs import replace
@@ -35,18 +35,23 @@ PROCESS_COMMAND_TICKS: Final = 2
 """Lifetime of a command of free-running processes [ticks]; H of docs/method.md."""
 
 
+Processes = Literal["launched", "by hand", "none"]
+"""How a run's processes are started: by the launcher, by hand, or not at all in virtual time."""
+
+
 def admit(
-    scenario: Scenario, file: str | Path, command_ticks: int, by_hand: bool = False
+    scenario: Scenario, file: str | Path, command_ticks: int, processes: Processes = "none"
 ) -> Scenario:
     """Return a scenario as it is flown: with all parameters of its controller.
 
-    command_ticks: lifetime of a command under the run's clock. by_hand: the processes are started
-    by hand, so that events on processes cannot be carried out. Raises ScenarioError where the
-    scenario cannot be flown.
+    command_ticks: lifetime of a command under the run's clock. processes: how they are started; by
+    hand, events on them cannot be carried out. Raises ScenarioError where the scenario cannot be
+    flown.
     """
     problem = (
         speed_problem(scenario, command_ticks)
-        or (_launcher(scenario) if by_hand else None)
+        or (_launcher(scenario) if processes == "by hand" else None)
+        or (foreign_problem(scenario, processes) if processes != "launched" else None)
         or _controller(scenario)
         or _services(scenario)
         or _room(scenario)
@@ -54,7 +59,23 @@ def admit(
     )
     if problem is not None:
         raise ScenarioError(file, *problem)
-    return _with_parameters(_with_command(scenario, Path(file)), file)
+    placed = _with_agents_commands(_with_command(scenario, Path(file)), Path(file))
+    return _with_parameters(placed, file)
+
+
+def foreign_problem(scenario: Scenario, processes: Processes) -> Problem | None:
+    """Return a problem for the first foreign agent of a run without a launcher."""
+    for index, table in enumerate(scenario.agent):
+        if table.command is not None:
+            reason = (
+                "a process of its own cannot fly in virtual time; use qswarm run, with --lockstep"
+                " for repeatable runs"
+                if processes == "none"
+                else "needs the launcher (qswarm run): start this agent by hand, too, and leave the"
+                " key out"
+            )
+            return Problem(f"agent[{index}].command", reason)
+    return None
 
 
 def _launcher(scenario: Scenario) -> Problem | None:
@@ -125,29 +146,47 @@ def _with_parameters(scenario: Scenario, file: str | Path) -> Scenario:
 
 
 def _with_command(scenario: Scenario, file: Path) -> Scenario:
-    """Return a scenario whose command names a program by its whole path.
+    """Return a scenario whose command names a program by its whole path."""
+    command = scenario.control.command
+    if command is None:
+        return scenario
+    found = _found_command(command, "control.command", file)
+    return replace(scenario, control=replace(scenario.control, command=found))
+
+
+def _with_agents_commands(scenario: Scenario, file: Path) -> Scenario:
+    """Return a scenario whose foreign agents' commands name their programs by their whole paths."""
+    tables = tuple(
+        table
+        if table.command is None
+        else replace(table, command=_found_command(table.command, f"agent[{k}].command", file))
+        for k, table in enumerate(scenario.agent)
+    )
+    return replace(scenario, agent=tables)
+
+
+def _found_command(command: tuple[str, ...], key: str, file: Path) -> tuple[str, ...]:
+    """Return a command whose program is named by its whole path.
 
     A program with a slash in its name, and an argument that names a file, are relative to the
-    scenario's folder.
+    scenario's folder. Raises ScenarioError where there is no such program, or it is not executable.
     """
-    if scenario.control.command is None:
-        return scenario
-    for index, each in enumerate(scenario.control.command):
+    for index, each in enumerate(command):
         if "\0" in each:
             detail = "holds a NUL, which no argument of a program may"
-            raise ScenarioError(file, f"control.command[{index}]", detail)
-    program, *arguments = scenario.control.command
-    beside = str((file.parent / program).resolve())
+            raise ScenarioError(file, f"{key}[{index}]", detail)
+    program, *arguments = command
+    beside = str((file.parent / program).absolute())
     found = shutil.which(beside if "/" in program else program)
     if found is None:
         exists = "/" in program and Path(beside).exists()
         detail = f"{program!r} {'is not executable' if exists else 'does not exist'}"
-        raise ScenarioError(file, "control.command[0]", detail)
+        raise ScenarioError(file, f"{key}[0]", detail)
     placed = [
-        str((file.parent / each).resolve()) if (file.parent / each).is_file() else each
+        str((file.parent / each).absolute()) if (file.parent / each).is_file() else each
         for each in arguments
     ]
-    return replace(scenario, control=replace(scenario.control, command=(found, *placed)))
+    return (found, *placed)
 
 
 def _room(scenario: Scenario) -> Problem | None:

@@ -235,6 +235,7 @@ class Launcher:
             users=self._directory.users,
             steps=self._steps.page,
             counts=self._counts,
+            commands=self._scenario.commands,
         )
         return Zygote(self._zygote_end, config).serve()
 

@@ -12,14 +12,15 @@ import selectors
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple, assert_never
 
 from agent import process as agent_process
 from agent.step_page import CLOSED_FILES, StepPage
-from worldsim.fleet import intruder
+from worldsim.fleet import foreign_agent, intruder
 from worldsim.fleet.fork import ProcessExit, adopt_orphans, end_orphans, fork, reap
 from worldsim.fleet.intruder import Attack, IntruderCounts
 from worldsim.fleet.ipc import (
@@ -45,6 +46,7 @@ AGENT_MEMORY_B = 2 * 1024**3
 AGENT_FILE_B = 64 * 1024**2
 """The longest file that an agent may write; its log stays far below."""
 CLOSED_FILES_EXIT = ProcessExit(None, CLOSED_FILES)
+NO_COMMANDS: Mapping[int, tuple[str, ...]] = MappingProxyType({})
 
 
 class AgentProcessConfig(NamedTuple):
@@ -57,6 +59,7 @@ class AgentProcessConfig(NamedTuple):
     users: Path | None = None  # file of passwords, where the router requires one
     steps: StepPage | None = None  # where agents note their steps
     counts: IntruderCounts | None = None  # where intruders count their messages
+    commands: Mapping[int, tuple[str, ...]] = NO_COMMANDS  # of each foreign agent, by id
 
 
 class Zygote:
@@ -191,7 +194,7 @@ class Zygote:
         """
         for pid, running in self._agents.items():
             if running == process:
-                os.kill(pid, number)
+                self._kill(pid, number)
                 if awaited is not None:
                     os.waitid(os.P_PID, pid, awaited | os.WEXITED | os.WNOWAIT)
 
@@ -199,6 +202,10 @@ class Zygote:
         pid = fork(
             self._log(process), signal.SIGKILL, lambda: self._run_agent(process.agent, after_s)
         )
+        if process.agent in self._config.commands:
+            foreign_agent.own_group(pid)
+            if self._config.steps is not None:  # a foreign agent does not write its row itself
+                self._config.steps.note_pid(process.agent, pid)
         exit_descriptor = os.pidfd_open(pid)
         self._agents[pid] = process
         self._selector.register(
@@ -211,11 +218,17 @@ class Zygote:
         time.sleep(after_s)
         _limit_resources()
         config = self._config
+        command = config.commands.get(agent)
+        if command is not None:
+            told = foreign_agent.options_of(agent, config.run, config.endpoint, config.users)
+            return foreign_agent.become(agent, command, told)
         row = config.steps.row(agent) if config.steps is not None else None
         patience = agent_process.launched(config.long_lease)
         return agent_process.run(agent, config.run, config.endpoint, patience, config.users, row)
 
     def _reap(self, exit_descriptor: int, pid: int) -> None:
+        if self._agents[pid].agent in self._config.commands:
+            foreign_agent.signal_group(pid, signal.SIGKILL)  # what it has started ends with it
         process_exit = reap(pid)
         if process_exit is None:
             return
@@ -236,6 +249,13 @@ class Zygote:
 
     def _signal_all(self, number: signal.Signals) -> None:
         for pid in self._agents:
+            self._kill(pid, number)
+
+    def _kill(self, pid: int, number: signal.Signals) -> None:
+        """Signal an agent's process, and what a foreign one has started."""
+        if self._agents[pid].agent in self._config.commands:
+            foreign_agent.signal_group(pid, number)
+        else:
             os.kill(pid, number)
 
 

@@ -22,7 +22,7 @@ from worldsim.scenario.orientation_checks import yaws_not_held
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.safety_checks import SAFETY_WARNINGS
 from worldsim.scenario.start import BoxStart, ListStart
-from worldsim.scenario.tables import CONVERGED_S, SLOTS_PER_TICK, Scenario
+from worldsim.scenario.tables import CONVERGED_S, SLOTS_PER_TICK, AgentTable, Scenario
 from worldsim.scenario.target_frame import frame_problem, path_of
 from worldsim.scenario.team_checks import empty_queues
 from worldsim.scenario.toml import ScenarioError
@@ -180,6 +180,13 @@ def _known_agents(scenario: Scenario) -> Problem | None:
         for agent in table.ids:
             if agent >= scenario.rows:
                 return _unknown_agent(f"agent[{index}].ids", agent, scenario)
+    return None
+
+
+def _agents_differ(scenario: Scenario) -> Problem | None:
+    for index, table in enumerate(scenario.agent):
+        if table == AgentTable(ids=table.ids):
+            return Problem(f"agent[{index}]", "changes nothing; give vehicle, command or both")
     return None
 
 
@@ -403,6 +410,7 @@ RULES = (
     _starts_inside,
     _starts_separated,
     _known_agents,
+    _agents_differ,
     _known_briefed,
     _known_links,
     _cast_zone_not_empty,

@@ -17,6 +17,7 @@ from agent.config import (
     Control,
     Hertz,
     Positive,
+    ProgramCommand,
     Sensors,
     Table,
     Vehicle,
@@ -78,10 +79,15 @@ VehicleChange = msgspec.defstruct(
 
 
 class AgentTable(Table, frozen=True):
-    """Some agents that differ: their ``ids``, and the keys of ``vehicle`` with their own values."""
+    """Some agents that differ: their ``ids``, and the keys of ``vehicle`` with their own values.
+
+    command: a program and its arguments that is started in place of each of these agents, and
+    speaks with the others over Zenoh by itself (docs/wire.md); not in virtual time.
+    """
 
     ids: Annotated[tuple[AgentId, ...], Meta(min_length=1, max_length=MAX_AGENTS)]
-    vehicle: VehicleChange  # type: ignore[valid-type]  # made by defstruct from Vehicle
+    vehicle: VehicleChange = VehicleChange()  # type: ignore[valid-type]  # made by defstruct
+    command: ProgramCommand | None = None
 
 
 class Expectations(Table, frozen=True):
@@ -193,6 +199,16 @@ class Scenario(Table, frozen=True, omit_defaults=False):
                 changes = {key: value for key, value in keys.items() if value is not None}
                 vehicle = msgspec.structs.replace(vehicle, **changes)
         return vehicle
+
+    @property
+    def commands(self) -> dict[int, tuple[str, ...]]:
+        """The command of each foreign agent, by id: that of the last [[agent]] table with one."""
+        return {
+            agent: table.command
+            for table in self.agent
+            if table.command is not None
+            for agent in table.ids
+        }
 
     def medium_setup(self) -> MediumSetup:
         """Return the setup of the medium."""

@@ -93,6 +93,7 @@ EXAMPLES: Given = {
 OF_OWN_CONTROLLERS = ("command", "parameters", "services", "safety_filter")
 """Keys of [control] that serve controllers of one's own; see docs/controllers.md."""
 BRIEF: Mapping[str, tuple[str, ...]] = {
+    "agent": ("ids", "vehicle"),  # a command needs a program; see docs/wire.md
     "agent.vehicle": ("max_speed_mps",),
     "control": tuple(key for key in Control.__struct_fields__ if key not in OF_OWN_CONTROLLERS),
     "event": ("at_s", "kill"),
