@@ -4,7 +4,7 @@
 It imports nothing of qswarm: only the standard library, eclipse-zenoh and msgpack. It flies
 free-running and in lockstep, tells its neighbours where it is, takes a free place of the formation,
 keeps its distance from what its vehicle senses, and gives its place up to whoever else claims it.
-It knows straight queues that begin at one vertex, and the mission that it is briefed with.
+It learns missions by radio, but knows only straight queues that begin at one vertex.
 """
 
 import argparse
@@ -19,14 +19,18 @@ from zlib import crc32
 import msgpack
 import zenoh
 
-LOCAL = 0  # the radio's channel of beacons
-MISSION = 0  # key of the mission of the briefing
+LOCAL, MULTIHOP = 0, 1  # the radio's channels: beacons on one, missions on the other
+BRIEFED = 0  # key of the mission of the briefing
+PIECE_B = 900  # longest part of a mission in one frame
+VERSION = 65536  # a newer mission's key is at least so much higher
 NONE = -1
+REST = (0.0, 0.0, 0.0, 0.0)
 MEMBER, DISTRESS = 0, 3  # roles
 UNPLACED, FIRST_QUEUE = 1, 2  # codes by which the team counts its members
 SILENT_S = 1.5  # who is silent for longer is gone
-PATIENCE_S = 4.0  # so long it waits for others to take their places first
+PATIENCE_S = 2.0  # so long it waits for others to take their places first
 SETTLE_S = 1.0  # so long a better place must be free until it changes
+YIELD_S = 0.3  # so long it claims nothing after it has yielded
 GAIN = 1.2  # speed for a distance [1/s]
 MARGIN_M = 0.2  # kept beyond the least distances
 
@@ -39,6 +43,12 @@ def add(a, b, factor=1.0):
 def dot(a, b):
     """Return the scalar product."""
     return sum(x * y for x, y in zip(a, b, strict=True))
+
+
+def payload_of(fields):
+    """Return a radio payload: fields in the order of the wire, and their checksum."""
+    data = msgpack.packb(fields)
+    return data + crc32(data).to_bytes(4, "little")
 
 
 class Beacon:
@@ -57,15 +67,15 @@ class Beacon:
 
 
 class Formation:
-    """The places of straight queues: (queue, rank), rank 0 is the vertex."""
+    """The places of straight queues: (queue, rank), rank 0 is the vertex. Raises ValueError."""
 
     def __init__(self, tables, spacing_m):
         self.vertices = tables["vertices"]
         self.queues = tables["queue"]
         self.spacing_m = spacing_m
         for each in self.queues:
-            if each["shape"]["kind"] != "ray" or len(each["vertices"]) != 1:
-                sys.exit(f"queue {each['name']!r}: only straight queues of one vertex are known")
+            if (each.get("shape") or {}).get("kind") != "ray" or len(each["vertices"]) != 1:
+                raise ValueError(f"queue {each['name']!r}: only straight queues of one vertex")
 
     def point(self, place):
         """Return where a place is in the formation's frame [m]."""
@@ -97,26 +107,32 @@ class Agent:
 
     def __init__(self, setup):
         self.setup, self.id = setup, setup["id"]
-        if setup["formation"] is None:
-            sys.exit("it is not briefed, and knows no way to learn a mission by radio")
         control = setup["control"]
-        self.formation = Formation(setup["formation"], control["spacing_m"])
-        waypoints, _, _, yaw, *_ = setup["frame"]
-        self.frame = [*waypoints[0], yaw]
-        self.frame_velocity, self.frame_s = [0.0, 0.0, 0.0, 0.0], 0.0
+        self.mission, self.formation = NONE, None
+        self.pieces = {}  # of missions, by sender and key
+        self.encoded, self.next_round_s = b"", 0.0  # the own mission, for who lacks it
+        self.held = []  # frames of a step that is to take long, in lockstep
+        self.place, self.cost_m = None, 0.0
+        if setup["formation"] is not None:
+            self.adopt(BRIEFED, setup["frame"], msgpack.packb(setup["formation"]))
         self.least_m = (control["separation_m"] + MARGIN_M, control["clearance_m"] + MARGIN_M)
         self.heard = {}  # beacons by id
         self.sequence, self.next_beacon_s = 0, 0.0
-        self.place, self.cost_m = None, 0.0
-        self.alone_s = self.better_s = None
+        self.alone_s = self.yielded_s = -1e9
+        self.better_s = None
 
     def receive(self, batches):
-        """Take the frames of some batches; what is damaged or not of the local channel is left."""
+        """Take the frames of some batches, without damaged ones."""
         for batch in batches:
             for source, _, channel, _, payload in batch[1]:
                 data, checksum = payload[:-4], payload[-4:]
-                if channel == LOCAL and crc32(data).to_bytes(4, "little") == checksum:
-                    self.hear(source, Beacon(msgpack.unpackb(data)))
+                if crc32(data).to_bytes(4, "little") != checksum:
+                    continue
+                fields = msgpack.unpackb(data)
+                if channel == LOCAL:
+                    self.hear(source, Beacon(fields))
+                elif fields[3] is not None:
+                    self.learn(source, *fields[3][:4])
 
     def hear(self, source, beacon):
         """Keep a neighbour's newest beacon, and follow the frame that it tells of."""
@@ -124,9 +140,37 @@ class Agent:
         if beacon.id != source or (known is not None and known.stamp_s >= beacon.stamp_s):
             return
         self.heard[source] = beacon
-        if beacon.frame_key == MISSION and beacon.drift is not None:
-            self.frame, self.frame_s = beacon.frame, beacon.drift[0]
-            self.frame_velocity = beacon.drift[1:]
+        if beacon.frame_key == self.mission:
+            since_s, *velocity = beacon.drift or (beacon.stamp_s, *REST)
+            self.frame, self.frame_s, self.frame_velocity = beacon.frame, since_s, velocity
+
+    def learn(self, source, key, index, count, data):
+        """Take a piece of a mission; with the last one of a sender, fly it."""
+        if key <= self.mission:
+            return
+        parts = self.pieces.setdefault((source, key, count), {})
+        parts[index] = data
+        if len(parts) == count:
+            self.pieces.clear()
+            self.adopt(key, *msgpack.unpackb(b"".join(parts[k] for k in range(count)))[:2])
+
+    def obey(self, key, path, formation):
+        """Take an operator's order; without a formation, only the frame's path is another one."""
+        formation = formation or msgpack.unpackb(self.encoded)[1]
+        version = max(self.mission, 0) // VERSION + 1
+        self.adopt(key or version * VERSION + self.id, path, formation)
+
+    def adopt(self, key, path, formation):
+        """Fly another mission, if its formation (as msgpack) is one that this agent knows."""
+        try:
+            tables = msgpack.unpackb(formation)
+            self.formation = Formation(tables, self.setup["control"]["spacing_m"])
+        except ValueError as error:
+            print(f"mission {key} is left to the others: {error}", file=sys.stderr)
+            return
+        waypoints, _, _, yaw, *_ = path
+        self.mission, self.place, self.encoded = key, None, msgpack.packb([path, formation])
+        self.frame, self.frame_s, self.frame_velocity = [*waypoints[0], yaw], 0.0, REST
 
     def world_point(self, place, now_s):
         """Return where a place is in the world now [m], and how it moves [m/s]."""
@@ -141,20 +185,15 @@ class Agent:
     def choose(self, here, now_s):
         """Keep a place, give it up, or take another one; return the members that are heard."""
         self.heard = {k: b for k, b in self.heard.items() if now_s - b.stamp_s < SILENT_S}
-        members = [b for b in self.heard.values() if b.mission == MISSION and b.standing]
-        if not any(each.leads for each in members):
+        members = [b for b in self.heard.values() if b.mission == self.mission and b.standing]
+        if self.mission == NONE or not any(each.leads for each in members):
             self.alone_s, self.place = now_s, None
             return None  # nobody counts the team yet: it is no part of it, and claims nothing
         claimed = {each.place for each in members if each.place is not None}
         if self.place in claimed:
-            self.place = None  # the other one keeps it: this agent yields to everybody
-        waits = any(each.place is None for each in members)
-        if self.place is None and (not waits or now_s - (self.alone_s or 0.0) > PATIENCE_S):
-
-            def away_m(place):
-                return dist(here, self.world_point(place, now_s)[0])
-
-            self.take(self.formation.best(claimed, away_m), here, now_s)
+            self.place, self.yielded_s = None, now_s  # it yields to everybody
+        if self.place is None and not self.waits(members, now_s):
+            self.take(self.formation.best(claimed, self.away_m(here, now_s)), here, now_s)
         elif self.place is not None:
             nearer = self.formation.free(self.place[0], claimed)
             if nearer[1] >= self.place[1] or self.better_s is None:
@@ -163,10 +202,21 @@ class Agent:
                 self.take(nearer, here, now_s)  # the queue closes up
         return members
 
+    def waits(self, members, now_s):
+        """Return whether others choose before this agent; later, only those of lower ids do."""
+        without = [each.id for each in members if each.place is None]
+        if now_s - self.alone_s > PATIENCE_S:
+            without = [each for each in without if each < self.id]
+        return bool(without) or now_s - self.yielded_s < YIELD_S
+
+    def away_m(self, here, now_s):
+        """Return a function: how far a place is [m]."""
+        return lambda place: dist(here, self.world_point(place, now_s)[0])
+
     def take(self, place, here, now_s):
         """Claim a place."""
         self.place, self.better_s = place, None
-        self.cost_m = dist(here, self.world_point(place, now_s)[0])
+        self.cost_m = self.away_m(here, now_s)(place)
 
     def wanted(self, here, yaw, now_s):
         """Return the wanted velocity [m/s] and heading [rad]: to the place, turning first."""
@@ -206,8 +256,12 @@ class Agent:
 
     def step(self, observation):
         """Return the encoded command and transmission for an observation."""
-        slot, now_s, here, _, yaw, vehicles, obstacles = observation[:7]
+        slot, now_s, here, _, yaw, vehicles, obstacles, orders = observation[:8]
+        late_slots, takes_s = (*observation[9:11], 0, 0.0)[:2]
         setup = self.setup
+        for order in orders:
+            if order[0] == 0 or order[0] > self.mission:
+                self.obey(*order[:3])
         members = self.choose(here, now_s)
         wanted, heading = self.wanted(here, yaw, now_s)
         velocity = self.safe(wanted, vehicles, obstacles)
@@ -215,18 +269,37 @@ class Agent:
         force = sqrt(dot(wanted, wanted))
         role = DISTRESS if self.place is None else MEMBER
         heard = sorted(self.heard)
-        telemetry = [wanted, force, target, self.place, heard, [], MISSION, NONE, NONE, role]
+        telemetry = [wanted, force, target, self.place, heard, [], self.mission, NONE, NONE, role]
         until = slot + setup["command_ticks"] * setup["slots_per_tick"]
         command = [slot, setup["incarnation"], until, velocity, heading, [0.0, 0.0], telemetry]
         frames = []
         if now_s >= self.next_beacon_s:
             self.next_beacon_s = now_s + 1.0 / setup["comms"]["local_hz"] - 1e-9
             frames.append([LOCAL, self.beacon(now_s, here, velocity, target or here, members)])
+        if now_s >= self.next_round_s and any(
+            b.mission < self.mission for b in self.heard.values()
+        ):
+            self.next_round_s = now_s + 0.25 / max(setup["comms"]["multihop_hz"], 0.1)
+            frames += [[MULTIHOP, payload] for payload in self.mission_pieces(now_s)]
+        if not setup["lockstep"]:
+            time.sleep(takes_s)  # the fault "slow"; where time waits, only its frames are late
+            slot += late_slots
+        elif late_slots:
+            frames, self.held = self.held, frames
+        else:
+            frames, self.held = self.held + frames, []
         transmission = [slot, setup["incarnation"], frames]
         return msgpack.packb(command), msgpack.packb(transmission)
 
+    def mission_pieces(self, now_s):
+        """Return the payloads that carry the own mission."""
+        parts = [self.encoded[k : k + PIECE_B] for k in range(0, len(self.encoded), PIECE_B)]
+        for index, part in enumerate(parts):
+            piece = [self.mission, index, len(parts), part]
+            yield payload_of([self.id, now_s, [], piece])
+
     def beacon(self, now_s, here, velocity, target, members):
-        """Return the payload of a beacon: its fields in the order of the wire, and the checksum."""
+        """Return the payload of a beacon."""
         self.sequence += 1
         queue_index, rank = self.place or (NONE, NONE)
         standing = None
@@ -239,11 +312,10 @@ class Agent:
         promise = self.setup["vehicle"]["max_speed_mps"]
         turn = self.sequence % max(1, len(self.heard))
         echoes = [[b.id, b.sequence] for _, b in sorted(self.heard.items())]
-        frame = [NONE, [0.0, 0.0, 0.0, 0.0], None]  # it tells others of no frame
+        frame = [NONE, REST, None]  # it tells others of no frame
         echoes = (echoes + echoes)[turn : turn + 8][: len(echoes)]
-        fields = [*identity, *motion, *claim, promise, echoes, MISSION, *frame, [], standing]
-        data = msgpack.packb(fields)
-        return data + crc32(data).to_bytes(4, "little")
+        fields = [*identity, *motion, *claim, promise, echoes, self.mission, *frame, [], standing]
+        return payload_of(fields)
 
 
 class Wire:
