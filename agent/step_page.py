@@ -44,6 +44,15 @@ class StepPage:
         """Note the process of a row that is written by nobody else."""
         self.row(agent)[_PID] = pid
 
+    def note_step(self, agent: int, cpu_s: float | None) -> None:
+        """Note for an agent that writes no row that its step begins; None: that it is over.
+
+        cpu_s: CPU time of its process so far [s].
+        """
+        row = self.row(agent)
+        row[_CPU] = 0 if cpu_s is None else round(cpu_s * _US)
+        row[_ENTERED] = 0 if cpu_s is None else round(time.monotonic() * _US)
+
     def read(self, agent: int) -> StepTimes:
         """Return what an agent wrote."""
         row = self.row(agent)

@@ -1,4 +1,4 @@
-"""The parts of the documents made from the code: layout, topics, process life, tables of a run.
+"""The parts of the documents made from the code: layout, topics, messages, tables of a run.
 
     python -m tests.house.generated_docs        # writes them anew
 
@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from netem.wire.keys import TOPICS
+from tests.house.wire_tables import wire_messages, wire_topics
 from worldsim.engine.process_life import diagram
 from worldsim.results.run_tables import LAYOUTS
 
@@ -83,6 +84,8 @@ PARTS = {
     "topics": topics,
     "process_life": process_life,
     "run_tables": run_tables,
+    "wire_topics": wire_topics,
+    "wire_messages": wire_messages,
 }
 
 

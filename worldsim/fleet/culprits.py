@@ -7,7 +7,7 @@ started by hand there is no page, and nobody is named.
 import re
 import signal
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from typing import NamedTuple
 
 from agent.step_page import StepPage, StepTimes
@@ -54,6 +54,33 @@ class SharedSteps(NamedTuple):
         return self.page.read(self.agents + shard).pid
 
 
+class ForeignSteps:
+    """Notes the steps of foreign agents, which do not note them themselves.
+
+    A step lasts from an observation to the next command. steps: None where nobody reads them.
+    """
+
+    def __init__(self, steps: SharedSteps | None, foreign: Container[int]) -> None:
+        self._steps = steps
+        self._foreign = foreign
+
+    def begin(self, agent: int) -> None:
+        """Note that an agent was sent an observation, unless it still owes a command."""
+        if self._steps is None or agent not in self._foreign:
+            return
+        times = self._steps.page.read(agent)
+        process = process_state(times.pid) if times.entered_s is None else None
+        if process is not None:
+            self._steps.page.note_step(agent, process.cpu_s)
+
+    def end(self, agents: Iterable[int]) -> None:
+        """Note that agents owe no command: it has come, or their processes are held up or gone."""
+        if self._steps is not None:
+            for agent in agents:
+                if agent in self._foreign:
+                    self._steps.page.note_step(agent, None)
+
+
 class _Fault(NamedTuple):
     """What an agent's process did."""
 
@@ -85,15 +112,17 @@ class Culprits:
         """Look for the reason why agents have not answered at ``time_s`` [s; simulated time]."""
         if self._steps is None or not late:
             return
+        halted = False
         for shard in range(self._steps.mediums):
-            self._note_stop(
-                medium_name(shard), process_state(self._steps.medium_pid(shard)), time_s
-            )
+            medium = process_state(self._steps.medium_pid(shard))
+            self._note_stop(medium_name(shard), medium, time_s)
+            halted = halted or (medium is not None and medium.stopped)
         for agent in late:
             times = self._steps.page.read(agent)
             process = process_state(times.pid)
             self._note_stop(agent_name(agent), process, time_s)
-            if process is not None and not process.stopped:
+            # While a medium stands still, a foreign agent waits for the next observation.
+            if process is not None and not process.stopped and not halted:
                 self._note_hang(agent, times, process, time_s)
 
     def note_exit(

@@ -7,7 +7,7 @@ is due move the vehicles.
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import msgspec
 import numpy as np
@@ -32,7 +32,7 @@ from worldsim.engine.operations import (
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS
 from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
 from worldsim.fleet.control import Control, ControlServer
-from worldsim.fleet.culprits import Culprits
+from worldsim.fleet.culprits import Culprits, ForeignSteps
 from worldsim.fleet.delivery_latency import DeliveryLatency, LatencyCollector
 from worldsim.fleet.late_under_attack import LateUnderAttack, attackers
 from worldsim.fleet.launcher_link import LauncherLink
@@ -90,10 +90,10 @@ class FreeRunningFleet:
         self.resources = ResourceMeter(launcher.steps)
         self._agent_steps = self._ticks_seen = 0
         self._culprits = Culprits(launcher.steps, launcher.report_notice, speed)
+        self._foreign_steps = ForeignSteps(launcher.steps, scenario.commands)
         self._late_agents: list[int] = []
         self._scenario = scenario
-        self._launcher = launcher
-        self._startup = startup
+        self._launcher, self._startup = launcher, startup
         self._netem = NetemProcess(bus, startup, launcher, self.loop.network, speed)
         self._reconnection = Reconnection(speed)
         self._stops: list[tuple[StopWorldProcess, By]] = []
@@ -293,13 +293,18 @@ class FreeRunningFleet:
         if isinstance(operation, StopWorldProcess):
             self._stops.append((operation, by))
         if isinstance(operation, EndProcesses | PauseProcesses | ResumeProcesses | AdmitAgents):
-            self.lateness.drop_pending(operation.agents)
+            self._expect_nothing(operation.agents)
         if isinstance(operation, ThrottleProcesses):
-            self.lateness.drop_pending(operation.stops)
+            self._expect_nothing(operation.stops)
         for agent in late:
             t_s = round(self.loop.world.time_s, 6)
             detail = "its process is not up by the end of boot_s"
             self.loop.emit(LateStart(t_s=t_s, agent=agent, detail=detail))
+
+    def _expect_nothing(self, agents: Iterable[int]) -> None:
+        """Await no command of agents for the observations that they were sent so far."""
+        self.lateness.drop_pending(agents)
+        self._foreign_steps.end(agents)
 
     def _follow_outage(self, *, was_down: bool) -> None:
         """Await the agents' observation after the end of an outage, and not in one."""
@@ -357,8 +362,10 @@ class FreeRunningFleet:
             if takes_messages:
                 self._observers[agent](encode(self._in_wall_time(observation)))
             if self._is_cut_off(agent) or self.loop.effects.slow.is_late(agent, opened.slot):
-                self.lateness.drop_pending([agent])
-            elif self.lateness.observe(agent, opened.slot, self.loop.world.latest[agent]):
+                self._expect_nothing([agent])
+                continue
+            self._foreign_steps.begin(agent)
+            if self.lateness.observe(agent, opened.slot, self.loop.world.latest[agent]):
                 self._late_agents.append(agent)
 
     def _in_wall_time(self, observation: Observation) -> Observation:
@@ -380,6 +387,7 @@ class FreeRunningFleet:
             return
         if command.incarnation == self.loop.members.incarnations[agent]:
             self._reconnection.hear(agent, self.loop.world.clock.time_s(command.slot))
+            self._foreign_steps.end([agent])
             self.loop.apply_command(agent, command, data)
         else:
             self._rejected["incarnation"] += 1
