@@ -1,5 +1,6 @@
-"""Checks before a run starts: room for those who join, and the controller's parameters."""
+"""Checks before a run starts: room for those who join, parameters, foreign agents."""
 
+import json
 import sys
 from pathlib import Path
 from time import process_time
@@ -11,7 +12,8 @@ import pytest
 from agent.parameters import made
 from netem.compiled import Finder, UnloadableError
 from tests.small_scenario import SMALL
-from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS, admit
+from worldsim.commands.app import command
+from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS, Processes, admit
 from worldsim.scenario.file import dump, parse
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
@@ -135,3 +137,71 @@ def test_parameters_that_nobody_takes_are_refused(scenario: Scenario, said: str)
     with pytest.raises(ScenarioError) as refused:
         admit(scenario, "small.toml", VIRTUAL_COMMAND_TICKS)
     assert str(refused.value) == f"small.toml: {said}"
+
+
+def foreign(arguments: list[str]) -> Scenario:
+    """A scenario whose agent 1 is a command."""
+    return parse(
+        SMALL, overrides={"agent": f"[{{ ids = [1], command = {json.dumps(arguments)} }}]"}
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["./none"], "agent[0].command[0]: './none' does not exist"),
+        (["./plain"], "agent[0].command[0]: './plain' is not executable"),
+        (["no-such-program"], "agent[0].command[0]: 'no-such-program' does not exist"),
+        (["sh", "a\0b"], "agent[0].command[1]: holds a NUL"),
+    ],
+)
+def test_a_foreign_agents_command_that_cannot_be_run_is_named(
+    tmp_path: Path, given: list[str], said: str
+) -> None:
+    (tmp_path / "plain").write_text("")
+    with pytest.raises(ScenarioError) as refused:
+        admit(foreign(given), tmp_path / "s.toml", VIRTUAL_COMMAND_TICKS, "launched")
+    assert f"s.toml: {said}" in str(refused.value)
+
+
+def test_a_foreign_agents_program_is_found_in_the_scenarios_folder(tmp_path: Path) -> None:
+    (tmp_path / "python").symlink_to(sys.executable)
+    (tmp_path / "mine.py").write_text("")
+    file, scenario = tmp_path / "s.toml", foreign(["./python", "mine.py", "far"])
+    flown = admit(scenario, file, VIRTUAL_COMMAND_TICKS, "launched")
+    # By its own name: an interpreter finds its packages by the link through which it is called.
+    assert flown.commands == {1: (f"{tmp_path}/python", f"{tmp_path}/mine.py", "far")}
+    assert parse(dump(flown)).commands == flown.commands
+
+
+@pytest.mark.parametrize(
+    ("processes", "said"), [("none", "cannot fly in virtual time"), ("by hand", "by hand, too")]
+)
+def test_a_foreign_agent_needs_a_launcher(processes: Processes, said: str) -> None:
+    with pytest.raises(ScenarioError, match=said) as refused:
+        admit(foreign([sys.executable]), "small.toml", VIRTUAL_COMMAND_TICKS, processes)
+    assert refused.value.key == "agent[0].command"
+
+
+def test_virtual_time_refuses_a_foreign_agent_and_check_warns_of_that(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "s.toml").write_text(dump(foreign([sys.executable])))
+    said = "agent[0].command: {}a process of its own cannot fly in virtual time; use qswarm run"
+    assert command(["sim", str(tmp_path / "s.toml"), "--out", str(tmp_path / "run")]) == 2
+    assert said.format("") in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+    assert command(["check", str(tmp_path / "s.toml")]) == 0
+    assert said.format("warning: 'qswarm sim' rejects this: ") in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("table", ["{ ids = [1] }", "{ ids = [1], vehicle = {} }"])
+def test_an_agents_table_that_changes_nothing_is_refused(table: str) -> None:
+    with pytest.raises(ScenarioError, match="agent\\[0\\]: changes nothing"):
+        parse(SMALL, overrides={"agent": f"[{table}]"})
+
+
+def test_the_last_table_with_a_command_counts() -> None:
+    tables = "[{ ids = [0, 1], command = ['a'] }, { ids = [1], command = ['b'] }]"
+    scenario = parse(SMALL, overrides={"agent": tables})
+    assert scenario.commands == {0: ("a",), 1: ("b",)}

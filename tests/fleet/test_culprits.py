@@ -13,7 +13,7 @@ import pytest
 from agent.step_page import StepGuard
 from tests.processes.harness import eventually
 from worldsim.fleet import culprits
-from worldsim.fleet.culprits import Culprits, SharedSteps
+from worldsim.fleet.culprits import Culprits, ForeignSteps, SharedSteps
 from worldsim.fleet.fork import ProcessExit
 
 Start = Callable[[str], int]
@@ -100,6 +100,44 @@ def test_a_stopped_process_is_not_called_a_hang(
     found = Culprits(steps_in(pid), lambda _: None)
     found.look([1], 5.0)
     assert (found.failure, found.stop) == (None, "agent-1 was stopped by a signal at 5.0 s")
+
+
+def test_a_foreign_agent_that_owes_a_command_is_named(
+    process: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(culprits, "HANG_S", -1.0)
+    steps = SharedSteps.of(3, 1)
+    for agent in (0, 1, 2):
+        steps.page.note_pid(agent, process(BUSY))
+    foreign = ForeignSteps(steps, {1, 2})
+    for agent in (0, 1, 2):
+        foreign.begin(agent)
+    foreign.end([0, 2])
+    found = Culprits(steps, lambda _: None)
+    found.look([0, 1, 2], 5.0)
+    assert [agent for agent in (0, 1, 2) if found.named(agent)] == [1]
+    entered_s = steps.page.read(1).entered_s
+    foreign.begin(1)  # the next observation does not begin the step anew
+    assert steps.page.read(1).entered_s == entered_s
+
+
+def test_a_foreign_agent_is_not_at_fault_while_a_medium_stands_still(
+    process: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(culprits, "HANG_S", -1.0)
+    pid = process(BLOCKED)
+    steps = steps_in(process(BUSY))
+    steps.page.row(1)[2] = 0
+    steps.note_medium(0, pid)
+    found = Culprits(steps, lambda _: None)
+    for number, state, failed in (
+        (signal.SIGSTOP, os.WSTOPPED, False),
+        (signal.SIGCONT, os.WCONTINUED, True),
+    ):
+        os.kill(pid, number)
+        os.waitid(os.P_PID, pid, state | os.WNOWAIT)
+        found.look([1], 5.0)
+        assert found.named(1) == failed
 
 
 def test_a_stopped_medium_is_named(process: Start) -> None:

@@ -156,3 +156,65 @@ def test_no_agent_outlives_it(tmp_path: Path, number: int) -> None:
     gone = "[os.read(ready, 1), print('all ended')]"
     program = f"os.close(is_ready)\n{killed}\nos.waitpid(zygote, 0)\n{gone}\n"
     assert ran(program, tmp_path) == ["all ended"]
+
+
+FOREIGN = """
+
+launcher.close()
+os.waitpid(zygote, 0)
+CHILD = "echo $$ \\"$@\\"; (trap '' TERM; echo child; exec sleep 61) & echo $!; wait"
+
+def serve_foreign():
+    launcher.close()
+    commands = {0: ("/bin/sh", "-c", CHILD, "sh"), 1: ("/no/such/program",)}
+    config = AgentProcessConfig(
+        "mine", "tcp/x", Path("."), users=Path("users.txt"), commands=commands
+    )
+    return Zygote(zygote_end, config).serve()
+
+launcher, zygote_end = zygote_sockets()
+zygote = fork(Path("zygote.log"), signal.SIGKILL, serve_foreign)
+zygote_end.close()
+
+def lines():
+    return Path("agent-0.log").read_text().splitlines()
+
+def child_of(times):
+    while sum(line == "child" for line in lines()) < times or len(lines()) < 3 * times:
+        time.sleep(0.01)
+    return int([line for line in lines() if line.isdecimal()][-1])
+
+Path("agent-0.log").unlink()
+Path("agent-1.log").unlink()
+request("start", FIRST)
+pid = receive(AgentStarted).pid
+child = child_of(1)
+print(lines()[0].replace(str(pid), "PID") if lines()[0] != "child" else lines()[1])
+assert os.getpgid(child) == os.getpgid(pid) == pid != os.getpgid(zygote)
+request("pause", FIRST)
+assert state(pid) == state(child) == "T"
+request("resume", FIRST)
+assert state(pid) != "T" != state(child)
+request("kill", FIRST)
+print(tuple(receive(AgentExited).exit))
+while Path(f"/proc/{child}").exists() and state(child) != "Z":
+    time.sleep(0.01)
+request("start", AgentProcess(0, 1))
+receive(AgentStarted)
+child = child_of(2)
+request("start", SECOND)
+print(tuple(receive(AgentExited).exit), Path("agent-1.log").read_text().strip())
+launcher.send(EndRequest())
+os.waitpid(zygote, 0)
+print(Path(f"/proc/{child}").exists())
+"""
+
+
+def test_a_foreign_agent_is_struck_and_ends_with_all_that_it_started(tmp_path: Path) -> None:
+    told, killed, not_started, survives = ran(FOREIGN, tmp_path)
+    users = tmp_path / "users.txt"
+    assert told == f"PID --id 0 --run mine --connect tcp/x --credentials {users}"
+    assert killed == "(9, None)"
+    said = "agent-1: '/no/such/program' cannot be started: No such file or directory"
+    assert not_started == f"(None, 127) {said}"
+    assert survives == "False"
