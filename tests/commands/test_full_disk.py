@@ -48,7 +48,7 @@ main()
 """
 """``qswarm`` on a disk that has lost the room reserved for each run's summary."""
 
-PROGRESS = re.compile(r"[0-9.]+ of 5 s simulated\n")
+PROGRESS = re.compile(r"[0-9.]+ of 5 s.*\n")
 """What a slow host prints besides."""
 
 
