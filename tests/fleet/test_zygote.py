@@ -204,14 +204,20 @@ receive(AgentStarted)
 child = child_of(2)
 request("start", SECOND)
 print(tuple(receive(AgentExited).exit), Path("agent-1.log").read_text().strip())
-launcher.send(EndRequest())
+END
 os.waitpid(zygote, 0)
+gone_by = time.monotonic() + 10.0
+while Path(f"/proc/{child}").exists() and time.monotonic() < gone_by:
+    time.sleep(0.01)
 print(Path(f"/proc/{child}").exists())
 """
 
 
-def test_a_foreign_agent_is_struck_and_ends_with_all_that_it_started(tmp_path: Path) -> None:
-    told, killed, not_started, survives = ran(FOREIGN, tmp_path)
+@pytest.mark.parametrize("end", ["launcher.send(EndRequest())", "os.kill(zygote, signal.SIGKILL)"])
+def test_a_foreign_agent_is_struck_and_ends_with_all_that_it_started(
+    tmp_path: Path, end: str
+) -> None:
+    told, killed, not_started, survives = ran(FOREIGN.replace("END\n", f"{end}\n"), tmp_path)
     users = tmp_path / "users.txt"
     assert told == f"PID --id 0 --run mine --connect tcp/x --credentials {users}"
     assert killed == "(9, None)"

@@ -75,6 +75,7 @@ class Zygote:
         self._agents: dict[int, AgentProcess] = {}  # by pid
         self._intruders: dict[int, int] = {}  # pids, by their faults' numbers
         self._selector = selectors.DefaultSelector()
+        self._guard: foreign_agent.GroupGuard | None = None
         self._ending = False
         self._status = 0
 
@@ -85,6 +86,8 @@ class Zygote:
         """
         adopt_orphans()
         warm_up()
+        if self._config.commands:
+            self._guard = foreign_agent.GroupGuard(self._launcher.close)
         gc.freeze()  # keeps the warm objects' memory pages shared with the children
         self._selector.register(self._launcher, selectors.EVENT_READ, self._receive)
         while not self._ending:
@@ -202,8 +205,9 @@ class Zygote:
         pid = fork(
             self._log(process), signal.SIGKILL, lambda: self._run_agent(process.agent, after_s)
         )
-        if process.agent in self._config.commands:
+        if self._guard is not None and process.agent in self._config.commands:
             foreign_agent.own_group(pid)
+            self._guard.watch(pid)
             if self._config.steps is not None:  # a foreign agent does not write its row itself
                 self._config.steps.note_pid(process.agent, pid)
         exit_descriptor = os.pidfd_open(pid)
@@ -232,6 +236,8 @@ class Zygote:
         process_exit = reap(pid)
         if process_exit is None:
             return
+        if self._guard is not None:
+            self._guard.forget(pid)
         self._selector.unregister(exit_descriptor)
         os.close(exit_descriptor)
         process = self._agents.pop(pid)
