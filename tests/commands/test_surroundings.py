@@ -16,7 +16,7 @@ from tests.small_scenario import SMALL
 from worldsim.commands.app import command
 from worldsim.results.output_streams import SafeStream, escaped
 
-PROGRESS = re.compile(r"[0-9.]+ of 0\.3 s simulated\n")
+PROGRESS = re.compile(r"[0-9.]+ of 0\.3 s.*\n")
 ROOT = Path(__file__).parents[2]
 PROGRAM = "from worldsim.commands.app import main; main()"
 SIM = f"'{sys.executable}' -c '{PROGRAM}' sim small.toml --out out --duration 0.3 --set expect.converge=false"  # noqa: E501
