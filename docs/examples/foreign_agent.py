@@ -12,6 +12,7 @@ import json
 import queue
 import sys
 import time
+from contextlib import suppress
 from math import atan2, cos, dist, hypot, pi, radians, sin, sqrt
 from pathlib import Path
 from zlib import crc32
@@ -20,6 +21,8 @@ import msgpack
 import zenoh
 
 LOCAL, MULTIHOP = 0, 1  # the radio's channels: beacons on one, missions on the other
+DATAGRAM_FIELDS = 2
+MALFORMED = (ValueError, TypeError, LookupError, msgpack.UnpackException)
 BRIEFED = 0  # key of the mission of the briefing
 PIECE_B = 900  # longest part of a mission in one frame
 VERSION = 65536  # a newer mission's key is at least so much higher
@@ -126,13 +129,19 @@ class Agent:
         for batch in batches:
             for source, _, channel, _, payload in batch[1]:
                 data, checksum = payload[:-4], payload[-4:]
-                if crc32(data).to_bytes(4, "little") != checksum:
-                    continue
-                fields = msgpack.unpackb(data)
-                if channel == LOCAL:
-                    self.hear(source, Beacon(fields))
-                elif fields[3] is not None:
-                    self.learn(source, *fields[3][:4])
+                if crc32(data).to_bytes(4, "little") == checksum:
+                    # A hostile radio may send anything.
+                    with suppress(*MALFORMED):
+                        self.take_frame(source, channel, msgpack.unpackb(data))
+
+    def take_frame(self, source, channel, fields):
+        """Take a neighbour's message. Raises one of MALFORMED."""
+        if len(fields) == DATAGRAM_FIELDS:
+            return  # controllers of another make talk to each other
+        if channel == LOCAL:
+            self.hear(source, Beacon(fields))
+        elif fields[3] is not None:
+            self.learn(source, *fields[3][:4])
 
     def hear(self, source, beacon):
         """Keep a neighbour's newest beacon, and follow the frame that it tells of."""

@@ -10,7 +10,7 @@ from typing import Any
 from msgspec import inspect
 
 from agent import config, messages
-from agent.messages import Beacon, Command, Gossip, MissionData, Observation
+from agent.messages import Beacon, Command, Datagram, Gossip, MissionData, Observation
 from netem.wire.access import MAX_AGENT_PUT_B
 from netem.wire.frame import Batch, Delivery, Inbox, Transmission
 from netem.wire.keys import TOPICS, Keys, agent_name
@@ -20,7 +20,7 @@ OF_AGENTS = ("setup", "observation", "rx", "command", "tx", "arrivals", "over", 
 GROUPS = {
     "From the world, and to it": (Observation, Command, LatencyReport),
     "Between an agent and the radio": (Transmission, Batch, Delivery, Inbox),
-    "Payloads of frames": (Beacon, Gossip, MissionData),
+    "Payloads of frames": (Beacon, Gossip, Datagram, MissionData),
 }
 """Messages by what they are for; the tables of what they hold follow each."""
 POWERS = {2**k - 1: f"2^{k} - 1" for k in (15, 16, 31, 32, 53)} | {-(2**31): "-2^31"}
@@ -115,6 +115,8 @@ def _scalar_in_words(info: Any) -> str:
             return f"float{_range(ge, le)}"
         case inspect.BytesType(max_length=most):
             return "bytes" if most is None else f"bytes, at most {most}"
+        case inspect.StrType(pattern=pattern):
+            return "text" if pattern is None else f"text, `{pattern}`"
         case inspect.BoolType():
             return "true or false"
     raise TypeError(f"no words for {info}")

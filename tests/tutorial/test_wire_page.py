@@ -19,6 +19,7 @@ from agent.codec import (
     encode,
 )
 from agent.messages import Beacon, Mission, Observation, Pose, Standing
+from netem.wire.channels import NUMBERS
 from netem.wire.frame import Batch, Frame, pack, unpack_transmission
 from worldsim.scenario.file import load
 
@@ -131,8 +132,10 @@ def test_damaged_and_forged_frames_are_left(program: Any) -> None:
     agent = agent_of(program)
     payload = add_checksum(encode(beacon(3, 0.1, (0, 0), None)))
     damaged = bytes([payload[0] ^ 1]) + payload[1:]
-    for source, data in ((3, damaged), (4, payload)):
-        agent.receive([msgpack.unpackb(pack(Batch(0, (Frame(source, 0, 0, 1, data),))))])
+    junk = (b"", b"\x92\x01\x02", b"\x05", b"\xc1", b"\x94\x01\x02\x03\x04", b"\x81\x01\x01")
+    frames = [Frame(3, 0, 0, 1, damaged), Frame(4, 0, 0, 1, payload)]
+    frames += [Frame(3, 0, on, 1, add_checksum(each)) for each in junk for on in NUMBERS]
+    agent.receive([msgpack.unpackb(pack(Batch(0, tuple(frames))))])
     assert agent.heard == {}
 
 
