@@ -204,8 +204,8 @@ ROWS = {
     "min_lambda2": Row(FAR, moved(0, (0.0, 0.0, 40.0))),
     "attitude_within_deg": Row({"attitude_within_deg": AT_S}, turned),
 }
-NO_MEASURE = {"converge", "idle_faults"}
-"""They say what else is not asked; tests/results/test_fault_rows.py tests idle faults."""
+NO_MEASURE = {"converge", "idle_faults", "property"}
+"""Others test the last two: tests/results/test_fault_rows.py and tests/judge/test_properties.py."""
 
 
 @pytest.mark.parametrize("name", ROWS)

@@ -60,6 +60,7 @@ def summary_of(judge: Judge, scenario: Scenario | None = None) -> dict[str, Any]
         "agents": flown.fleet.agents,
         "duration_s": flown.duration_s,
         "expectations": [row.row for row in judge.expectations()],
+        "coverage": [],
         "min_separation_m": judge.min_separation_m,
         "min_obstacle_distance_m": None,
         "attitude_error_deg": judge.attitude_error_deg,

@@ -21,7 +21,7 @@ def fault_window_s(scenario: Scenario) -> float:
     return scenario.expect.reform_within_s or DISTURBED_S
 
 
-class Measured(NamedTuple):
+class RunMeasured(NamedTuple):
     """What the judge measured of a run so far; None where there was nothing to measure."""
 
     until_s: float
@@ -43,7 +43,7 @@ class Measured(NamedTuple):
 class RunExpectations:
     """The expectations of a scenario on a run."""
 
-    def __init__(self, scenario: Scenario, measured: Measured) -> None:
+    def __init__(self, scenario: Scenario, measured: RunMeasured) -> None:
         self._scenario, self._measured = scenario, measured
 
     def rows(self) -> list[Expectation]:

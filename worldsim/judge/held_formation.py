@@ -28,12 +28,16 @@ class HeldFormation:
         """Take the beginning or the end of a fault at a time [s]."""
         self._from_s = t_s + self._window_s
 
+    def disturbed(self, t_s: float) -> bool:
+        """Return whether a fault takes the time [s]."""
+        return bool(self._parting) or t_s < self._from_s
+
     def see(self, tick: Tick, phase: Phase, in_place: bool) -> bool:
         """Take a tick, and return whether it counts.
 
         in_place: whether every running agent is in its slot.
         """
-        if phase.converge_s is None or self._parting or tick.time_s < self._from_s:
+        if phase.converge_s is None or self.disturbed(tick.time_s):
             return False
         self._ticks += 1
         self._in_place += in_place

@@ -12,7 +12,7 @@ import numpy as np
 from agent.guidance.cone import cone_of
 from agent.messages import FramePath
 from agent.qstructure.formation import FormationSpec, formation_of
-from worldsim.judge.expectations import Measured, RunExpectations, fault_window_s
+from worldsim.judge.expectations import RunExpectations, RunMeasured, fault_window_s
 from worldsim.judge.expected_places import ExpectedPlaces
 from worldsim.judge.finding import Expectation, InvariantTally
 from worldsim.judge.held_attitudes import HeldAttitudes
@@ -25,6 +25,7 @@ from worldsim.judge.network_strength import NetworkStrength
 from worldsim.judge.obstacle_clearance import ObstacleClearance
 from worldsim.judge.parting_faults import PartingFaults
 from worldsim.judge.phase import Phase
+from worldsim.judge.properties import Coverage, Measured, monitors_of
 from worldsim.judge.queue_convergence import QueueConvergence
 from worldsim.judge.radio_events import RadioRunEvent, Sabotaged
 from worldsim.judge.recovery import Recoveries, Recovery
@@ -130,6 +131,7 @@ class Judge:
         strength = scenario.expect.min_lambda2 is not None
         self._strength = NetworkStrength(scenario) if strength else None
         self._missions = MissionOrder()
+        self._properties = monitors_of(scenario)
         self._safety = InvariantTally()
         self._conservation = InvariantTally()
         cones = np.degrees([cone_of(vehicle) for vehicle in scenario.vehicles])
@@ -255,6 +257,17 @@ class Judge:
             self._strength.see(tick)
         if self._allocation is not None:
             self._allocation.see(tick, phase)
+        self._see_properties(
+            Measured(
+                tick=tick,
+                before=last,
+                separation=separation,
+                slot_error=slot_error,
+                obstacle_distance=distance,
+                parted=bool(self._parting),
+                disturbed=self._held.disturbed(tick.time_s),
+            )
+        )
         return Figures(
             separation=separation,
             slot_error=slot_error,
@@ -262,6 +275,15 @@ class Judge:
             obstacle_distance=distance,
             queue_residual=np.array(self.queues[-1].see(tick, error)),
         )
+
+    def _see_properties(self, measured: Measured) -> None:
+        for each in self._properties:
+            each.see(measured)
+
+    @property
+    def coverage(self) -> list[Coverage]:
+        """What of a campaign's runs the run covers: properties that hold sometimes."""
+        return [each.coverage for each in self._properties if each.coverage is not None]
 
     @property
     def recoveries(self) -> list[Recovery]:
@@ -301,7 +323,7 @@ class Judge:
     def expectations(self) -> list[Expectation]:
         """Return every expectation of the run with its measured value."""
         attitudes = self._attitudes
-        measured = Measured(
+        measured = RunMeasured(
             until_s=0.0 if self._last is None else self._last.time_s,
             min_separation_m=self.min_separation_m,
             clearance=self.clearance,
@@ -314,7 +336,9 @@ class Judge:
             worst_attitude_deg=None if attitudes is None else attitudes.worst_deg,
             without_room=self._without_room,
         )
-        return RunExpectations(self._scenario, measured).rows()
+        own = [each.expectation() for each in self._properties]
+        rows = RunExpectations(self._scenario, measured).rows()
+        return [*rows, *(each for each in own if each is not None)]
 
     def invariants(self) -> dict[str, InvariantTally]:
         """Return the tally of each invariant.

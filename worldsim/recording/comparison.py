@@ -30,6 +30,7 @@ ADDED_LATER = (
     "settings",
     "datagrams",
     "safety_filter",
+    "coverage",
 )
 """Keys that the summary of an older recording lacks."""
 UNRECORDED = (

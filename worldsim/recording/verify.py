@@ -239,6 +239,7 @@ def _figures(readback: Readback, judge: Judge) -> dict[str, Any]:
         "agents": scenario.fleet.agents,
         "duration_s": scenario.slots / scenario.slot_hz if ended_s is None else ended_s,
         "expectations": [row.row for row in judge.expectations()],
+        "coverage": [each.row for each in judge.coverage],
         "min_separation_m": judge.min_separation_m,
         "min_obstacle_distance_m": judge.min_obstacle_distance_m,
         "phases": [asdict(phase) for phase in _phases(judge)],

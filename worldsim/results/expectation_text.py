@@ -10,6 +10,8 @@ CONVERGE = "converge "
 """An expectation's name begins so where it is about a formation; the formation's name follows."""
 STARTS = ("join at ", "restart at ")
 """An expectation's name begins so where agents were to start and found no room."""
+OWN = ("always ", "eventually ", "settle ")
+"""An expectation's name begins so where it is a property of the user's own."""
 NEARLY_S = 0.1
 """A time that lacks less of what it has to be is not told exactly."""
 MAX_NAMED = 4
@@ -213,7 +215,7 @@ def _other(row: ExpectationRow, run: Circumstances) -> str:
         margin = _margin(row, bound)
         left = f"; margin {margin}" if margin else ""
         return f"{bound.what}: {_measured(row, bound)} ({required}{left})"
-    return f"{name}: {row['got']} (required {wanted})"
+    return _own(row) if name.startswith(OWN) else f"{name}: {row['got']} (required {wanted})"
 
 
 def _cells(row: ExpectationRow, text: str) -> Cells:
@@ -234,7 +236,28 @@ def _cells(row: ExpectationRow, text: str) -> Cells:
         return Cells("formation restored after each fault", *_timed_cells(row, shown))
     if wanted is None:
         return Cells(name, "", text.removeprefix(f"{name}: "), "")
-    return Cells(name, f"{wanted}", f"{got}", "")
+    return _own_cells(row) if name.startswith(OWN) else Cells(name, f"{wanted}", f"{got}", "")
+
+
+def _own(row: ExpectationRow) -> str:
+    """Return what a run showed of a property of the user's own, whose name begins with a verb."""
+    what, required, got, margin = _own_cells(row)
+    verb, _, title = what.partition(" ")
+    words = {"always": f"always {title}", "eventually": f"{title} at last", "settle": title}
+    left = f"; margin {margin}" if margin else ""
+    return f"{words.get(verb, what)}: {got} (required {required}{left})"
+
+
+def _own_cells(row: ExpectationRow) -> Cells:
+    wanted, got, margin = row["wanted"], row["got"], row["margin"]
+    if not row["name"].startswith("always "):
+        held_s = "never, or not for long enough" if got is None else f"from {got:.3g} s on"
+        required = "by the end" if wanted is None else f"within {wanted:g} s"
+        return Cells(row["name"], required, held_s, "" if margin is None else f"{margin:.3g} s")
+    if got is None or margin is None:
+        return Cells(row["name"], f"{wanted:.6g}", "no tick counted, or nobody states it", "")
+    relation = ">=" if abs(got - wanted - margin) <= abs(wanted - got - margin) else "<="
+    return Cells(row["name"], f"{relation} {wanted:.6g}", f"at worst {got:.6g}", f"{margin:.3g}")
 
 
 def _timed_cells(row: ExpectationRow, got: str) -> tuple[str, str, str]:

@@ -62,6 +62,7 @@ class Row(TypedDict):
     residual_m: float | None  # of several formations the largest
     turns_over_limit_fraction: float | None
     sub_formations_lead_s: float | None  # of several formations the shortest
+    covers: dict[str, bool]  # whether it showed what some run must show, by the property's name
     real_time_factor: float | None
     trace_sha256: str | None
 
@@ -76,6 +77,7 @@ class ScenarioRow(TypedDict("Outcomes", {"pass": int, "fail": int, "inconclusive
     residual_m: Spread | None
     turns_over_limit_fraction: Spread | None
     sub_formations_lead_s: Spread | None
+    coverage: dict[str, int]  # in how many runs each property held that some run must show
 
 
 class Overall(Provenance):
@@ -132,6 +134,7 @@ def _failed_row(run: FailedRun) -> Row:
         "residual_m": None,
         "turns_over_limit_fraction": None,
         "sub_formations_lead_s": None,
+        "covers": {},
         "real_time_factor": None,
         "trace_sha256": None,
     }
@@ -151,6 +154,7 @@ def _summary_row(result: Result) -> Row:
         "residual_m": _worst([phase["residual_m"] for phase in phases]),
         "turns_over_limit_fraction": summary["turns_over_limit_fraction"],
         "sub_formations_lead_s": _least([each["lead_s"] for each in summary["sub_formations"]]),
+        "covers": {each["name"]: each["first_s"] is not None for each in summary["coverage"]},
         "real_time_factor": summary["real_time_factor"],
         "trace_sha256": summary["trace_sha256"],
     }
@@ -170,7 +174,14 @@ def _of_scenario(name: str, rows: list[Row]) -> ScenarioRow:
         "residual_m": _spread([row["residual_m"] for row in own]),
         "turns_over_limit_fraction": _spread([row["turns_over_limit_fraction"] for row in own]),
         "sub_formations_lead_s": _spread([row["sub_formations_lead_s"] for row in own]),
+        "coverage": _coverage([row["covers"] for row in own]),
     }
+
+
+def _coverage(covers: list[dict[str, bool]]) -> dict[str, int]:
+    """Return in how many runs each property held."""
+    names = dict.fromkeys(name for each in covers for name in each)
+    return {name: sum(each.get(name, False) for each in covers) for name in names}
 
 
 def _worst(values: list[float | None]) -> float | None:

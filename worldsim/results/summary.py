@@ -14,6 +14,7 @@ from netem.messages import MediumCounters
 from worldsim.engine.counters import Links
 from worldsim.engine.step import SlotLoop
 from worldsim.judge.finding import ExpectationRow
+from worldsim.judge.properties import CoverageRow
 from worldsim.judge.sub_formations import SubFormationsRow
 from worldsim.judge.verdict import Judge
 from worldsim.results.controller_rows import DatagramRow, FilterRow, datagram_row, filter_row
@@ -167,6 +168,7 @@ class Summary(Provenance):
     outcome: Outcome
     reason: str | None  # of an outcome that is not a pass
     expectations: list[ExpectationRow]
+    coverage: list[CoverageRow]  # properties that must hold sometimes, in some run
     min_separation_m: float | None  # centre to centre, swept between ticks
     min_obstacle_distance_m: float | None  # vehicle centre to surface
     phases: list[PhaseRow]  # one for each formation, in order
@@ -216,6 +218,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "outcome": outcome,
         "reason": reason,
         "expectations": expectations,
+        "coverage": [each.row for each in judge.coverage],
         "min_separation_m": judge.min_separation_m,
         "min_obstacle_distance_m": judge.min_obstacle_distance_m,
         "phases": _phase_rows(judge),

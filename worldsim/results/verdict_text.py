@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from worldsim.judge.finding import ExpectationRow
+from worldsim.judge.properties import CoverageRow
 from worldsim.judge.sub_formations import SubFormationsRow
 from worldsim.recording.layout import SUMMARY_FILE
 from worldsim.results.controller_rows import filter_texts
@@ -59,6 +60,7 @@ def verdict(summary: Summary, folder: Path, recorded: bool) -> str:
 def remarks(summary: Summary) -> list[str]:
     """Return lines on what a run showed beside its expectations."""
     return [
+        *_coverage(summary["coverage"]),
         *_encounters(summary["encounters"]),
         *(f"  {text}" for text in fault_texts(summary["faults"])),
         f"  {_accuracy(summary)}",
@@ -205,6 +207,15 @@ def _accuracy(summary: Summary) -> str:
     return f"largest slot error at the end: {error}; {told}"
 
 
+def _coverage(rows: list[CoverageRow]) -> list[str]:
+    """Return a line for each property that must hold in some run."""
+    return [
+        f"  {'not seen' if row['first_s'] is None else 'seen    '} {row['name']}"
+        + ("" if row["first_s"] is None else f": first at {row['first_s']:.4g} s")
+        for row in rows
+    ]
+
+
 def _sub_formations(rows: list[SubFormationsRow]) -> list[str]:
     """Return a line for each formation of which the queues stood long before the whole."""
     return [
@@ -270,6 +281,7 @@ def _scenario(scenario: ScenarioRow) -> list[str]:
             for name, spread, unit, digits in spreads
             if spread is not None
         ),
+        *(f"  seen in {runs} of {made}: {name}" for name, runs in scenario["coverage"].items()),
     ]
 
 

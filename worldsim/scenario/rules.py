@@ -20,6 +20,7 @@ from worldsim.scenario.idle_keys import idle_keys
 from worldsim.scenario.obstacle_tables import obstacle_problem
 from worldsim.scenario.orientation_checks import yaws_not_held
 from worldsim.scenario.problem import Problem
+from worldsim.scenario.property_checks import properties_consistent
 from worldsim.scenario.safety_checks import SAFETY_WARNINGS
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.tables import CONVERGED_S, SLOTS_PER_TICK, AgentTable, Scenario
@@ -422,6 +423,7 @@ RULES = (
     _connected_at_most_by_all,
     _frame_consistent,
     _obstacles_consistent,
+    properties_consistent,
 )
 WARNINGS = (
     _cast_zone_within_range,

@@ -30,6 +30,7 @@ from netem.link_parameters import Conditions
 from netem.messages import MediumSetup
 from worldsim.scenario.events import EventTable, Name
 from worldsim.scenario.obstacle_tables import ObstacleField, Obstacles
+from worldsim.scenario.properties import Property
 from worldsim.scenario.start import BoxStart, ListStart
 from worldsim.scenario.target_frame import FrameTable, path_of
 
@@ -102,7 +103,7 @@ class Expectations(Table, frozen=True):
     control.separation_m. min_obstacle_distance_m: from a vehicle's centre to a surface; left out:
     control.clearance_m. attitude_within_deg: how far an agent's attitude may be from its queue's
     orientation, at the end and from the formation's convergence on. idle_faults: whether the run
-    may pass though a fault struck nothing.
+    may pass though a fault struck nothing. property: what else it must show.
     """
 
     converge_within_s: Positive | None = None
@@ -115,6 +116,7 @@ class Expectations(Table, frozen=True):
     min_obstacle_distance_m: Annotated[float, Meta(ge=0, le=1e4)] | None = None
     attitude_within_deg: Annotated[float, Meta(ge=LEAST, le=180)] | None = None
     idle_faults: bool = False
+    property: Annotated[tuple[Property, ...], Meta(max_length=64)] = ()
 
 
 class Scenario(Table, frozen=True, omit_defaults=False):
