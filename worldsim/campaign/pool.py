@@ -6,8 +6,7 @@ with the run.
 """
 
 import selectors
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
@@ -50,10 +49,11 @@ def simulate(
     return made
 
 
-def sweep(jobs: list[Job], workers: int, stop: StopRequest) -> Iterator[Made]:
+def sweep(jobs: Iterable[Job], workers: int, stop: StopRequest) -> Iterator[Made]:
     """Make many runs, up to ``workers`` at once; yield each result as soon as it is there.
 
-    An error fails its run alone. After a stop request no further run begins. Raises
+    A job is taken when there is room for it: it may depend on results that were yielded before. An
+    error fails its run alone. After a stop request no further run begins. Raises
     RunDirectoryError where the first run's folder cannot be written; where that of a later one
     cannot, RunWriteError, once the active runs have ended.
     """
@@ -65,17 +65,37 @@ class _Ready(NamedTuple):
     printed: bool  # output to read; otherwise an exit
 
 
+class _Waiting:
+    """The jobs that wait, each taken when it is needed."""
+
+    def __init__(self, jobs: Iterable[Job]) -> None:
+        self._jobs = iter(jobs)
+        self._next: Job | None = None
+
+    def __bool__(self) -> bool:
+        if self._next is None:
+            self._next = next(self._jobs, None)
+        return self._next is not None
+
+    def pop(self) -> Job | None:
+        job, self._next = self._next, None
+        return job
+
+    def clear(self) -> None:
+        self._jobs, self._next = iter(()), None
+
+
 class _Pool:
     """The flights that are active, and the jobs that wait."""
 
     def __init__(
         self,
-        jobs: list[Job],
+        jobs: Iterable[Job],
         workers: int,
         stop: StopRequest,
         on_progress: Callable[[float], None],
     ) -> None:
-        self._waiting = deque(jobs)
+        self._waiting = _Waiting(jobs)
         self._workers = workers
         self._stop = stop
         self._on_progress = on_progress
@@ -90,8 +110,8 @@ class _Pool:
         """Yield each run's result as soon as it is there."""
         with self._all_ended():
             while self._flights or (self._waiting and not self._stop.requested):
-                while self._may_begin():
-                    self._begin(self._waiting.popleft())
+                while self._may_begin() and (job := self._waiting.pop()) is not None:
+                    self._begin(job)
                 yield from self._poll()
         if self._lost is not None:
             raise self._lost

@@ -70,10 +70,11 @@ def override(data: Data, overrides: Mapping[str, str], file: str | Path) -> None
             if not isinstance(table, dict):
                 detail = "is not a table, so it has no keys to set"
                 raise ScenarioError(file, ".".join(path[: depth + 1]), detail)
-        table[last] = _value(text)
+        table[last] = value_of(text)
 
 
-def _value(text: str) -> Any:
+def value_of(text: str) -> Any:
+    """Return the value of a text written as in TOML; a bare word is text."""
     try:
         parsed = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):

@@ -1,0 +1,67 @@
+"""sweep: every cell and seed once, its table, and what is refused before anything starts."""
+
+import json
+from pathlib import Path
+
+import pytest
+from pyarrow import csv, parquet
+
+from tests.commands.conftest import Command
+
+VARIED = ("--vary", "netem.loss_percent=0,100")
+
+
+def test_a_sweep_is_a_tidy_table_and_goes_on(small: Path, qswarm: Command) -> None:
+    limit = ("--set", "expect.converge_within_s=2.0", "--duration", "4.5")
+    first = qswarm("sweep", small, *VARIED, *limit, "--seeds", "0:1", "--out", "s")
+    assert first.status == 1  # no agent of two can hear the other at 100 %
+    assert "netem.loss_percent: breaks at a value between 0 (all pass) and 100" in first.out
+    assert "repeat a failure: qswarm sim " in first.out
+    lines = Path("s/flights.jsonl").read_text()
+    again = qswarm("sweep", small, *VARIED, *limit, "--seeds", "0:2", "--out", "s")
+    assert again.status == 1
+    assert Path("s/flights.jsonl").read_text().startswith(lines)
+    flights = parquet.read_table("s/flights.parquet")
+    assert flights.num_rows == csv.read_csv("s/flights.csv").num_rows == 4
+    rows = {(row["netem.loss_percent"], row["seed"]): row for row in flights.to_pylist()}
+    assert {key: row["outcome"] for key, row in rows.items()} == {
+        (0, 0): "pass", (0, 1): "pass", (100, 0): "fail", (100, 1): "fail",
+    }  # fmt: skip
+    # A flight of a sweep is that of `qswarm sim`.
+    setting = ("--set", "netem.loss_percent=100", "--seed", "1")
+    qswarm("sim", small, *limit, *setting, "--no-recording", "--out", "one")
+    alone = json.loads(Path("one/summary.json").read_text())
+    assert rows[100, 1]["trace_sha256"] == alone["trace_sha256"]
+    assert rows[100, 1]["min_separation_m"] == alone["min_separation_m"]
+    assert csv.read_csv("s/cells.csv").num_rows == 2
+    figures = sorted(file.name for file in Path("s/figures").iterdir())
+    assert figures == ["along-netem.loss_percent.png", "along-netem.loss_percent.svg"]
+    assert not Path("s/.flights").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--vary", "netem.los_percent=0,1"], "netem.los_percent: unknown key; did you mean"),
+        (["--vary", "netem.loss_percent=0,150"], "netem.loss_percent: got 150"),
+        (["--vary", "netem.loss_percent="], "--vary: netem.loss_percent: has no value"),
+        (["--vary", "netem.loss_percent=1", "--seeds", "3:3"], "--seeds: '3:3'"),
+        (
+            ["--vary", "netem.loss_percent=1", "--set", "netem.loss_percent=2"],
+            "--vary: netem.loss_percent: is set as well",
+        ),
+        (["--vary", "control.controller=q_structure,no.such:One"], "control.controller: "),
+        (["--vary", "netem.loss_percent=1", "--out", "taken"], "holds no sweep"),
+        ([], "--vary"),
+    ],
+)
+def test_bad_input_is_refused_before_anything_starts(
+    small: Path, qswarm: Command, options: list[str], says: str
+) -> None:
+    Path("taken").mkdir()
+    Path("taken/mine.txt").touch()
+    printed = qswarm("sweep", small, *options)
+    assert (printed.status, printed.out) == (2, "")
+    assert says in printed.err
+    assert printed.err.count("\n") == 1
+    assert sorted(file.name for file in Path().iterdir()) == ["small.toml", "taken"]

@@ -1,0 +1,95 @@
+"""Where flights are flown: an order goes in anywhere, the same summary comes out.
+
+A search or a sweep gives its orders to a site and takes what was flown, in any order. A site takes
+an order when it has room for it, so that an order may depend on what was flown before. A flight
+leaves nothing but what is returned; its scenario with its seed repeats it.
+"""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from shutil import rmtree
+from typing import NamedTuple, Protocol
+
+from netem.wire.shutdown import StopRequest
+from worldsim.campaign.pool import Job, sweep
+from worldsim.results.overall import Made, Result
+from worldsim.results.summary import Outcome, Summary
+from worldsim.scenario.tables import Scenario
+
+
+class SiteError(Exception):
+    """A site cannot fly, or no longer; one line with its name and the reason."""
+
+
+class Order(NamedTuple):
+    """One flight to fly."""
+
+    key: str  # names it among the others; letters, digits and dashes
+    scenario: Scenario
+
+
+class Flown(NamedTuple):
+    """What one flight showed; without a summary where an error ended it, a controller's as a rule.
+
+    details: the traceback of such an error, where there is one.
+    """
+
+    key: str
+    outcome: Outcome
+    reason: str | None
+    summary: Summary | None
+    details: str = ""
+
+
+class FlightSite(Protocol):
+    """Flies orders."""
+
+    def fly(self, orders: Iterable[Order], stop: StopRequest) -> Iterator[Flown]:
+        """Yield what each order showed, as soon as it is there.
+
+        After a stop request no further order is taken, and a flight that it cuts off yields
+        nothing. Raises SiteError, or RunDirectoryError, where the site can fly no more.
+        """
+
+
+class LocalSite:
+    """Processes of this host.
+
+    workers: flights at once. scratch: a folder for what they write; it is removed after them.
+    """
+
+    def __init__(self, workers: int, scratch: Path) -> None:
+        self._workers = workers
+        self._scratch = scratch
+
+    def fly(self, orders: Iterable[Order], stop: StopRequest) -> Iterator[Flown]:
+        """Yield what each order showed. Raises RunDirectoryError without room in ``scratch``."""
+        active: dict[Path, Order] = {}
+
+        def jobs() -> Iterator[Job]:
+            for order in orders:
+                folder = self._scratch / order.key
+                active[folder] = order
+                yield Job(order.scenario, folder, recording=False)
+
+        rmtree(self._scratch, ignore_errors=True)  # of a sweep that was killed
+        try:
+            for made in sweep(jobs(), self._workers, stop):
+                order = active.pop(made.folder)
+                rmtree(made.folder, ignore_errors=True)
+                if not (stop.requested and is_cut_off(made, order.scenario)):
+                    yield flown_of(order.key, made)
+        finally:
+            rmtree(self._scratch, ignore_errors=True)
+
+
+def is_cut_off(made: Made, scenario: Scenario) -> bool:
+    """Return whether a flight ended before its time without an error."""
+    return isinstance(made, Result) and made.summary["duration_s"] < scenario.duration_s - 1e-6
+
+
+def flown_of(key: str, made: Made) -> Flown:
+    """Return what a run of a campaign showed."""
+    if isinstance(made, Result):
+        return Flown(key, made.outcome, made.summary["reason"], made.summary)
+    return Flown(key, made.outcome, made.error, None, made.details)

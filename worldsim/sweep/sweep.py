@@ -1,0 +1,165 @@
+"""Flying a sweep: orders to a site, a line of the journal for each flight, results at the end."""
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from time import monotonic
+from typing import NamedTuple
+
+from agent.controller import BUILT_IN
+from netem.wire.shutdown import StopRequest, stop_requests
+from worldsim.campaign.flight_site import FlightSite, Order, SiteError
+from worldsim.export.table_files import write_csv, write_parquet
+from worldsim.results.exit_status import EXIT_STATUS, INTERRUPTED
+from worldsim.results.progress_line import ProgressLine
+from worldsim.results.provenance import provenance
+from worldsim.results.run_folder import RunWriteError, write_json
+from worldsim.scenario.file import dump
+from worldsim.scenario.tables import Scenario
+from worldsim.sweep.controller_code import code_sha256
+from worldsim.sweep.figures import sweep_figures
+from worldsim.sweep.flight_row import row_of
+from worldsim.sweep.journal import SCHEMA, Identity, Journal
+from worldsim.sweep.plan import FlightKey, Plan
+from worldsim.sweep.result import Summary, cells_of, summary_of
+from worldsim.sweep.sweep_tables import cells_table, flights_table
+
+SUMMARY, FIGURES, SCRATCH = "summary.json", "figures", ".flights"
+
+
+class Sweep(NamedTuple):
+    """What is flown."""
+
+    plan: Plan
+    scenarios: Mapping[FlightKey, Scenario]
+
+    @property
+    def name(self) -> str:
+        """The name of the scenario; that of the first cell where it is varied."""
+        return next(iter(self.scenarios.values())).name
+
+
+class Ended(NamedTuple):
+    """A sweep that has ended, complete or not."""
+
+    summary: Summary
+    status: int
+
+
+def identity_of(sweep: Sweep) -> Identity:
+    """Return what a sweep is. A user's controllers are known by the files of their package."""
+    first, known = sweep.plan.seeds.start, provenance()
+    chosen = [sweep.scenarios[FlightKey(cell, first)] for cell in range(len(sweep.plan.cells))]
+    return {
+        "schema": SCHEMA,
+        "scenario": sweep.name,
+        "vary": [(axis.key, list(axis.values)) for axis in sweep.plan.axes],
+        "seeds": (first, sweep.plan.seeds.stop),
+        "content_sha256": _digest(dump(scenario) for scenario in chosen),
+        "controllers": _controllers(chosen),
+        "version": known["version"],
+        "commit": known["commit"],
+        "commit_dirty": known["commit_dirty"],
+        "python": known["python"],
+        "packages": known["packages"],
+    }
+
+
+def fly(sweep: Sweep, journal: Journal, site: FlightSite, line: ProgressLine) -> Ended:
+    """Fly what the journal lacks, and write tables, figures and summary into its folder.
+
+    Ctrl-C ends it between two slots of its flights; what was flown is kept. Raises RunWriteError
+    where the folder cannot be written any more.
+    """
+    with stop_requests() as stop:
+        lost = _fly_missing(sweep, journal, site, stop, line)
+        cut_off_by = "interrupted" if stop.requested else lost
+        summary = summary_of(sweep.plan, sweep.name, journal.rows, cut_off_by)
+        write_results(journal.folder, sweep.plan, journal, summary, line.update)
+    line.clear()
+    status = INTERRUPTED if stop.requested else EXIT_STATUS[summary["outcome"]]
+    return Ended(summary, status)
+
+
+def write_results(
+    folder: Path,
+    plan: Plan,
+    journal: Journal,
+    summary: Summary,
+    progress: Callable[[str], None] = lambda _: None,
+) -> None:
+    """Write tables, figures and summary, over those of before. Raises RunWriteError."""
+    cells = cells_of(plan, journal.rows)
+    tables = [flights_table(plan, journal.rows), cells_table(plan, cells)]
+    try:
+        write_csv(tables, folder)
+        write_parquet(tables, folder)
+        (folder / FIGURES).mkdir(exist_ok=True)
+        progress("drawing the figures")
+        for figure in sweep_figures(plan, cells):
+            (folder / FIGURES / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
+            (folder / FIGURES / f"{figure.name}.png").write_bytes(figure.png)
+    except OSError as error:
+        raise RunWriteError(folder, error.strerror or str(error)) from error
+    write_json(folder / SUMMARY, summary)
+
+
+def _fly_missing(
+    sweep: Sweep, journal: Journal, site: FlightSite, stop: StopRequest, line: ProgressLine
+) -> str | None:
+    """Fly what the journal lacks; return why the site could not fly it all."""
+    missing = [key for key in sweep.plan.flights() if key not in journal.rows]
+    named = {_name(key): key for key in missing}
+    pace = _Pace(len(sweep.plan), len(missing))
+    orders = _orders(sweep, missing)
+    try:
+        for flown in site.fly(orders, stop):
+            journal.append(row_of(named[flown.key], flown))
+            line.update(pace.text(len(journal.rows), journal))
+    except SiteError as error:
+        return str(error)
+    return None
+
+
+def _orders(sweep: Sweep, keys: Iterable[FlightKey]) -> Iterator[Order]:
+    return (Order(_name(key), sweep.scenarios[key]) for key in keys)
+
+
+def _name(key: FlightKey) -> str:
+    return f"cell{key.cell}-seed{key.seed}"
+
+
+class _Pace:
+    """How far a sweep is, and how long the rest takes."""
+
+    def __init__(self, flights: int, missing: int) -> None:
+        self._flights, self._before = flights, flights - missing
+        self._began_s = monotonic()
+
+    def text(self, flown: int, journal: Journal) -> str:
+        passed = sum(row["outcome"] == "pass" for row in journal.rows.values())
+        new = flown - self._before
+        left_s = (monotonic() - self._began_s) / max(new, 1) * (self._flights - flown)
+        earlier = f" ({self._before} earlier)" if self._before else ""
+        return f"{flown} of {self._flights} flights{earlier}, {passed} pass, {_time(left_s)} left"
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds / 60.0:.0f} min" if seconds >= 120.0 else f"{seconds:.0f} s"
+
+
+def _controllers(scenarios: Iterable[Scenario]) -> dict[str, str]:
+    """Return the hash of the code of every controller that is not built in."""
+    found: dict[str, str] = {}
+    for control in (scenario.control for scenario in scenarios):
+        if control.controller not in BUILT_IN:
+            name = " ".join(control.command or [control.controller])
+            found[name] = found.get(name) or code_sha256(control.controller, control.command)
+    return found
+
+
+def _digest(texts: Iterable[str]) -> str:
+    digest = hashlib.sha256()
+    for text in texts:
+        digest.update(text.encode("utf-8") + b"\0")
+    return digest.hexdigest()
