@@ -6,9 +6,7 @@ from pathlib import Path
 from tests.commands.conftest import Command
 
 
-def test_many_runs_are_compared_and_a_mix_is_refused(
-    small: Path, qswarm: Command
-) -> None:
+def test_many_runs_are_compared_and_a_mix_is_refused(small: Path, qswarm: Command) -> None:
     short = ("--no-recording", "--duration", "2", "--quiet")
     qswarm("sim", small, *short, "--seeds", "0:2", "--out", "many")
     qswarm("sim", small, *short, "--seed", "0", "--out", "one")

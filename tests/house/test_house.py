@@ -61,7 +61,8 @@ def test_constraints_are_names_and_versions_only() -> None:
 def test_every_requirement_is_pinned() -> None:
     pins = (ROOT / "constraints.txt").read_text().lower().replace("_", "-")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    needed = [*project["dependencies"], *project["optional-dependencies"]["dev"]]
+    extras = project["optional-dependencies"].values()
+    needed = [*project["dependencies"], *(name for extra in extras for name in extra)]
     for name in (re.match(r"[A-Za-z0-9-]+", each) for each in needed):
         assert name is not None
         assert f"\n{name[0].lower()}==" in pins

@@ -4,8 +4,9 @@ import pytest
 
 from worldsim.sweep.figures import sweep_figures
 from worldsim.sweep.flight_row import FIGURES, FlightRow
+from worldsim.sweep.logistic import Point, break_of
 from worldsim.sweep.plan import Axis, FlightKey, Plan
-from worldsim.sweep.result import Rows, breaks_of, cells_of, summary_of
+from worldsim.sweep.result import Rows, break_text, breaks_of, cells_of, summary_of
 from worldsim.sweep.sweep_tables import cells_table, flights_table
 from worldsim.sweep.sweep_text import repeat_text
 
@@ -47,6 +48,23 @@ def test_a_break_is_found_with_the_other_keys_held() -> None:
     assert row["text"].startswith("breaks at 65.6")
     assert found["netem.loss_percent", "b", "0"]["kind"] == "all pass"
     assert found["netem.delay_ms", "90", "a"]["kind"] == "no trend"
+
+
+@pytest.mark.parametrize(
+    ("passed", "says"),
+    [
+        ((20, 20, 14), "holds from 0 to 20: more than half pass; the curve reaches one half at 2"),
+        ((8, 2, 0), "fails from 0 to 20: less than half pass; the curve reaches one half at -"),
+        ((0, 2, 8), "fails from 0 to 20: less than half pass; the curve reaches one half at 2"),
+        ((14, 20, 20), "holds from 0 to 20: more than half pass; the curve reaches one half at -"),
+        ((16, 13, 9), "on, no upper bound in what was flown)"),
+        ((20, 20, 0), "breaks at a value between 10 (all pass) and 20 (all fail); no curve fits"),
+        ((0, 20, 20), "holds from a value between 0 (all fail) and 10 (all pass); no curve fits"),
+    ],
+)
+def test_a_break_in_words(passed: tuple[int, ...], says: str) -> None:
+    found = break_of([Point(10.0 * index, each, 20) for index, each in enumerate(passed)])
+    assert says in break_text(found, 0.0, 20.0)
 
 
 def test_a_flight_that_is_not_there_counts_nowhere() -> None:

@@ -5,7 +5,7 @@ an order when it has room for it, so that an order may depend on what was flown 
 leaves nothing but what is returned; its scenario with its seed repeats it.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from shutil import rmtree
 from typing import NamedTuple, Protocol
@@ -56,11 +56,15 @@ class LocalSite:
     """Processes of this host.
 
     workers: flights at once. scratch: a folder for what they write; it is removed after them.
+    on_poll: called now and then during a flight; what it raises ends all.
     """
 
-    def __init__(self, workers: int, scratch: Path) -> None:
+    def __init__(
+        self, workers: int, scratch: Path, on_poll: Callable[[], None] = lambda: None
+    ) -> None:
         self._workers = workers
         self._scratch = scratch
+        self._on_poll = on_poll
 
     def fly(self, orders: Iterable[Order], stop: StopRequest) -> Iterator[Flown]:
         """Yield what each order showed. Raises RunDirectoryError without room in ``scratch``."""
@@ -74,7 +78,7 @@ class LocalSite:
 
         rmtree(self._scratch, ignore_errors=True)  # of a sweep that was killed
         try:
-            for made in sweep(jobs(), self._workers, stop):
+            for made in sweep(jobs(), self._workers, stop, self._on_poll):
                 order = active.pop(made.folder)
                 rmtree(made.folder, ignore_errors=True)
                 if not (stop.requested and is_cut_off(made, order.scenario)):

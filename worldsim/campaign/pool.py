@@ -49,15 +49,21 @@ def simulate(
     return made
 
 
-def sweep(jobs: Iterable[Job], workers: int, stop: StopRequest) -> Iterator[Made]:
+def sweep(
+    jobs: Iterable[Job],
+    workers: int,
+    stop: StopRequest,
+    on_poll: Callable[[], None] = lambda: None,
+) -> Iterator[Made]:
     """Make many runs, up to ``workers`` at once; yield each result as soon as it is there.
 
     A job is taken when there is room for it: it may depend on results that were yielded before. An
-    error fails its run alone. After a stop request no further run begins. Raises
-    RunDirectoryError where the first run's folder cannot be written; where that of a later one
-    cannot, RunWriteError, once the active runs have ended.
+    error fails its run alone. After a stop request no further run begins. on_poll: called now and
+    then during each run; what it raises ends all of them. Raises RunDirectoryError where the first
+    run's folder cannot be written; where that of a later one cannot, RunWriteError, once the active
+    runs have ended.
     """
-    return _Pool(jobs, workers, stop, lambda _: None).results()
+    return _Pool(jobs, workers, stop, lambda _: on_poll()).results()
 
 
 class _Ready(NamedTuple):

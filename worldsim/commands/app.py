@@ -98,6 +98,7 @@ def main() -> None:
 
 def command(arguments: list[str]) -> int:
     """Run one command line and return its exit status; bad input is reported in one line."""
+    from worldsim.campaign.flight_site import SiteError
     from worldsim.campaign.pool import FailedFlightError
     from worldsim.fleet.process_table import OperatorError
     from worldsim.recording.viewer import ViewerError
@@ -108,7 +109,7 @@ def command(arguments: list[str]) -> int:
     names = tuple(typed.commands)
     try:
         status = typed(arguments, prog_name="qswarm", standalone_mode=False)
-    except (ScenarioError, RunDirectoryError, ViewerError, OperatorError) as error:
+    except (ScenarioError, RunDirectoryError, SiteError, ViewerError, OperatorError) as error:
         complain(" ".join(str(error).splitlines()))
         return INCONCLUSIVE if isinstance(error, RunWriteError) else BAD_INPUT
     except typer.TyperException as error:

@@ -3,7 +3,8 @@
 import os
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -44,6 +45,7 @@ commands = typer.Typer()
         "qswarm sweep my.toml --vary control.controller=q_structure,my_package.module:Mine",
         "qswarm sweep my.toml --vary control.parameters.gain=0.5,1,2 --seeds 0:50 --jobs 2",
         "qswarm sweep wedge-9 --vary fleet.agents=9,12,15 --out runs/growth    # again: goes on",
+        "qswarm sweep wedge-9 --vary netem.delay_ms=0,500 --cluster tcp://10.0.0.5:8786",
     )
 )
 def sweep(
@@ -62,6 +64,13 @@ def sweep(
     jobs: Annotated[
         int | None,
         typer.Option(metavar="N", min=1, help="Flights at once.", show_default="all cores"),
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            metavar="tcp://HOST:PORT",
+            help="Fly on this Dask cluster instead of this host (needs qswarm[cluster]).",
+        ),
     ] = None,
     agents: Agents = None,
     duration: Duration = None,
@@ -83,7 +92,6 @@ def sweep(
     end a table of flights and one of cells (Parquet and CSV), the share of passes with its
     interval, the value at which each number breaks the team, and figures (SVG and PNG).
     """
-    from worldsim.campaign.flight_site import LocalSite
     from worldsim.results.progress_line import ProgressLine
     from worldsim.results.run_folder import folder_named_after_now
     from worldsim.sweep.journal import Journal
@@ -91,17 +99,19 @@ def sweep(
     from worldsim.sweep.sweep_text import repeat_text
 
     base = overrides_of(settings, agents, None, duration)
+    if cluster is not None and jobs is not None:
+        raise typer.BadParameter("its workers decide that (--jobs)", param_hint="--cluster")
     plan = _plan(vary, seeds, base)
     line = ProgressLine(hidden=quiet)
     flown = _loaded(scenario, plan, base, line)
     folder = out or folder_named_after_now(f"sweep-{flown.name}")
-    journal = Journal(folder, identity_of(flown))
-    site: FlightSite = LocalSite(jobs or len(os.sched_getaffinity(0)), folder / SCRATCH)
-    try:
-        ended = fly(flown, journal, site, line)
-    finally:
-        line.clear()
-        journal.close()
+    with _site(cluster, jobs, flown, folder / SCRATCH) as site:
+        journal = Journal(folder, identity_of(flown))
+        try:
+            ended = fly(flown, journal, site, line)
+        finally:
+            line.clear()
+            journal.close()
     _tell(ended.summary, folder, quiet, json)
     repeat = repeat_text(plan, journal.rows, _given(scenario, base))
     if repeat is not None and not quiet:
@@ -163,6 +173,26 @@ def _check_kinds(folders: tuple[Path, Path], kinds: list[str]) -> None:
     if kinds[0] != kinds[1]:
         detail = f"holds {kinds[1]}, and {folders[0]} holds {kinds[0]}: compare two of a kind"
         raise RunDirectoryError(folders[1], detail)
+
+
+@contextmanager
+def _site(
+    cluster: str | None, jobs: int | None, flown: "Sweep", scratch: Path
+) -> "Iterator[FlightSite]":
+    """Yield where flights are flown. Raises SiteError where a cluster cannot fly them."""
+    from worldsim.campaign.flight_site import LocalSite
+
+    if cluster is None:
+        yield LocalSite(jobs or len(os.sched_getaffinity(0)), scratch)
+        return
+    from worldsim.campaign.cluster_site import ClusterSite
+    from worldsim.campaign.controller_code import user_controllers
+
+    site = ClusterSite(cluster, user_controllers(flown.scenarios.values()))
+    try:
+        yield site
+    finally:
+        site.close()
 
 
 def _plan(vary: list[str], seeds: str, base: Mapping[str, str]) -> "Plan":

@@ -192,9 +192,15 @@ def break_text(found: Break, least: float, most: float) -> str:
         "no trend": f"no trend {tested}",
         "too few": "cannot be fitted: fewer than two of its values were flown",
     }
-    return texts.get(found.kind) or (
-        f"does not break {tested}; the curve reaches one half at {found.at or 0.0:.3g}"
-    )
+    return texts.get(found.kind) or _outside_text(found, least, tested)
+
+
+def _outside_text(found: Break, least: float, tested: str) -> str:
+    """Return where the curve reaches one half, outside the tested values."""
+    at = found.at or 0.0
+    word = "holds" if (at < least) != bool(found.falls) else "fails"
+    half = "more" if word == "holds" else "less"
+    return f"{word} {tested}: {half} than half pass; the curve reaches one half at {at:.4g}"
 
 
 def _bounds(found: Break) -> str:

@@ -6,8 +6,8 @@ from pathlib import Path
 from time import monotonic
 from typing import NamedTuple
 
-from agent.controller import BUILT_IN
 from netem.wire.shutdown import StopRequest, stop_requests
+from worldsim.campaign.controller_code import code_sha256, user_controllers
 from worldsim.campaign.flight_site import FlightSite, Order, SiteError
 from worldsim.export.table_files import write_csv, write_parquet
 from worldsim.results.exit_status import EXIT_STATUS, INTERRUPTED
@@ -16,7 +16,6 @@ from worldsim.results.provenance import provenance
 from worldsim.results.run_folder import RunWriteError, write_json
 from worldsim.scenario.file import dump
 from worldsim.scenario.tables import Scenario
-from worldsim.sweep.controller_code import code_sha256
 from worldsim.sweep.figures import sweep_figures
 from worldsim.sweep.flight_row import row_of
 from worldsim.sweep.journal import SCHEMA, Identity, Journal
@@ -56,7 +55,9 @@ def identity_of(sweep: Sweep) -> Identity:
         "vary": [(axis.key, list(axis.values)) for axis in sweep.plan.axes],
         "seeds": (first, sweep.plan.seeds.stop),
         "content_sha256": _digest(dump(scenario) for scenario in chosen),
-        "controllers": _controllers(chosen),
+        "controllers": {
+            str(each): code_sha256(each.name, each.command) for each in user_controllers(chosen)
+        },
         "version": known["version"],
         "commit": known["commit"],
         "commit_dirty": known["commit_dirty"],
@@ -146,16 +147,6 @@ class _Pace:
 
 def _time(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds >= 120.0 else f"{seconds:.0f} s"
-
-
-def _controllers(scenarios: Iterable[Scenario]) -> dict[str, str]:
-    """Return the hash of the code of every controller that is not built in."""
-    found: dict[str, str] = {}
-    for control in (scenario.control for scenario in scenarios):
-        if control.controller not in BUILT_IN:
-            name = " ".join(control.command or [control.controller])
-            found[name] = found.get(name) or code_sha256(control.controller, control.command)
-    return found
 
 
 def _digest(texts: Iterable[str]) -> str:
