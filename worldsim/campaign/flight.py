@@ -12,18 +12,20 @@ import sys
 import traceback
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from agent.checked_controller import described
 from agent.controller import FailedProgramError, FaultyControllerError
 from netem.wire.shutdown import StopRequest
 from worldsim.campaign.pulse import ClosedFilesError, Guard, Pulse, blame
 from worldsim.engine.step import SlotLoop
+from worldsim.engine.trace import TraceLog
 from worldsim.engine.virtual import Flight, fly
 from worldsim.fleet.fork import adopt_orphans, end_orphans
 from worldsim.results.run_folder import RunDirectory, RunWriteError
 from worldsim.results.sinks import Sinks, open_sinks
 from worldsim.results.summary import FinishedRun, summarise
+from worldsim.results.trace_file import write_trace
 from worldsim.scenario.tables import Scenario
 
 MEMORY_B = 4 * 1024**3
@@ -34,7 +36,14 @@ FLOWN, FAILED, NOT_WRITTEN = 0, 1, 3
 """Exit statuses of a flight: a summary is there; an error ended it; no summary can be written."""
 
 
-def fly_in_child(scenario: Scenario, directory: RunDirectory, recording: bool, pulse: Pulse) -> int:
+class Kept(NamedTuple):
+    """What a flight writes beside its events and its summary."""
+
+    recording: bool
+    trace: bool = False  # as a file, to be compared slot by slot
+
+
+def fly_in_child(scenario: Scenario, directory: RunDirectory, kept: Kept, pulse: Pulse) -> int:
     """Fly, and write recording, events and summary; return the exit status."""
     adopt_orphans()
     _limit_memory()
@@ -42,7 +51,7 @@ def fly_in_child(scenario: Scenario, directory: RunDirectory, recording: bool, p
     faulthandler.enable(all_threads=False)
     faulthandler.register(signal.SIGUSR1, all_threads=False)
     try:
-        _fly(scenario, directory, recording, pulse)
+        _fly(scenario, directory, kept, pulse)
     except ClosedFilesError as error:
         pulse.note_end(str(error))
         os._exit(FAILED)
@@ -71,15 +80,16 @@ def finished(flight: Flight, scenario: Scenario) -> FinishedRun:
     )
 
 
-def _fly(scenario: Scenario, directory: RunDirectory, recording: bool, pulse: Pulse) -> None:
-    stop = StopRequest()
-    sinks = open_sinks(directory, scenario, directory.path.name, "virtual", recording)
+def _fly(scenario: Scenario, directory: RunDirectory, kept: Kept, pulse: Pulse) -> None:
+    stop, log = StopRequest(), TraceLog() if kept.trace else None
+    sinks = open_sinks(directory, scenario, directory.path.name, "virtual", kept.recording)
     try:
         flight = fly(
             scenario,
             sinks,
             should_stop=lambda: stop.requested or pulse.stop_requested,
             watch=Guard(pulse, scenario),
+            log=log,
         )
     except ClosedFilesError:
         raise
@@ -88,6 +98,8 @@ def _fly(scenario: Scenario, directory: RunDirectory, recording: bool, pulse: Pu
         raise
     _close(sinks, flight.loop)
     flight.loop.note_writes()
+    if log is not None:
+        write_trace(log, directory.path)
     directory.write_summary(summarise(scenario, finished(flight, scenario)))
 
 

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
-from worldsim.campaign.flight import fly_in_child
+from worldsim.campaign.flight import Kept, fly_in_child
 from worldsim.campaign.pulse import Pulse
 from worldsim.results.run_folder import RunDirectory
 from worldsim.scenario.tables import Scenario
@@ -23,7 +23,7 @@ class _Task(NamedTuple):
 
     scenario: Scenario
     folder: Path
-    recording: bool
+    kept: Kept
     pulse: int
     """The descriptor of the pulse's memory."""
 
@@ -33,10 +33,10 @@ def is_needed() -> bool:
     return "rerun" in sys.modules
 
 
-def fly_in_fresh_child(scenario: Scenario, folder: Path, recording: bool, pulse: Pulse) -> NoReturn:
+def fly_in_fresh_child(scenario: Scenario, folder: Path, kept: Kept, pulse: Pulse) -> NoReturn:
     """Replace this process by a fresh one that flies."""
     task = os.memfd_create("qswarm-flight")
-    os.write(task, pickle.dumps(_Task(scenario, folder, recording, pulse.descriptor)))
+    os.write(task, pickle.dumps(_Task(scenario, folder, kept, pulse.descriptor)))
     os.lseek(task, 0, os.SEEK_SET)
     os.set_inheritable(task, True)
     os.set_inheritable(pulse.descriptor, True)
@@ -50,7 +50,7 @@ def main() -> NoReturn:
     with os.fdopen(int(sys.argv[1]), "rb") as file:
         task: _Task = pickle.load(file)
     pulse = Pulse(task.pulse)
-    status = fly_in_child(task.scenario, RunDirectory(task.folder), task.recording, pulse)
+    status = fly_in_child(task.scenario, RunDirectory(task.folder), task.kept, pulse)
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(status)

@@ -17,6 +17,7 @@ from worldsim.results.run_folder import (
     room_reserved,
     write_json,
 )
+from worldsim.results.same_twice import verify_twice
 from worldsim.scenario.tables import Scenario
 
 ROW_B = 2048
@@ -25,18 +26,22 @@ HEAD_B = 16 * 1024
 """Room for the rest of it [bytes]."""
 
 
-def simulate_one(scenario: Scenario, out: Path | None, recording: bool, output: Output) -> int:
+def simulate_one(
+    scenario: Scenario, out: Path | None, recording: bool, output: Output, trace: bool = False
+) -> int:
     """Make one run and tell its outcome; return the exit status. Raises RunDirectoryError.
 
-    Ctrl-C ends it early; the verdict on what was simulated is printed and kept all the same.
+    Ctrl-C ends it early; the verdict on what was simulated is printed and kept all the same. trace:
+    whether the trace is kept as a file.
     """
     line, began_s = ProgressLine(hidden=output.quiet), monotonic()
+    again = "again: " if output.silent else ""
     with stop_requests() as stop:
         try:
             result = simulate(
-                Job(scenario, out, recording),
+                Job(scenario, out, recording, trace),
                 stop,
-                lambda time_s: line.update(_pace(time_s, scenario.duration_s, began_s)),
+                lambda time_s: line.update(again + _pace(time_s, scenario.duration_s, began_s)),
             )
         except (FailedFlightError, RunWriteError) as error:
             output.fail(_failed(scenario, error))
@@ -44,6 +49,19 @@ def simulate_one(scenario: Scenario, out: Path | None, recording: bool, output: 
     line.clear()
     status = output.conclude(result, recording)
     return INTERRUPTED if stop.requested else status
+
+
+def simulate_twice(scenario: Scenario, out: Path, recording: bool, output: Output) -> int:
+    """Make one run twice and compare the traces; return the exit status: 1 where they differ."""
+    status = simulate_one(scenario, out, recording, output, trace=True)
+
+    def again(folder: Path) -> int:
+        silent = output._replace(silent=True, junit=None)
+        return simulate_one(scenario, folder, False, silent, trace=True)
+
+    verified = verify_twice(scenario, out, status, again)
+    print(verified.text, file=output.stream)
+    return verified.status
 
 
 def _pace(time_s: float, duration_s: float, began_s: float) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from worldsim.campaign import fresh_flight
-from worldsim.campaign.flight import FLOWN, NOT_WRITTEN, fly_in_child
+from worldsim.campaign.flight import FLOWN, NOT_WRITTEN, Kept, fly_in_child
 from worldsim.campaign.printed import PrintedOutput
 from worldsim.campaign.pulse import Place, Pulse, blame
 from worldsim.fleet.fork import ProcessExit, fork, reap
@@ -41,6 +41,7 @@ class Job(NamedTuple):
     scenario: Scenario
     folder: Path | None  # a new folder; None: one named after the scenario and the time
     recording: bool
+    trace: bool = False  # whether the trace is kept as a file
 
 
 class WatchedFlight:
@@ -51,7 +52,9 @@ class WatchedFlight:
         self._directory = RunDirectory.create(job.folder, job.scenario)
         self._pulse = Pulse()
         self.output = PrintedOutput(self._directory.path.name)
-        self.pid = fork(self.output.write_end, signal.SIGKILL, lambda: self._fly(job.recording))
+        self.pid = fork(
+            self.output.write_end, signal.SIGKILL, lambda: self._fly(Kept(job.recording, job.trace))
+        )
         self.output.release()
         self.exit_descriptor = os.pidfd_open(self.pid)
         self._exit: ProcessExit | None = None
@@ -104,11 +107,11 @@ class WatchedFlight:
             os.waitpid(self.pid, 0)
         self._close()
 
-    def _fly(self, recording: bool) -> int:
+    def _fly(self, kept: Kept) -> int:
         folder = self._directory.path.absolute()  # a controller may change the current folder
-        if recording and fresh_flight.is_needed():
-            fresh_flight.fly_in_fresh_child(self._scenario, folder, recording, self._pulse)
-        return fly_in_child(self._scenario, RunDirectory(folder), recording, self._pulse)
+        if kept.recording and fresh_flight.is_needed():
+            fresh_flight.fly_in_fresh_child(self._scenario, folder, kept, self._pulse)
+        return fly_in_child(self._scenario, RunDirectory(folder), kept, self._pulse)
 
     def _allowed_s(self) -> float:
         if self._pulse.ended:

@@ -149,6 +149,13 @@ LiveWeb = Annotated[
         help="Show it in a browser on this host; prints the address, and one for viewers.",
     ),
 ]
+Verify = Annotated[
+    bool,
+    typer.Option(
+        "--verify",
+        help="Fly twice and compare the traces; exit 1 with tick and agent where they part.",
+    ),
+]
 Quiet = Annotated[
     bool, typer.Option("--quiet", help="Print the outcome and errors only, no progress.")
 ]

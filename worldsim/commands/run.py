@@ -24,6 +24,7 @@ from worldsim.commands.options import (
     Seed,
     Settings,
     Shards,
+    Verify,
     check_lockstep,
     examples,
     live_view_of,
@@ -42,7 +43,7 @@ commands = typer.Typer()
         "qswarm run wedge-9 --seed 7 --set netem.loss_percent=50",
         "qswarm run my.toml --agents 20 --duration 40 --speed 2",
         "qswarm run wedge-9 --agents 80 --on-overload slow",
-        "qswarm run wedge-9 --lockstep",
+        "qswarm run wedge-9 --lockstep --verify",
         "qswarm run wedge-9 --live",
         "qswarm run wedge-9 --json | jq .outcome",
         "qswarm run --list",
@@ -63,6 +64,7 @@ def run(
     settings: Settings = None,
     out: Out = None,
     no_recording: NoRecording = False,
+    verify: Verify = False,
     live: Live = False,
     live_web: LiveWeb = False,
     quiet: Quiet = False,
@@ -75,7 +77,8 @@ def run(
     The processes are the emulated radio (netem), the world, and one for each agent.
     """
     from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, VIRTUAL_COMMAND_TICKS
-    from worldsim.fleet.launcher import run as run_processes
+    from worldsim.fleet.flown_twice import run_twice
+    from worldsim.fleet.launcher import run as run_once
     from worldsim.fleet.process import RunOptions
     from worldsim.results.closing import Output
     from worldsim.results.run_folder import RunDirectory
@@ -83,6 +86,10 @@ def run(
     if not isfinite(speed):
         raise typer.BadParameter(f"{speed}; a number from 0.01", param_hint="--speed")
     check_lockstep(lockstep, speed, shards, on_overload)
+    if verify and not lockstep:
+        raise typer.BadParameter(
+            "needs --lockstep: free-running runs differ slightly", param_hint="--verify"
+        )
     overrides = overrides_of(settings, agents, seed, duration)
     command_ticks = VIRTUAL_COMMAND_TICKS if lockstep else PROCESS_COMMAND_TICKS
     loaded = load_scenario(scenario, overrides, command_ticks, "launched")
@@ -94,7 +101,8 @@ def run(
     terms = RunOptions(
         loaded.name, speed, not no_recording, lockstep, shards, on_overload=on_overload
     )
-    return shown.watch(directory.recording, lambda: run_processes(loaded, directory, terms, output))
+    fly = run_twice if verify else run_once
+    return shown.watch(directory.recording, lambda: fly(loaded, directory, terms, output))
 
 
 @commands.command(
@@ -103,6 +111,7 @@ def run(
         "qswarm sim wedge-9 --seeds 0:20 --jobs 2 --out runs/twenty",
         "qswarm sim my.toml --set netem.delay_ms=200 --no-recording",
         "qswarm sim wedge-100 --live-web",
+        "qswarm sim my.toml --verify    # is it the same twice?",
         "qswarm sim wedge-9 --json | jq .min_separation_m",
         "qswarm sim wedge-9 --seeds 0:20 --quiet --junit wedge-9.xml",
     )
@@ -123,6 +132,7 @@ def sim(
     settings: Settings = None,
     out: Out = None,
     no_recording: NoRecording = False,
+    verify: Verify = False,
     live: Live = False,
     live_web: LiveWeb = False,
     quiet: Quiet = False,
@@ -134,7 +144,7 @@ def sim(
 
     The same agents, radio and world as in `qswarm run`, in one process; the result is repeatable.
     """
-    from worldsim.campaign.virtual_runs import simulate_many, simulate_one
+    from worldsim.campaign.virtual_runs import simulate_many, simulate_one, simulate_twice
     from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
     from worldsim.recording.layout import RECORDING_FILE
     from worldsim.results.closing import Output
@@ -142,6 +152,8 @@ def sim(
 
     if seed is not None and seeds is not None:
         raise typer.BadParameter("cannot be combined with --seed", param_hint="--seeds")
+    if verify and (seeds is not None or len(scenarios) > 1):
+        raise typer.BadParameter("verifies one run, and these are many", param_hint="--verify")
     loaded = []
     for given in scenarios:
         for each in seeds_of(seeds) if seeds is not None else (seed,):
@@ -153,9 +165,10 @@ def sim(
     shown = live_view_of(live, live_web, no_recording, len(loaded))
     if seeds is None and len(scenarios) == 1:
         folder = out or folder_named_after_now(loaded[0].name)
+        fly = simulate_twice if verify else simulate_one
         return shown.watch(
             folder / RECORDING_FILE,
-            lambda: simulate_one(loaded[0], folder, not no_recording, output),
+            lambda: fly(loaded[0], folder, not no_recording, output),
         )
     workers = jobs or len(os.sched_getaffinity(0))
     return simulate_many(loaded, out, not no_recording, workers, output)

@@ -47,12 +47,10 @@ from worldsim.engine.operations import (
 )
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
 from worldsim.engine.step import OpenSlot, Recorder, SlotLoop, world_of
-from worldsim.judge.run_events import RunEvent
+from worldsim.engine.trace import TraceLog
 from worldsim.scenario.tables import Scenario
 
 WORLD_KILLED: Final = "the world was killed"
-PROGRESS_EVERY_S: Final = 0.5
-"""[s; wall time]"""
 CHECKED_EVERY: Final = 61
 """A prime, so that each agent's turn comes: agents step in every fourth slot."""
 HEARD_AGAIN: Final = 16
@@ -240,23 +238,19 @@ def _check_codec(sent: _Message, arrived: _Message) -> None:
 def fly(
     scenario: Scenario,
     recorder: Recorder | None = None,
-    on_event: Callable[[RunEvent], None] | None = None,
-    on_progress: Callable[[SlotLoop], None] | None = None,
     should_stop: Callable[[], bool] = lambda: False,
     watch: StepWatch | None = None,
+    log: TraceLog | None = None,
 ) -> Flight:
-    """Fly a scenario in virtual time to its end, or until ``should_stop`` returns True."""
+    """Fly a scenario in virtual time to its end, or until ``should_stop`` returns True.
+
+    log: gets checksums of what goes into the trace.
+    """
     fleet = VirtualFleet(scenario, recorder, watch)
+    fleet.loop.trace.log = log
     wall, cpu = perf_counter(), process_time()
-    reported, progress_at = 0, wall + PROGRESS_EVERY_S
     while fleet.loop.world.slot < scenario.slots and not should_stop() and not fleet.ended_by:
         fleet.slot()
-        while on_event is not None and reported < len(fleet.loop.events):
-            on_event(fleet.loop.events[reported])
-            reported += 1
-        if on_progress is not None and perf_counter() >= progress_at:
-            progress_at = perf_counter() + PROGRESS_EVERY_S
-            on_progress(fleet.loop)
     fleet.loop.finish()
     return Flight(
         loop=fleet.loop,

@@ -16,6 +16,7 @@ from netem.wire.bus import Bus
 from netem.wire.keys import Keys
 from netem.wire.session import SessionError, open_client
 from netem.wire.shutdown import StopRequest
+from worldsim.engine.trace import TraceLog
 from worldsim.fleet.free_running import FreeRunningFleet
 from worldsim.fleet.launcher_link import LauncherLink
 from worldsim.fleet.lockstep import LockstepFleet
@@ -24,7 +25,8 @@ from worldsim.fleet.startup import Startup, StartupError, assemble
 from worldsim.results.exit_status import BAD_INPUT, EXIT_STATUS, INCONCLUSIVE
 from worldsim.results.run_folder import RunDirectory, RunDirectoryError, RunWriteError
 from worldsim.results.sinks import Sinks, open_sinks
-from worldsim.results.summary import FinishedRun, Mode, summarise
+from worldsim.results.summary import FinishedRun, Mode, Summary, summarise
+from worldsim.results.trace_file import write_trace
 from worldsim.scenario.tables import Scenario
 
 
@@ -38,6 +40,7 @@ class RunOptions(NamedTuple):
     shards: int = 1  # number of mediums that share the agents
     users: Path | None = None  # file of passwords, where the router requires one
     on_overload: OnOverload = "go"  # what is done when ticks are late; not in lockstep
+    trace: bool = False  # whether the trace is kept as a file; in lockstep alone
     launched_s: float | None = None  # when the launcher started [s; monotonic clock], if one did
 
     @property
@@ -108,7 +111,7 @@ def conduct(
         ended_by = None if complete else cause
         summary = summarise(scenario, _finished(fleet, options, ended_by, up_s))
         if fleet.begun:
-            summary = directory.write_summary(summary)
+            summary = _write(summary, fleet.loop.trace.log, directory)
         else:
             directory.remove_results()
     if launcher.orphaned:
@@ -116,6 +119,16 @@ def conduct(
     outcome = summary["outcome"] if fleet.begun else f"{ended_by} before take-off"
     print(f"world: {outcome}{_lateness(fleet.medium_counters)}", flush=True)
     return EXIT_STATUS[summary["outcome"]]
+
+
+def _write(summary: Summary, log: TraceLog | None, directory: RunDirectory) -> Summary:
+    """Write the summary, and the trace if it is kept. Raises RunWriteError."""
+    try:
+        if log is not None:
+            write_trace(log, directory.path)
+    except OSError as error:
+        raise RunWriteError(directory.path, error.strerror or str(error)) from error
+    return directory.write_summary(summary)
 
 
 def _failure(error: Exception, directory: RunDirectory) -> str:
@@ -134,7 +147,9 @@ def _fleet(
     options: RunOptions,
 ) -> FreeRunningFleet | LockstepFleet:
     if options.lockstep:
-        return LockstepFleet(scenario, bus, sinks, launcher, startup, options.shards)
+        fleet = LockstepFleet(scenario, bus, sinks, launcher, startup, options.shards)
+        fleet.loop.trace.log = TraceLog() if options.trace else None
+        return fleet
     overload = Overload(options.speed, options.on_overload)
     return FreeRunningFleet(scenario, bus, sinks, launcher, startup, overload)
 

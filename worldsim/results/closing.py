@@ -20,6 +20,7 @@ class Output(NamedTuple):
     quiet: bool = False
     json: bool = False
     junit: Path | None = None
+    silent: bool = False  # a run that is flown again tells nothing
 
     @property
     def stream(self) -> TextIO:
@@ -37,6 +38,8 @@ class Output(NamedTuple):
     def conclude(self, result: Result, recorded: bool) -> int:
         """Tell the outcome of one run; return its exit status."""
         folder, summary = result
+        if self.silent:
+            return EXIT_STATUS[summary["outcome"]]
         if self.quiet:
             self._tell(closing_line(summary, folder, recorded), summary)
         elif self.stream.isatty():
