@@ -13,7 +13,18 @@ from typing import Annotated, Any
 import typer
 from typer.main import get_command
 
-from worldsim.commands import bench, inspect, netem, operate, replay, results, run, scenario, sweep
+from worldsim.commands import (
+    bench,
+    doctor,
+    inspect,
+    netem,
+    operate,
+    replay,
+    results,
+    run,
+    scenario,
+    sweep,
+)
 from worldsim.commands.options import complain, examples
 from worldsim.commands.usage_errors import usage_text
 from worldsim.results.environment import folder_is_gone, prepare_environment
@@ -46,7 +57,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for group in (run, sweep, scenario, inspect, replay, results, netem, operate, bench):
+for group in (run, sweep, scenario, inspect, replay, results, netem, operate, bench, doctor):
     app.add_typer(group.commands)
 
 

@@ -1,0 +1,1 @@
+"""What this host can do with qswarm: its parts, and the fleets that it flies in real time."""
