@@ -1,5 +1,6 @@
 """The folder of a sweep: it goes on where it was cut off, and is never another sweep's."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -43,9 +44,20 @@ def test_a_sweep_goes_on_and_a_line_that_was_cut_off_is_flown_again(tmp_path: Pa
     again.append(row(0, 1, "fail"))
     again.append(row(0, 1))  # flown twice: the first counts
     again.close()
+    assert len(lines.read_bytes().splitlines()) == 3
     plan, _, rows = read_sweep(tmp_path / "s")
     assert [each["outcome"] for each in rows.values()] == ["pass", "pass", "fail"]
     assert len(plan) == 8
+
+
+def test_of_two_lines_of_one_flight_the_first_counts(tmp_path: Path) -> None:
+    Journal(tmp_path / "s", IDENTITY).close()
+    twice = [json.dumps(row(0, 0, outcome)) + "\n" for outcome in ("fail", "pass")]
+    (tmp_path / "s" / LINES).write_text("".join(twice))
+    journal = Journal(tmp_path / "s", IDENTITY)
+    journal.close()
+    for rows in (journal.rows, read_sweep(tmp_path / "s")[2]):
+        assert [each["outcome"] for each in rows.values()] == ["fail"]
 
 
 def test_one_process_at_a_time(tmp_path: Path) -> None:
@@ -58,10 +70,10 @@ def test_one_process_at_a_time(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"commit": "bad"}, "the commit of qswarm differ"),
-        ({"vary": [("netem.loss_percent", ["0"])]}, "what is varied differ"),
-        ({"content_sha256": "b"}, "the scenario's content, or a --set differ"),
-        ({"controllers": {"mine:Mine": "d"}}, "the code of a controller differ"),
+        ({"commit": "bad"}, r"\(what differs: the commit of qswarm\)"),
+        ({"vary": [("netem.loss_percent", ["0"])]}, r"\(what differs: what is varied\)"),
+        ({"content_sha256": "b"}, "the scenario's content, or a --set"),
+        ({"controllers": {"mine:Mine": "d"}}, "the code of a controller"),
         ({"seeds": (1, 4)}, "seeds 0:4, which can only grow"),
         ({"seeds": (0, 3)}, "seeds 0:4, which can only grow"),
     ],

@@ -1,6 +1,6 @@
 """Where a number breaks the team: what is fitted, and when it cannot be."""
 
-from math import inf, log
+from math import exp, inf, log
 
 import pytest
 
@@ -30,6 +30,26 @@ def test_the_interval_shrinks_with_the_flights_and_shifts_with_the_numbers() -> 
     assert (few.high - few.low) / (many.high - many.low) == pytest.approx(10.0**0.5, rel=0.1)
     far = break_of([Point(1e6 + point.x, *point[1:]) for point in points(19, 15, 4, 1)])
     assert far.at == pytest.approx(1e6 + few.at)  # type: ignore[operator]
+
+
+def test_the_interval_holds_what_the_likelihood_ratio_does_not_rule_out() -> None:
+    data = points(19, 15, 4, 1)
+
+    def likelihood(middle: float, slope: float) -> float:
+        odds = [slope * (point.x - middle) for point in data]
+        return sum(
+            point.passed * each - point.flown * log(1.0 + exp(each))
+            for point, each in zip(data, odds, strict=True)
+        )
+
+    def best(middle: float) -> float:
+        return max(likelihood(middle, -0.001 * step) for step in range(1, 600))
+
+    found = break_of(data)
+    for bound in (found.low, found.high):
+        assert bound is not None
+        ratio = 2.0 * (best(found.at or 0.0) - best(bound))
+        assert ratio == pytest.approx(3.841, abs=0.01)
 
 
 def test_a_share_that_rises() -> None:

@@ -15,10 +15,12 @@ from worldsim.sweep.sweep_pair import Flights, PairKey, compare_sweeps
 FOLDERS = (Path("a"), Path("b"))
 
 
-def tick(index: int, x_m: float = 0.0, rank: int = 0, alive: bool = True) -> Tick:
-    """Three agents, of which the second is as given, and the third not in the world."""
+def tick(
+    index: int, x_m: float = 0.0, rank: int = 0, alive: bool = True, joined: bool = False
+) -> Tick:
+    """Three agents, of which the second is as given, and the third joins the world or not."""
     position = np.zeros((3, 3))
-    position[1, 0], position[2] = x_m, np.nan
+    position[1, 0], position[2] = x_m, 1.0 if joined else np.nan
     place = np.zeros((3, 2), np.int16)
     place[1, 1] = rank
     nothing = np.full(3, np.nan)
@@ -37,13 +39,15 @@ def test_equal_recordings_do_not_part() -> None:
     ("other", "what"),
     [
         (tick(1, x_m=1e-15), "its positions are 1e-15 m apart"),
+        (tick(1, joined=True), "it is in the world of one of them alone"),
         (tick(1, rank=2), "it claims another place"),
         (tick(1, alive=False), "its process runs in one of them alone"),
     ],
 )
 def test_the_first_tick_that_differs_is_found(other: Tick, what: str) -> None:
     parting = parting_of([tick(0), tick(1), tick(2)], [tick(0), other, tick(2, x_m=3.0)])
-    assert parting == {"tick": 1, "t_s": 0.05, "agent": 1, "what": what}
+    agent = 2 if other.position[2, 0] == 1.0 else 1
+    assert parting == {"tick": 1, "t_s": 0.05, "agent": agent, "what": what}
 
 
 def test_a_run_that_ends_early_parts_there() -> None:

@@ -42,4 +42,6 @@ def test_flights_come_seed_by_seed() -> None:
     flights = list(plan.flights())
     assert len(flights) == len(plan) == len(set(flights)) == 12
     assert flights[:6] == [FlightKey(cell, 4) for cell in range(6)]
+    assert [tuple(plan.settings(cell).values()) for cell in range(6)] == plan.cells
     assert plan.settings(4) == {"a": "2", "b": "y"}
+    assert list(plan.settings(4)) == ["a", "b"]

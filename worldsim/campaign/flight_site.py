@@ -12,7 +12,8 @@ from typing import NamedTuple, Protocol
 
 from netem.wire.shutdown import StopRequest
 from worldsim.campaign.pool import Job, sweep
-from worldsim.results.overall import Made, Result
+from worldsim.results.overall import FailedRun, Made, Result
+from worldsim.results.run_folder import RunWriteError
 from worldsim.results.summary import Outcome, Summary
 from worldsim.scenario.tables import Scenario
 
@@ -67,7 +68,10 @@ class LocalSite:
         self._on_poll = on_poll
 
     def fly(self, orders: Iterable[Order], stop: StopRequest) -> Iterator[Flown]:
-        """Yield what each order showed. Raises RunDirectoryError without room in ``scratch``."""
+        """Yield what each order showed.
+
+        Raises RunDirectoryError without room in ``scratch``, RunWriteError once it is full.
+        """
         active: dict[Path, Order] = {}
 
         def jobs() -> Iterator[Job]:
@@ -80,6 +84,8 @@ class LocalSite:
         try:
             for made in sweep(jobs(), self._workers, stop, self._on_poll):
                 order = active.pop(made.folder)
+                if isinstance(made, FailedRun) and made.outcome == "inconclusive":
+                    raise RunWriteError(made.folder, made.error)  # no flight: it is flown again
                 rmtree(made.folder, ignore_errors=True)
                 if not (stop.requested and is_cut_off(made, order.scenario)):
                     yield flown_of(order.key, made)

@@ -106,7 +106,9 @@ def sweep(
     flown = _loaded(scenario, plan, base, line)
     folder = out or folder_named_after_now(f"sweep-{flown.name}")
     with _site(cluster, jobs, flown, folder / SCRATCH) as site:
-        journal = Journal(folder, identity_of(flown))
+        journal = Journal(folder, identity := identity_of(flown))
+        if journal.rows and identity["commit_dirty"]:
+            complain(f"{folder}: warning: qswarm's own files differ from its commit, then or now")
         try:
             ended = fly(flown, journal, site, line)
         finally:

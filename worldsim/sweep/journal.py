@@ -141,7 +141,7 @@ def _checked(folder: Path, identity: Identity) -> Any:
     differing = [words for key, words in SAME.items() if before.get(key) != now[key]]
     if differing:
         raise RunDirectoryError(
-            folder, f"holds another sweep: {' and '.join(differing)} differ; {ANOTHER}"
+            folder, f"holds another sweep (what differs: {', '.join(differing)}); {ANOTHER}"
         )
     (first, end), (now_first, now_end) = before["seeds"], now["seeds"]
     if first != now_first or end > now_end:

@@ -68,7 +68,11 @@ class Plan:
 
     def settings(self, cell: int) -> dict[str, str]:
         """Return the value of each varied key in a cell."""
-        return dict(zip((axis.key for axis in self.axes), self.cells[cell], strict=True))
+        settings = {}
+        for axis in reversed(self.axes):
+            cell, value = divmod(cell, len(axis.values))
+            settings[axis.key] = axis.values[value]
+        return dict(reversed(settings.items()))
 
     def flights(self) -> Iterator[FlightKey]:
         """Yield all flights, seed by seed: a sweep that is cut off has seen every cell alike."""

@@ -119,7 +119,9 @@ def _parted(one: Tick, other: Tick) -> tuple[int | None, str] | None:
     if len(one.position) != len(other.position):
         return None, f"{len(one.position)} agents in the first, {len(other.position)} in the second"
     moved = ~((one.position == other.position) | (_nan(one) & _nan(other))).all(axis=1)
+    apart = (_nan(one) != _nan(other)).any(axis=1)
     for differs, words in (
+        (apart, "it is in the world of one of them alone"),
         (moved, ""),
         ((one.place != other.place).any(axis=1), "it claims another place"),
         (one.alive != other.alive, "its process runs in one of them alone"),

@@ -111,12 +111,13 @@ def _fly_missing(
     """Fly what the journal lacks; return why the site could not fly it all."""
     missing = [key for key in sweep.plan.flights() if key not in journal.rows]
     named = {_name(key): key for key in missing}
-    pace = _Pace(len(sweep.plan), len(missing))
+    passed = sum(row["outcome"] == "pass" for row in journal.rows.values())
+    pace = _Pace(len(sweep.plan), len(journal.rows), passed)
     orders = _orders(sweep, missing)
     try:
         for flown in site.fly(orders, stop):
             journal.append(row_of(named[flown.key], flown))
-            line.update(pace.text(len(journal.rows), journal))
+            line.update(pace.after(flown.outcome == "pass"))
     except SiteError as error:
         return str(error)
     return None
@@ -131,18 +132,26 @@ def _name(key: FlightKey) -> str:
 
 
 class _Pace:
-    """How far a sweep is, and how long the rest takes."""
+    """How far a sweep is, and how long the rest takes.
 
-    def __init__(self, flights: int, missing: int) -> None:
-        self._flights, self._before = flights, flights - missing
+    flights: in all; before, passed: those that were flown earlier, and how many of them passed.
+    """
+
+    def __init__(self, flights: int, before: int, passed: int) -> None:
+        self._flights, self._before = flights, before
+        self._flown, self._passed = before, passed
         self._began_s = monotonic()
 
-    def text(self, flown: int, journal: Journal) -> str:
-        passed = sum(row["outcome"] == "pass" for row in journal.rows.values())
-        new = flown - self._before
-        left_s = (monotonic() - self._began_s) / max(new, 1) * (self._flights - flown)
+    def after(self, passes: bool) -> str:
+        """Count one more flight, and return how far the sweep is."""
+        self._flown += 1
+        self._passed += passes
+        each_s = (monotonic() - self._began_s) / (self._flown - self._before)
+        left = _time(each_s * (self._flights - self._flown))
         earlier = f" ({self._before} earlier)" if self._before else ""
-        return f"{flown} of {self._flights} flights{earlier}, {passed} pass, {_time(left_s)} left"
+        return (
+            f"{self._flown} of {self._flights} flights{earlier}, {self._passed} pass, {left} left"
+        )
 
 
 def _time(seconds: float) -> str:
