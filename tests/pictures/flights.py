@@ -33,7 +33,7 @@ FLIGHTS: Mapping[str, Flight] = {
     "field-6": Flight("field-6", 40.0, (5.0, 20.0, 40.0)),
     "partition-9": Flight("partition-9", 30.0, (10.0, 19.0, 30.0), STORM, NETWORK),
     "flocking-9": Flight("flocking-9", 12.0, (1.0, 6.0, 12.0)),
-    "wedge-100": Flight("wedge-100", 8.0, (1.0, 4.0, 8.0)),
+    "wedge-100": Flight("wedge-100", 5.0, (1.0, 3.0, 5.0)),
 }
 LIBRARY = Path(__file__).parents[2] / "deploy" / "scenarios"
 

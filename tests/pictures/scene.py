@@ -4,9 +4,11 @@ For each component the latest row at or before the time counts, a null row leave
 and static data wins. Transforms of an entity move everything below it.
 """
 
+from bisect import bisect_right
 from collections.abc import Iterator
+from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from rerun.chunk import RrdReader
@@ -20,43 +22,59 @@ PLACES = ("Points3D:positions", "Boxes3D:centers", "Ellipsoids3D:centers", "Arro
 STRIPS = "LineStrips3D:strips"
 
 Values = list[Any]
-Rows = list[tuple[float, Values]]
+
+
+class Row(NamedTuple):
+    """A row of a component: when it was logged [s], and where it is."""
+
+    time_s: float
+    column: Any
+    number: int
+    """Its index in the column."""
+
+    def values(self) -> Values:
+        """Return what was logged; slow, so done only for what is looked at."""
+        values: Values = self.column[self.number].as_py()
+        return values
 
 
 class Scenes:
     """All times of a recording."""
 
     def __init__(self, recording: Path) -> None:
-        self._rows: dict[tuple[str, str], Rows] = {}
+        self._rows: dict[tuple[str, str], list[Row]] = {}
         self._static: dict[tuple[str, str], Values] = {}
         for chunk in RrdReader(recording).stream():
             self._read(chunk)
         for rows in self._rows.values():
-            rows.sort(key=lambda row: row[0])
+            rows.sort(key=lambda row: row.time_s)
 
     def at(self, time_s: float) -> "Scene":
         """Return what is shown at a time [s]."""
-        latest = {key: _latest(rows, time_s) for key, rows in self._rows.items()}
-        cleared = {
-            entity: at for (entity, name), (at, _) in latest.items() if name == CLEAR and at >= 0.0
-        }
+        found = {key: _latest(rows, time_s) for key, rows in self._rows.items()}
+        latest = {key: row for key, row in found.items() if row is not None}
+        cleared = {entity: row.time_s for (entity, name), row in latest.items() if name == CLEAR}
         shown = {
-            (entity, name): values
-            for (entity, name), (at, values) in latest.items()
-            if not any(at < cleared[above] for above in cleared if f"{entity}/".startswith(above))
+            (entity, name): row.values()
+            for (entity, name), row in latest.items()
+            if not any(
+                row.time_s < cleared[above] for above in cleared if f"{entity}/".startswith(above)
+            )
         }
         return Scene(shown | self._static)
 
     def _read(self, chunk: Any) -> None:
         batch = chunk.to_record_batch()
         for name in (name for name in batch.schema.names if ":" in name):
-            key, values = (chunk.entity_path, name), batch.column(name).to_pylist()
+            key, column = (chunk.entity_path, name), batch.column(name)
             if chunk.is_static:
-                self._static[key] = values[-1]
+                self._static[key] = column[-1].as_py()
             else:
                 times = [at.total_seconds() for at in batch.column(layout.SIM_TIME).to_pylist()]
-                rows = zip(times, values, strict=True)
-                self._rows.setdefault(key, []).extend(row for row in rows if row[1] is not None)
+                there = enumerate(zip(times, column.is_valid().to_pylist(), strict=True))
+                self._rows.setdefault(key, []).extend(
+                    Row(at, column, number) for number, (at, valid) in there if valid
+                )
 
 
 class Scene:
@@ -110,10 +128,10 @@ class Scene:
         return points
 
 
-def _latest(rows: Rows, time_s: float) -> tuple[float, Values]:
-    """Return the last row at or before a time [s], with its time; -1 where there is none."""
-    before = [row for row in rows if row[0] <= time_s + 1e-6]
-    return before[-1] if before else (-1.0, [])
+def _latest(rows: list[Row], time_s: float) -> Row | None:
+    """Return the last row at or before a time [s]."""
+    before = bisect_right(rows, time_s + 1e-6, key=attrgetter("time_s"))
+    return rows[before - 1] if before else None
 
 
 def _matrix(x: float, y: float, z: float, w: float) -> np.ndarray:

@@ -5,7 +5,6 @@ meaning: what the panel of words says of them.
 """
 
 import re
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +26,11 @@ ELSEWHERE = (layout.GROUND, layout.OBSTACLES, layout.JAMS)
 FORMING = [name for name in FLIGHTS if name != "flocking-9"]
 
 
+def of(*names: str) -> pytest.MarkDecorator:
+    """Test flights of these names, all tests of one flight together."""
+    return pytest.mark.parametrize("moments", names, indirect=True, scope="module")
+
+
 class Moment(NamedTuple):
     """A time of a flight: what is true, and what is shown."""
 
@@ -34,17 +38,14 @@ class Moment(NamedTuple):
     scene: Scene
 
 
-Moments = dict[str, list[Moment]]
+Moments = list[Moment]
 
 
 @pytest.fixture(scope="module")
-def moments(tmp_path_factory: pytest.TempPathFactory) -> Moments:
-    """Return the moments of each flight."""
-    base = tmp_path_factory.mktemp("pictures")
-    return {name: moments_of(fly(name, base / name), name) for name in FLIGHTS}
-
-
-def moments_of(recording: Path, name: str) -> list[Moment]:
+def moments(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Moments:
+    """Return the moments of a flight, which is flown once for all tests of it."""
+    name = request.param
+    recording = fly(name, tmp_path_factory.mktemp("pictures") / name)
     scenes, ticks = Scenes(recording), worldsim.results.open(recording).ticks
     return [
         Moment(min(ticks, key=lambda tick: abs(tick.time_s - at)), scenes.at(at))
@@ -52,9 +53,9 @@ def moments_of(recording: Path, name: str) -> list[Moment]:
     ]
 
 
-@pytest.mark.parametrize("name", FLIGHTS)
-def test_vehicles_are_drawn_where_they_are_and_in_view(moments: Moments, name: str) -> None:
-    for tick, scene in moments[name]:
+@of(*FLIGHTS)
+def test_vehicles_are_drawn_where_they_are_and_in_view(moments: Moments) -> None:
+    for tick, scene in moments:
         shown = scene.rows(layout.VEHICLES, CENTRES)
         np.testing.assert_allclose(shown, tick.position, atol=0.06)
         centre, radius_m = scene.view()
@@ -62,9 +63,9 @@ def test_vehicles_are_drawn_where_they_are_and_in_view(moments: Moments, name: s
         assert radius_m <= 1.5 * max(np.ptp(tick.position, axis=0).max(), 3.0), "it is no dot"
 
 
-@pytest.mark.parametrize("name", FLIGHTS)
-def test_nothing_is_drawn_away_from_the_team(moments: Moments, name: str) -> None:
-    for tick, scene in moments[name]:
+@of(*FLIGHTS)
+def test_nothing_is_drawn_away_from_the_team(moments: Moments) -> None:
+    for tick, scene in moments:
         centre, radius_m = scene.view()
         # At the start of a large fleet, the last slots of long queues are far away.
         reach_m = max(radius_m, np.nanmax(np.linalg.norm(tick.target - centre, axis=1), initial=0))
@@ -75,9 +76,9 @@ def test_nothing_is_drawn_away_from_the_team(moments: Moments, name: str) -> Non
             assert away <= 1.6 * reach_m, (entity, tick.time_s)
 
 
-@pytest.mark.parametrize("name", FORMING)
-def test_slots_stand_where_agents_fly_to(moments: Moments, name: str) -> None:
-    for tick, scene in moments[name]:
+@of(*FORMING)
+def test_slots_stand_where_agents_fly_to(moments: Moments) -> None:
+    for tick, scene in moments:
         slots = np.concatenate(
             [
                 scene.points(f"{formation}/{layout.SLOTS_PART}")
@@ -92,15 +93,16 @@ def test_slots_stand_where_agents_fly_to(moments: Moments, name: str) -> None:
         assert nearest.max() <= NEAR_M, tick.time_s
 
 
+@of("flocking-9")
 def test_a_controller_that_forms_nothing_shows_no_formation(moments: Moments) -> None:
-    for _, scene in moments["flocking-9"]:
+    for _, scene in moments:
         shown = [entity for entity in scene.entities() if entity.startswith(layout.FORMATION)]
         assert not shown
 
 
-@pytest.mark.parametrize("name", FLIGHTS)
-def test_lines_join_vehicles(moments: Moments, name: str) -> None:
-    for tick, scene in moments[name]:
+@of(*FLIGHTS)
+def test_lines_join_vehicles(moments: Moments) -> None:
+    for tick, scene in moments:
         for entity in (layout.LINKS, layout.LINKS_LOST, layout.LINKS_CUT, layout.HIERARCHY):
             ends = [end for strip in scene.values(entity, STRIPS) for end in strip]
             apart = np.array(ends).reshape(-1, 1, 3) - tick.position[None]
@@ -109,9 +111,9 @@ def test_lines_join_vehicles(moments: Moments, name: str) -> None:
             assert (nearest <= 1.0).all(), (entity, tick.time_s)
 
 
-@pytest.mark.parametrize("name", FORMING)
-def test_colours_are_those_that_the_panel_names(moments: Moments, name: str) -> None:
-    for tick, scene in moments[name]:
+@of(*FORMING)
+def test_colours_are_those_that_the_panel_names(moments: Moments) -> None:
+    for tick, scene in moments:
         panels = [scene.text(layout.panel_entity(question)) for question in QUESTIONS]
         assert len({panel.rsplit("**Now", 1)[1] for panel in panels}) == 1
         colours = colours_of_queues(panels[0])
@@ -125,22 +127,24 @@ def test_colours_are_those_that_the_panel_names(moments: Moments, name: str) -> 
             assert {shown[agent], trails[agent]} <= allowed, (agent, tick.time_s)
 
 
+@of("flocking-9")
 def test_agents_without_a_formation_have_colours_of_their_own(moments: Moments) -> None:
-    seen = [scene.values(layout.VEHICLES, BOX_COLOURS) for _, scene in moments["flocking-9"]]
+    seen = [scene.values(layout.VEHICLES, BOX_COLOURS) for _, scene in moments]
     assert len(set(seen[0])) == len(seen[0])
     assert seen[0] == seen[1] == seen[2]
-    for _, scene in moments["flocking-9"]:
+    for _, scene in moments:
         assert "each agent has a colour of its own" in scene.text(layout.panel_entity(MOTION))
 
 
+@of("partition-9")
 def test_a_partition_and_a_jam_are_shown_while_they_are_in_force(moments: Moments) -> None:
-    before, during, after = (scene for _, scene in moments["partition-9"])
+    before, during, after = (scene for _, scene in moments)
     for scene in (before, after):
         assert not len(scene.points(layout.JAMS))
     assert not len(before.points(layout.SIDES))
     np.testing.assert_allclose(during.points(layout.JAMS), [[-1.5, 1.5, 0.0]], atol=1e-6)
     assert during.values(layout.JAMS, "Ellipsoids3D:half_sizes") == [[pytest.approx(1.6)] * 3]
-    tick = moments["partition-9"][1].tick
+    tick = moments[1].tick
     discs = during.rows(layout.SIDES, "Ellipsoids3D:centers")
     np.testing.assert_allclose(discs, tick.position, atol=0.06)
     sides = during.values(layout.SIDES, "Ellipsoids3D:colors")
@@ -150,9 +154,9 @@ def test_a_partition_and_a_jam_are_shown_while_they_are_in_force(moments: Moment
     assert len(set(sides)) == 2
 
 
-@pytest.mark.parametrize("name", [n for n in FLIGHTS if n != "wedge-100"])
-def test_labels_name_every_vehicle(moments: Moments, name: str) -> None:
-    for tick, scene in moments[name]:
+@of(*[name for name in FLIGHTS if name != "wedge-100"])
+def test_labels_name_every_vehicle(moments: Moments) -> None:
+    for tick, scene in moments:
         labels = scene.values(layout.VEHICLES, "Boxes3D:labels")
         assert [re.match(r"a\d+", label)[0] for label in labels] == [  # type: ignore[index]
             layout.agent_name(agent) for agent in range(len(tick.alive))
