@@ -8,6 +8,9 @@ source "$here/setup.sh"
 
 # The source is checked, not what may have been compiled of it: tests replace parts of it.
 export QSWARM_PURE=1
+# Hundreds of processes start here. Without bytecode on disk each would first compile the code, and
+# each worker of pytest all tests, which takes longer than most of them.
+unset PYTHONDONTWRITEBYTECODE
 failed=0
 
 # check NAME COMMAND: print one line with the result, and the output only of a failed check.
@@ -43,6 +46,11 @@ end_begun() {
 
 set_up dev
 cd "$root"
+# One core compiles while the other checks, and then while processes, which mostly wait, are tested.
+if [ $# -eq 0 ]; then
+    # Both use mypy: the compiler keeps off the other's cache.
+    begin compiled env MYPY_CACHE_DIR=/dev/null "$venv/bin/python" -m tests.same_compiled
+fi
 check format "$venv/bin/ruff" format --check .
 check lint "$venv/bin/ruff" check .
 check types "$venv/bin/mypy"
@@ -51,19 +59,19 @@ printf '%-16s ...\n' tests
 if [ $# -gt 0 ]; then
     "$venv/bin/pytest" "$@" || failed=1
 else
-    # Processes mostly wait, so two such tests share the host with the compiler.
-    processes=(tests/processes tests/tutorial)
-    begin compiled "$venv/bin/python" -m tests.same_compiled
-    "$venv/bin/pytest" "${processes[@]}" -m "processes and not real_time" --numprocesses 2 \
+    # The tutorial is the longest of them: begun first, it is not waited for at the end.
+    processes=(tests/tutorial tests/processes)
+    "$venv/bin/pytest" "${processes[@]}" -m "processes and not real_time" --numprocesses 3 \
         || failed=1
     end_begun
     # A late host fails fleets on the wall clock, so only compiled ones share it.
     at_once=0
-    if [ -f build/compiled/manifest.json ]; then at_once=2; fi
+    if [ -f build/compiled/manifest.json ]; then at_once=3; fi
     QSWARM_PURE=0 "$venv/bin/pytest" "${processes[@]}" -m "processes and real_time" \
         --numprocesses "$at_once" || failed=1
-    # Virtual tests share the cores, one file per worker. Flights run compiled if the compiler ran.
-    virtual=(--numprocesses auto --dist loadfile)
+    # Virtual tests share the cores: half of the files for each, and at the end single tests of who
+    # has more left. Flights run compiled if the compiler ran.
+    virtual=(--numprocesses auto --dist worksteal)
     "$venv/bin/pytest" -m "not processes and not flight" "${virtual[@]}" || failed=1
     QSWARM_PURE=0 "$venv/bin/pytest" -m "not processes and flight" "${virtual[@]}" || failed=1
 fi
