@@ -218,6 +218,10 @@ class Links:
         self._seed = seed
         self._states: dict[tuple[int, int, int], LinkState] = {}
 
+    def redraw(self, seed: bytes) -> None:
+        """Draw every later frame's numbers from another seed (32 bytes); states stay."""
+        self._seed = seed
+
     def plain(self, link: LinkModel, sending: Sending, in_range: InRange) -> list[Verdict]:
         """Decide a frame for all receivers in range, whose links are alike and plain; in order."""
         law = PlainLaw(link)

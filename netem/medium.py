@@ -91,6 +91,13 @@ class Medium:
         if resumes.counters is not None:
             self._count_on(resumes.counters)
 
+    def redraw(self, seed: int) -> None:
+        """Draw the fate of every later frame from another seed; link state and frames stay."""
+        self._seed = sha256(b"qswarm medium %d" % seed).digest()
+        self._links.redraw(self._seed)
+        for saboteur in self._saboteurs.values():
+            saboteur.redraw(self._seed)
+
     def place(self, positions: tuple[Position | None, ...]) -> None:
         """Set the positions, row i = agent i [m; world frame]; None where there is no radio."""
         self._range_index.place(positions)

@@ -58,6 +58,10 @@ class Saboteur:
         self._to_repeat: deque[tuple[float, Forged]] = deque(maxlen=MOST_KEPT)
         """When each frame is due again [s], in this order."""
 
+    def redraw(self, seed: bytes) -> None:
+        """Draw what it sends from now on from another seed (32 bytes)."""
+        self._seed = seed
+
     def overhear(self, source: int, sent_s: float, transmission: Transmission) -> None:
         """Take what an agent sends itself at a time [s]."""
         if source in self._incarnations:

@@ -9,13 +9,13 @@ import pytest
 
 from agent.messages import Place
 from agent.qstructure.formation import Formation, FormationSpec, Layout, Slot, formation_of
-from tests.random_flights.draws import Draw
-from tests.random_flights.formations import FALLBACK, drawn, fits, library
 from tests.recording.flights import straight_flight, wedge
 from worldsim.judge.expected_places import MATCH_M, ExpectedPlaces
 from worldsim.judge.verdict import Judge
 from worldsim.scenario.file import formation_tables
 from worldsim.scenario.library import find_formation
+from worldsim.search.draws import Draw
+from worldsim.search.formations import FALLBACK, drawn, fits, library
 
 SPACING_M = 1.0
 NOTHING: frozenset[Place] = frozenset()

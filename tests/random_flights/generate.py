@@ -4,7 +4,6 @@
 left out, and it judges the rest; a draft that does not get through so is drawn anew.
 """
 
-import re
 import tempfile
 from collections import Counter
 from contextlib import redirect_stderr, redirect_stdout
@@ -13,8 +12,10 @@ from pathlib import Path
 from time import process_time
 from typing import NamedTuple
 
-from tests.random_flights.draws import Draw, Tables
-from tests.random_flights.fleets import (
+from worldsim.commands.app import command
+from worldsim.search.drafts import accepted
+from worldsim.search.draws import Draw, Tables
+from worldsim.search.fleets import (
     agents_that_differ,
     carried,
     comms,
@@ -23,23 +24,16 @@ from tests.random_flights.fleets import (
     sensor,
     vehicle,
 )
-from tests.random_flights.formations import formation
-from tests.random_flights.radios import conditions
-from tests.random_flights.surroundings import field, frame, obstacles
-from tests.random_flights.timelines import Timeline, repeated_and_ended
-from worldsim.commands.app import command
-from worldsim.scenario.file import as_toml
+from worldsim.search.formations import formation
+from worldsim.search.radios import conditions
+from worldsim.search.surroundings import field, frame, obstacles
+from worldsim.search.timelines import Timeline, repeated_and_ended
 
 STEPS = 5_000
 """Steps of all agents together in a flight: so many take one or two seconds."""
 MAX_AGENTS = 24
 LONGEST_S = 60.0
 DRAFTS = 200
-REPAIRS = 12
-NAMED = re.compile(r"^.*?\.toml: (?P<key>[\w.\[\]]+): ", re.DOTALL)
-PART = re.compile(r"(\w+)(?:\[(\d+)\])?")
-NEEDED = ("fleet", "fleet.agents", "formation", "control", "vehicle", "duration_s")
-"""Tables and keys that no repair leaves out."""
 
 
 class Generated(NamedTuple):
@@ -63,7 +57,7 @@ def scenario(base: int, number: int, steps: int = STEPS) -> Generated:
     for attempt in range(DRAFTS):
         tables = draft(Draw(base, number, attempt), steps)
         tables["name"] = f"random-{base}-{number}"
-        text = accepted(tables, objections)
+        text = accepted(tables, objections, objection)
         if text is not None:
             begun = process_time()
             assert objection(text) == "", "check says now one thing, now another"
@@ -155,21 +149,6 @@ def expectations(draw: Draw, made: Tables) -> Tables:
     return table
 
 
-def accepted(tables: Tables, objections: Counter[str]) -> str | None:
-    """Return the text that ``check`` accepts without a word; None where repairs do not help."""
-    for _ in range(REPAIRS):
-        text = as_toml(tables)
-        said = objection(text)
-        if not said:
-            return text
-        named = NAMED.match(said)
-        key = named["key"] if named else "another key"
-        objections[re.sub(r"\[\d+\]", "", key)] += 1
-        if not without(tables, key):
-            return None
-    return None
-
-
 def objection(text: str) -> str:
     """Return the errors and warnings of ``qswarm check`` about a scenario; empty: it accepts."""
     with tempfile.TemporaryDirectory() as folder:
@@ -179,20 +158,3 @@ def objection(text: str) -> str:
         with redirect_stderr(said), redirect_stdout(StringIO()):
             status = command(["check", str(file)])
     return said.getvalue() or ("refused without a word" if status else "")
-
-
-def without(tables: Tables, key: str) -> bool:
-    """Leave out a key, a table, or the item of a list; return whether there was one to spare."""
-    outer: Tables = tables
-    inner, last = tables, ""
-    for name, index in PART.findall(key):
-        if not isinstance(inner, dict) or name not in inner:
-            return False
-        if index:
-            del inner[name][int(index)]
-            return True
-        outer, inner, last = inner, inner[name], name
-    if not last or (outer is tables and last in NEEDED) or key in NEEDED:
-        return False
-    del outer[last]
-    return True

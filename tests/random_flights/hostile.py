@@ -19,8 +19,10 @@ from tests.random_flights.__main__ import arguments
 from tests.random_flights.campaign import ROUNDING_M, Campaign, report
 from tests.random_flights.controllers import KINDS as HOSTILES
 from tests.random_flights.controllers import Mixed
-from tests.random_flights.draws import Draw, Tables
-from tests.random_flights.fleets import (
+from tests.random_flights.generate import DRAFTS, Generated, centre, duration, objection
+from worldsim.search.drafts import accepted
+from worldsim.search.draws import Draw, Tables
+from worldsim.search.fleets import (
     COMMAND_TICKS,
     KINDS,
     MAX_STEP_M,
@@ -28,10 +30,9 @@ from tests.random_flights.fleets import (
     fleet,
     sensor,
 )
-from tests.random_flights.formations import FALLBACK
-from tests.random_flights.generate import DRAFTS, Generated, accepted, centre, duration
-from tests.random_flights.radios import conditions, flap, partition
-from tests.random_flights.surroundings import obstacles
+from worldsim.search.formations import FALLBACK
+from worldsim.search.radios import conditions, flap, partition
+from worldsim.search.surroundings import obstacles
 
 STEPS = 4_000
 STRIDE = 37
@@ -76,7 +77,7 @@ def scenario(
     for attempt in range(DRAFTS):
         tables = draft(Draw("hostile", base, number, attempt), case, steps)
         tables["name"] = f"hostile-{base}-{number}"
-        text = accepted(tables, objections)
+        text = accepted(tables, objections, objection)
         if text is not None:
             return Generated(text, attempt + 1, objections)
     raise LookupError(f"no draft of {base}/{number} gets through: {objections.most_common(5)}")

@@ -16,9 +16,9 @@ from typing import Any
 
 from tests.random_flights.campaign import failure
 from tests.random_flights.children import answers
-from tests.random_flights.draws import Tables
 from tests.random_flights.generate import objection
 from worldsim.scenario.file import as_toml
+from worldsim.search.draws import Tables
 
 LISTS = ("event", "obstacle", "agent")
 TABLES = ("netem", "vehicle", "control", "comms", "sensor", "fleet", "frame", "expect")

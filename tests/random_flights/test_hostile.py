@@ -13,9 +13,9 @@ from agent.guidance.safety_monitor import SafetyMonitor
 from tests.random_flights import hostile
 from tests.random_flights.campaign import Campaign, report
 from tests.random_flights.controllers import KINDS as HOSTILES
-from tests.random_flights.fleets import KINDS, SENSORS
 from tests.random_flights.hostile import CASES, CONTROLLERS, case_of
 from worldsim.scenario.file import parse
+from worldsim.search.fleets import KINDS, SENSORS
 
 BASE = 5
 SHORT = 300

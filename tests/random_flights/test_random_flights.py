@@ -14,12 +14,13 @@ import pytest
 from tests.random_flights import __main__ as the_command
 from tests.random_flights.campaign import Campaign, report
 from tests.random_flights.children import answers
-from tests.random_flights.draws import Draw
-from tests.random_flights.generate import Generated, draft, objection, scenario, without
+from tests.random_flights.generate import Generated, draft, objection, scenario
 from tests.small_scenario import SMALL
 from worldsim.scenario.file import parse
 from worldsim.scenario.schema import schema
 from worldsim.scenario.template import OF_OWN_CONTROLLERS
+from worldsim.search.drafts import without
+from worldsim.search.draws import Draw
 
 BASE = 11
 SHORT = 300

@@ -3,10 +3,10 @@
 import tomllib
 from typing import Any
 
-from tests.random_flights.draws import Tables
 from tests.random_flights.generate import objection, scenario
 from tests.random_flights.shrink import flies, shrunk
 from worldsim.scenario.file import as_toml
+from worldsim.search.draws import Tables
 
 TOO_NEAR = """
 duration_s = 30.0

@@ -12,7 +12,7 @@ import sys
 import traceback
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from agent.checked_controller import described
 from agent.controller import FailedProgramError, FaultyControllerError
@@ -20,7 +20,7 @@ from netem.wire.shutdown import StopRequest
 from worldsim.campaign.pulse import ClosedFilesError, Guard, Pulse, blame
 from worldsim.engine.step import SlotLoop
 from worldsim.engine.trace import TraceLog
-from worldsim.engine.virtual import Flight, fly
+from worldsim.engine.virtual import Flight, Probe, fly
 from worldsim.fleet.fork import adopt_orphans, end_orphans
 from worldsim.results.run_folder import RunDirectory, RunWriteError
 from worldsim.results.sinks import Sinks, open_sinks
@@ -36,11 +36,19 @@ FLOWN, FAILED, NOT_WRITTEN = 0, 1, 3
 """Exit statuses of a flight: a summary is there; an error ended it; no summary can be written."""
 
 
+class FlightProbe(Probe, Protocol):
+    """Looks into a flight, and writes what it saw."""
+
+    def write(self, folder: Path) -> None:
+        """Write into the folder of a flight that has ended by itself."""
+
+
 class Kept(NamedTuple):
     """What a flight writes beside its events and its summary."""
 
     recording: bool
     trace: bool = False  # as a file, to be compared slot by slot
+    probe: FlightProbe | None = None  # looks into the flight, in its process; not with a recording
 
 
 def fly_in_child(scenario: Scenario, directory: RunDirectory, kept: Kept, pulse: Pulse) -> int:
@@ -90,6 +98,7 @@ def _fly(scenario: Scenario, directory: RunDirectory, kept: Kept, pulse: Pulse) 
             should_stop=lambda: stop.requested or pulse.stop_requested,
             watch=Guard(pulse, scenario),
             log=log,
+            probe=kept.probe,
         )
     except ClosedFilesError:
         raise
@@ -100,6 +109,8 @@ def _fly(scenario: Scenario, directory: RunDirectory, kept: Kept, pulse: Pulse) 
     flight.loop.note_writes()
     if log is not None:
         write_trace(log, directory.path)
+    if kept.probe is not None:
+        kept.probe.write(directory.path)
     directory.write_summary(summarise(scenario, finished(flight, scenario)))
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from worldsim.campaign import fresh_flight
-from worldsim.campaign.flight import FLOWN, NOT_WRITTEN, Kept, fly_in_child
+from worldsim.campaign.flight import FLOWN, NOT_WRITTEN, FlightProbe, Kept, fly_in_child
 from worldsim.campaign.printed import PrintedOutput
 from worldsim.campaign.pulse import Place, Pulse, blame
 from worldsim.fleet.fork import ProcessExit, fork, reap
@@ -42,6 +42,8 @@ class Job(NamedTuple):
     folder: Path | None  # a new folder; None: one named after the scenario and the time
     recording: bool
     trace: bool = False  # whether the trace is kept as a file
+    probe: FlightProbe | None = None
+    """Looks into the flight, in its process; without a recording."""
 
 
 class WatchedFlight:
@@ -52,9 +54,8 @@ class WatchedFlight:
         self._directory = RunDirectory.create(job.folder, job.scenario)
         self._pulse = Pulse()
         self.output = PrintedOutput(self._directory.path.name)
-        self.pid = fork(
-            self.output.write_end, signal.SIGKILL, lambda: self._fly(Kept(job.recording, job.trace))
-        )
+        kept = Kept(job.recording, job.trace, job.probe)
+        self.pid = fork(self.output.write_end, signal.SIGKILL, lambda: self._fly(kept))
         self.output.release()
         self.exit_descriptor = os.pidfd_open(self.pid)
         self._exit: ProcessExit | None = None

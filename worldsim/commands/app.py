@@ -23,6 +23,7 @@ from worldsim.commands import (
     results,
     run,
     scenario,
+    search,
     sweep,
 )
 from worldsim.commands.options import complain, examples
@@ -57,7 +58,19 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for group in (run, sweep, scenario, inspect, replay, results, netem, operate, bench, doctor):
+for group in (
+    run,
+    sweep,
+    search,
+    scenario,
+    inspect,
+    replay,
+    results,
+    netem,
+    operate,
+    bench,
+    doctor,
+):
     app.add_typer(group.commands)
 
 

@@ -133,6 +133,14 @@ class VirtualFleet:
         """The medium's counters."""
         return self._medium.counters(self.loop.world.slot)
 
+    def redraw(self, seed: int) -> None:
+        """Draw from the present slot on from another seed: the radio, and the sensors' noise.
+
+        Starts and the agents that a selector draws stay those of the scenario.
+        """
+        self._medium.redraw(seed)
+        self.loop.world.redraw(seed)
+
     def slot(self) -> None:
         """Run one slot: operations before it, positions, steps, batches of the next, motion.
 
@@ -229,6 +237,13 @@ class VirtualFleet:
                 self._inboxes[agent].append(frames)
 
 
+class Probe(Protocol):
+    """Looks into a fleet that flies."""
+
+    def before_slot(self, fleet: VirtualFleet) -> None:
+        """See the fleet before its next slot."""
+
+
 def _check_codec(sent: _Message, arrived: _Message) -> None:
     """Raise ValueError if a message does not come out of the codec as it went in."""
     if arrived != sent:
@@ -241,15 +256,19 @@ def fly(
     should_stop: Callable[[], bool] = lambda: False,
     watch: StepWatch | None = None,
     log: TraceLog | None = None,
+    probe: Probe | None = None,
 ) -> Flight:
     """Fly a scenario in virtual time to its end, or until ``should_stop`` returns True.
 
-    log: gets checksums of what goes into the trace.
+    log: gets checksums of what goes into the trace. probe: sees the fleet before each slot, and may
+    change what is drawn from there on.
     """
     fleet = VirtualFleet(scenario, recorder, watch)
     fleet.loop.trace.log = log
     wall, cpu = perf_counter(), process_time()
     while fleet.loop.world.slot < scenario.slots and not should_stop() and not fleet.ended_by:
+        if probe is not None:
+            probe.before_slot(fleet)
         fleet.slot()
     fleet.loop.finish()
     return Flight(

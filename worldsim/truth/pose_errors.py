@@ -44,6 +44,10 @@ class PoseErrors:
         self.struck: dict[int, int] = {}
         """How many poses each fault made wrong, by its number."""
 
+    def redraw(self, seed: int) -> None:
+        """Draw later noise from another seed; faults in force stay."""
+        self._seed = seed
+
     def __bool__(self) -> bool:
         return bool(self._errors)
 

@@ -33,6 +33,10 @@ class ScanningSensor:
         self._radius = radius
         self._obstacles = obstacles
 
+    def redraw(self, seed: int) -> None:
+        """Draw the noise and the dropouts of every later scan from another seed."""
+        self._seed = seed
+
     def due(self, tick: int) -> bool:
         """Return whether the sensor scans at a tick."""
         return tick % self._pattern.every == 0
@@ -109,6 +113,11 @@ class ScanningSensors:
         """Each kind of sensor, and the agents that carry it."""
         self.any = any(carriers for _, carriers in self._carriers)
         """Whether any agent carries a scanning sensor."""
+
+    def redraw(self, seed: int) -> None:
+        """Draw the noise and the dropouts of every later scan from another seed."""
+        for sensor, _ in self._carriers:
+            sensor.redraw(seed)
 
     def read(
         self,

@@ -33,6 +33,10 @@ class SensorFaults:
         self._stuck_readings: dict[int, ProximityReading] = {}
         self._stuck_scans: dict[tuple[int, str], Scan] = {}
 
+    def redraw(self, seed: int) -> None:
+        """Draw later wrong readings from another seed; faults in force stay."""
+        self._seed = seed
+
     def __bool__(self) -> bool:
         return bool(self._acting)
 

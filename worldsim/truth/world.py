@@ -93,6 +93,13 @@ class World:
         """How many readings each fault of what agents read has changed, by its number."""
         return self.sensor_faults.struck | self.clocks.struck | self.pose_errors.struck
 
+    def redraw(self, seed: int) -> None:
+        """Draw the noise of every later reading from another seed."""
+        self._proximity.seed = seed
+        self._scanning.redraw(seed)
+        self.sensor_faults.redraw(seed)
+        self.pose_errors.redraw(seed)
+
     def positions(self) -> tuple[Vector | None, ...]:
         """Return true positions, row i = agent i [m; world frame], None where there is none."""
         found = self._positions

@@ -6,8 +6,8 @@ import msgspec
 
 from agent.qstructure.formation import Formation, FormationError, FormationSpec
 from agent.qstructure.shape import ShapeError, ShapeSpec, shape_of
-from tests.random_flights.draws import Draw, Tables
 from worldsim.scenario.library import FORMATIONS
+from worldsim.search.draws import Draw, Tables
 
 TRIES = 30
 FALLBACK: Tables = {
@@ -42,10 +42,12 @@ def formation(draw: Draw, agents: int, spacing: float, least: float) -> Tables:
 
 
 def library() -> list[str]:
+    """Return the names of the formations of the library."""
     return sorted(file.stem for file in FORMATIONS.glob("*.toml"))
 
 
 def fits(tables: Tables, agents: int, spacing: float, least: float) -> bool:
+    """Return whether a team of ``agents`` can form a formation without slots too near."""
     if len(tables["vertices"]) > agents:
         return False
     try:
@@ -76,6 +78,7 @@ def drawn(draw: Draw, agents: int, spacing: float) -> Tables:
 
 
 def shape(draw: Draw) -> Tables:
+    """Return a queue's shape of any kind."""
     match draw.among(("ray", "ray", "polyline", "arc", "helix", "spline", "curve")):
         case "ray":
             turn = draw.number(-pi, pi)
@@ -95,6 +98,7 @@ def shape(draw: Draw) -> Tables:
 
 
 def arc(draw: Draw) -> Tables:
+    """Return an arc or a circle."""
     sweep = draw.among((360.0, draw.number(-300, -20, 0), draw.number(20, 300, 0)))
     heading = draw.number(-180, 180, 0)
     return {
@@ -121,7 +125,7 @@ def corners(draw: Draw) -> list[list[float]]:
 def close(draw: Draw, queue: Tables, vertices: Tables, spacing: float) -> None:
     """End a queue at one or two more vertices, which lie on its shape."""
     try:
-        curve = shape_of(msgspec.convert(queue["shape"], ShapeSpec))  # type: ignore[arg-type]
+        curve = shape_of(msgspec.convert(queue["shape"], ShapeSpec))
     except ShapeError:
         return
     x, y, z = vertices[queue["vertices"][0]]
@@ -148,6 +152,7 @@ def share(draw: Draw, queues: list[Tables]) -> None:
 
 
 def orientation(draw: Draw) -> Tables:
+    """Return the attitude that a queue's slots ask for."""
     keys = draw.some(ANGLES, draw.whole(1, 3))
     choices = (draw.number(-90, 90, 0), "10*d", "20*sin(d)", "45*tanh(d) - 10")
     return {key: draw.among(choices) for key in keys}

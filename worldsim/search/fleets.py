@@ -3,14 +3,14 @@
 from math import ceil
 
 from agent.guidance.potential import TARGET_FLOOR_M
-from tests.random_flights.draws import Draw, Tables
+from worldsim.search.draws import Draw, Tables
 
 TICK_HZ = (10.0, 12.5, 20.0, 20.0, 20.0, 25.0, 30.0, 40.0, 50.0)
 COMMAND_TICKS = 2
 MAX_STEP_M = 0.1
 """No vehicle moves farther while a command is valid, or ``check`` warns."""
 KINDS = ("kinematic", "accelerating", "forward")
-SENSORS = (
+SENSORS: tuple[list[str], ...] = (
     ["proximity"],
     [],
     ["laser"],
@@ -23,6 +23,7 @@ SENSORS = (
 
 
 def control(draw: Draw) -> Tables:
+    """Return the control table of a scenario."""
     separation = draw.among((0.25, 0.25, draw.number(0.12, 0.6)))
     least = separation + TARGET_FLOOR_M
     table: Tables = {
@@ -44,6 +45,7 @@ def control(draw: Draw) -> Tables:
 
 
 def fleet(draw: Draw, agents: int, separation: float) -> Tables:
+    """Return the fleet table: number, start and rates."""
     table: Tables = {"agents": agents, "start": start(draw, agents, separation)}
     table["tick_hz"] = draw.among(TICK_HZ)
     if draw.chance(0.3):
@@ -81,6 +83,7 @@ def lattice(draw: Draw, agents: int, pitch: float, centre: list[float]) -> list[
 
 
 def vehicle(draw: Draw, tick_hz: float) -> Tables:
+    """Return the vehicle table of a fleet."""
     fastest = MAX_STEP_M * tick_hz / COMMAND_TICKS
     table: Tables = {"kind": draw.among(KINDS), "sensors": sensors(draw)}
     table["max_speed_mps"] = draw.among((min(0.5, fastest), draw.number(0.2, fastest)))
@@ -101,6 +104,7 @@ def vehicle(draw: Draw, tick_hz: float) -> Tables:
 
 
 def sensors(draw: Draw) -> list[str]:
+    """Return the sensors that a vehicle carries."""
     return list(SENSORS[0] if draw.chance(0.45) else draw.among(SENSORS))
 
 
@@ -135,6 +139,7 @@ def carried(vehicle: Tables, differing: list[Tables]) -> set[str]:
 
 
 def laser(draw: Draw) -> Tables:
+    """Return the properties of a laser scanner."""
     table: Tables = {"range_m": draw.number(1.0, 8.0), "field_deg": draw.among((90, 180, 270, 350))}
     table["rays"] = draw.whole(21, 121)
     if draw.chance(0.7):
@@ -143,6 +148,7 @@ def laser(draw: Draw) -> Tables:
 
 
 def sonar(draw: Draw) -> Tables:
+    """Return the properties of a sonar."""
     table: Tables = {"range_m": draw.number(0.8, 4.0), "ring": draw.whole(4, 24)}
     if draw.chance(0.5):
         table |= {"beam_deg": draw.number(10.0, 90.0, 0), "up_down": draw.chance(0.6)}
@@ -150,6 +156,7 @@ def sonar(draw: Draw) -> Tables:
 
 
 def scanner(draw: Draw) -> Tables:
+    """Return the properties that laser and sonar share."""
     table: Tables = {}
     for key, low, high in (("rate_hz", 2, 20), ("noise_m", 0, 0.05), ("dropout_percent", 0, 20)):
         if draw.chance(0.3):
@@ -158,6 +165,7 @@ def scanner(draw: Draw) -> Tables:
 
 
 def comms(draw: Draw, tick_hz: float) -> Tables:
+    """Return the rates of both channels."""
     table: Tables = {"local_hz": draw.among((tick_hz, min(20.0, tick_hz), draw.number(2, tick_hz)))}
     if draw.chance(0.4):
         table["multihop_hz"] = draw.among((0.0, draw.number(0.2, tick_hz)))

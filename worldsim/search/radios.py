@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 
-from tests.random_flights.draws import Draw, Tables
+from worldsim.search.draws import Draw, Tables
 
 SHAPES = ("uniform", "normal", "pareto", "paretonormal")
 
 
 def conditions(draw: Draw, agents: int, spacing: float) -> Tables:
+    """Return the radio's conditions, with some channels and links of their own."""
     table = link(draw)
     if draw.chance(0.6):
         table["range_m"] = round(spacing + draw.scale(1.0, 12.0), 2)
@@ -20,6 +21,7 @@ def conditions(draw: Draw, agents: int, spacing: float) -> Tables:
 
 
 def links(draw: Draw, agents: int) -> list[Tables]:
+    """Return links with conditions of their own."""
     pairs = [(a, b) for a in range(agents) for b in range(agents) if a != b]
     chosen = draw.some(pairs, draw.whole(1, 4))
     return [{"from": a, "to": b, **link(draw)} for a, b in chosen]
@@ -45,6 +47,7 @@ def link(draw: Draw) -> Tables:
 
 
 def delay(draw: Draw) -> Tables:
+    """Return keys of delay, jitter and reordering."""
     table: Tables = {"delay_ms": draw.among((20.0, 200.0, draw.scale(0.1, 2000.0)))}
     if draw.chance(0.6):
         table["jitter_ms"] = draw.scale(0.1, 400.0)
@@ -56,6 +59,7 @@ def delay(draw: Draw) -> Tables:
 
 
 def queue(draw: Draw) -> Tables:
+    """Return a rate with its queue."""
     table: Tables = {"rate_kbit": draw.scale(1.0, 2000.0)}
     if draw.chance(0.5):
         table |= {"rate_overhead_b": draw.whole(0, 200), "limit": draw.whole(1, 200)}
@@ -63,6 +67,7 @@ def queue(draw: Draw) -> Tables:
 
 
 def bursts(draw: Draw) -> Tables:
+    """Return a Gilbert-Elliott model."""
     table: Tables = {"p_percent": draw.number(0.1, 30.0), "r_percent": draw.number(1.0, 100.0)}
     if draw.chance(0.3):
         table |= {"loss_bad_percent": draw.number(20, 100), "loss_good_percent": draw.number(0, 20)}
@@ -70,6 +75,7 @@ def bursts(draw: Draw) -> Tables:
 
 
 def path_loss(draw: Draw) -> Tables:
+    """Return a log-distance path loss with shadowing."""
     return {
         "exponent": draw.number(1.5, 5.0),
         "reference_distance_m": draw.among((1.0, draw.scale(0.1, 5.0))),
@@ -93,6 +99,7 @@ def fault(draw: Draw, agents: int, spacing: float) -> Tables:
 
 
 def partition(draw: Draw, agents: int) -> Tables | list[list[int]]:
+    """Return a partition of any kind."""
     mixed = draw.some(range(agents), agents)
     cuts = sorted(draw.some(range(1, agents), draw.whole(1, 3))) if agents > 1 else []
     groups = [mixed[a:b] for a, b in zip([0, *cuts], [*cuts, agents], strict=True)]
@@ -107,6 +114,7 @@ def partition(draw: Draw, agents: int) -> Tables | list[list[int]]:
 
 
 def flap(draw: Draw, agents: int) -> Tables:
+    """Return links that come and go."""
     table: Tables = {"period_s": draw.scale(0.05, 8.0)}
     pairs = [[a, b] for a in range(agents) for b in range(agents) if a != b]
     if pairs and draw.chance(0.5):
@@ -115,6 +123,7 @@ def flap(draw: Draw, agents: int) -> Tables:
 
 
 def sabotage(draw: Draw, agents: int) -> Tables:
+    """Return what somebody sends in the name of agents."""
     victims: list[int | str] = draw.some(range(agents), draw.whole(1, max(1, agents // 2)))
     table: Tables = {
         "kind": draw.among(("replay", "spoof", "garbage", "flood")),

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 
-from tests.random_flights.draws import Draw, Tables
-from tests.random_flights.fleets import lattice
-from tests.random_flights.formations import formation
-from tests.random_flights.radios import fault
-from tests.random_flights.surroundings import moving
+from worldsim.search.draws import Draw, Tables
+from worldsim.search.fleets import lattice
+from worldsim.search.formations import formation
+from worldsim.search.radios import fault
+from worldsim.search.surroundings import moving
 
 MODES = ("stuck", "silent", "wrong")
 ONCE = {"join", "formation", "frame", "heal", "restart", "resume"}
@@ -26,8 +26,14 @@ class Timeline:
         self._clock_is_behind = False
 
     def events(self) -> list[Tables]:
+        """Return the events of a whole timeline."""
         count = self._draw.among((0, 1, 2, 4, 8))
         return [self._event() for _ in range(count)]
+
+    def next_event(self, draw: Draw) -> Tables:
+        """Return one more event, from draws of its own."""
+        self._draw = draw
+        return self._event()
 
     def _event(self) -> Tables:
         draw = self._draw

@@ -2,7 +2,7 @@
 
 from math import cos, hypot, pi, sin
 
-from tests.random_flights.draws import Draw, Tables
+from worldsim.search.draws import Draw, Tables
 
 NEAR_M = 1.2
 FAR_M = 9.0
@@ -14,8 +14,8 @@ def obstacles(draw: Draw, slowest: float, about: list[float]) -> list[Tables]:
     """Return obstacles near a point [m; world frame]; a third of them moves."""
     found = []
     for _ in range(draw.among((0, 0, 1, 2, 4, 8))):
-        kind = draw.among((sphere, box, cylinder, wall))
-        if kind is wall:
+        kind = draw.among((sphere, box, cylinder, None))
+        if kind is None:
             found.append(wall(draw, about))
             continue
         table = kind(draw)
@@ -29,6 +29,7 @@ def obstacles(draw: Draw, slowest: float, about: list[float]) -> list[Tables]:
 
 
 def around(draw: Draw, about: list[float]) -> list[float]:
+    """Return a place around a point [m; world frame]."""
     away, turn = draw.scale(NEAR_M, FAR_M), draw.number(-pi, pi)
     x, y, z = about
     height = draw.number(-1.5, 1.5)
@@ -36,19 +37,23 @@ def around(draw: Draw, about: list[float]) -> list[float]:
 
 
 def sphere(draw: Draw) -> Tables:
+    """Return a sphere without its place."""
     return {"shape": "sphere", "radius_m": draw.scale(0.1, 1.5)}
 
 
 def box(draw: Draw) -> Tables:
+    """Return a box without its place."""
     size = [draw.scale(0.1, 3.0) for _ in range(3)]
     return {"shape": "box", "size_m": size, "yaw_deg": draw.number(-180, 180, 0)}
 
 
 def cylinder(draw: Draw) -> Tables:
+    """Return a cylinder without its place."""
     return {"shape": "cylinder", "radius_m": draw.scale(0.05, 1), "height_m": draw.scale(0.2, 8)}
 
 
 def wall(draw: Draw, about: list[float]) -> Tables:
+    """Return a wall near a point [m; world frame]."""
     one, two = around(draw, about), around(draw, about)
     foot = round(about[2] - 1.0, 2)
     return {
@@ -61,6 +66,7 @@ def wall(draw: Draw, about: list[float]) -> Tables:
 
 
 def path(draw: Draw, place: list[float], slowest: float) -> Tables:
+    """Return the way of an obstacle that moves from a place [m; world frame]."""
     shift = draw.point(5.0, 1.0)
     ends = [round(a + b, 2) for a, b in zip(place, shift, strict=True)]
     table: Tables = {"waypoints_m": [place, ends]}
@@ -98,6 +104,7 @@ def frame(draw: Draw, slowest: float, about: list[float]) -> Tables:
 
 
 def moving(draw: Draw, slowest: float, here: list[float]) -> Tables:
+    """Return waypoints that start at a place [m; world frame], with a speed."""
     points = [here]
     for _ in range(draw.whole(1, 4)):
         leg = draw.point(4.0, 1.0)

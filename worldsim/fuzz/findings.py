@@ -1,0 +1,189 @@
+"""Findings: a failing seed kept as a scenario, made smaller within a budget, and explained."""
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from shutil import copytree
+from typing import Any, Final
+
+from worldsim.fuzz.flights import Flown, Hangar, Task, violated_s
+from worldsim.fuzz.folder import (
+    FINDING,
+    ORIGINAL,
+    PAGE,
+    SCENARIO,
+    Row,
+    findings_in,
+    read_finding,
+)
+from worldsim.fuzz.pages import page
+from worldsim.fuzz.probe import MarginProbe
+from worldsim.results.provenance import provenance
+from worldsim.results.run_folder import write_json
+from worldsim.scenario.file import as_toml
+from worldsim.scenario.tables import CONVERGED_M
+from worldsim.scenario.toml import ScenarioError
+from worldsim.search.drafts import loaded, objection
+from worldsim.search.draws import Tables
+from worldsim.search.shrink import Shrinker, Size, tidy
+
+TIMED: Final = ("converge", "reform")
+"""Properties that are violated where a time runs out."""
+BUDGET: Final = 150
+"""Flights that shrink one finding at most."""
+EVENTS: Final = 8
+"""How many events before the trouble are kept."""
+OF_TIMELINE: Final = ("slot", "queue", "role")
+"""Kinds of events that are no fault, but what agents do."""
+Say = Callable[[str], None]
+
+
+def begin(folder: Path, text: str, row: Row) -> Row:
+    """Keep a failing seed as a finding that replays it; return what is known of it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in (ORIGINAL, SCENARIO):
+        (folder / name).write_text(text, encoding="utf-8")
+    size = Size.of(tomllib.loads(text))._asdict()
+    finding: Row = {
+        "name": folder.name,
+        "property": row["violated"][0],
+        "seed": row["seed"],
+        "how": row["how"],
+        "reason": row["reason"],
+        "original_size": size,
+        "size": size,
+        "shrunk": False,
+        "shrink_flights": 0,
+        "trouble_s": row["violated_s"],
+        "last_event": None,
+        "signature": signature(row["violated"][0], tomllib.loads(text)),
+        "version": provenance()["version"],
+        "commit": provenance()["commit"],
+    }
+    keep(folder, finding)
+    return finding
+
+
+def keep(folder: Path, finding: Row) -> None:
+    """Write a finding and its page."""
+    write_json(folder / FINDING, finding)
+    (folder / PAGE).write_text(page(finding), encoding="utf-8")
+
+
+def signature(name: str, tables: Tables) -> str:
+    """Return what findings have in common that are taken for the same: property and actions."""
+    spare = {"at_s", "for_s", "every_s", "name"}
+    kinds = {key for event in tables.get("event") or () for key in event.keys() - spare}
+    return " ".join([name, *sorted(kinds)])
+
+
+def shrink(folder: Path, hangar: Hangar, say: Say, budget: int = BUDGET) -> Row | None:
+    """Make a finding's scenario smaller, and explain it; None where a stop was requested.
+
+    A finding that cannot be replayed stays as it is.
+    """
+    finding, file = read_finding(folder), folder / SCENARIO
+    name, tables = finding["property"], tomllib.loads(file.read_text(encoding="utf-8"))
+    first = hangar.measure("first", loaded(as_toml(tables), file))
+    if first is None:
+        return None
+    first_s = violated_s(first, loaded(as_toml(tables), file), name)
+    flights = 0
+    if first_s is not None:
+        shrinker = Shrinker(tables, first_s, timed=name in TIMED)
+        while flights < budget and (batch := shrinker.batch(hangar.jobs)):
+            found = _violations(batch, file, name, hangar)
+            if hangar.stop.requested:
+                return None
+            flights += len(batch)
+            if shrinker.take(zip(batch, found, strict=True)):
+                file.write_text(as_toml(tidy(shrinker.smallest)), encoding="utf-8")
+            say(f"shrinking {folder.name}: {flights} of {budget} flights, {_size(shrinker)}")
+        tables = tidy(shrinker.smallest)
+    finding |= {"shrunk": True, "shrink_flights": flights, "size": Size.of(tables)._asdict()}
+    finding["signature"] = signature(name, tables)
+    last = hangar.measure("last", loaded(as_toml(tables), file))
+    if last is None:
+        return None
+    finding |= explanation(last, name, tables["duration_s"])
+    keep(folder, finding)
+    return finding
+
+
+def _size(shrinker: Shrinker) -> str:
+    size = Size.of(shrinker.smallest)
+    return f"{size.faults} faults, {size.agents} agents, {size.duration_s:g} s"
+
+
+def _violations(batch: list[Tables], file: Path, name: str, hangar: Hangar) -> list[float | None]:
+    """Return when each candidate violates a property; None where it does not or cannot fly."""
+    tasks = []
+    for number, tables in enumerate(batch):
+        text = as_toml(tidy(tables))
+        if not objection(text, file):
+            scenario = loaded(text, file)
+            tasks.append(Task(str(number), scenario, MarginProbe(scenario)))
+    found: list[float | None] = [None] * len(batch)
+    scenarios = {task.name: task.scenario for task in tasks}
+    for flown in hangar.fly(tasks):
+        found[int(flown.name)] = violated_s(flown, scenarios[flown.name], name)
+    return found
+
+
+def explanation(flown: Flown, name: str, duration_s: float) -> Row:
+    """Return what a finding's flight tells: its trouble, the events before it, the margins."""
+    measured = flown.measured or {}
+    trouble_s = trouble_of(measured, name, duration_s)
+    before = [each for each in flown.events if each["t_s"] <= trouble_s]
+    faults = [each for each in before if each["kind"] not in OF_TIMELINE]
+    return {
+        "reason": flown.reason,
+        "trouble_s": trouble_s,
+        "last_event": faults[-1] if faults else None,
+        "events": before[-EVENTS:],
+        "margins": {name: values for name, values in measured.items() if name != "first_s"},
+        "trace_sha256": flown.trace,
+    }
+
+
+def trouble_of(measured: Any, name: str, duration_s: float) -> float:
+    """Return the first tick of trouble [s]: of the violation, or of the way to it.
+
+    Of a time that runs out it is the tick from which on an agent was never in its slot again.
+    """
+    first_s = (measured.get("first_s") or {}).get(name)
+    if first_s is not None:
+        return float(first_s)
+    times, errors = measured.get("t_s") or [], measured.get("slot_error_m") or []
+    trouble_s = duration_s if name not in TIMED else 0.0
+    for t_s, error_m in zip(times, errors, strict=True):
+        if name in TIMED and error_m is not None and error_m <= CONVERGED_M:
+            trouble_s = t_s
+    return float(trouble_s)
+
+
+def refly(corpus: Path, hangar: Hangar, say: Say) -> dict[str, str]:
+    """Fly every finding of a corpus; return its state by name: known or fixed."""
+    states = {}
+    tasks, wanted = [], {}
+    for folder in findings_in(corpus):
+        finding, file = read_finding(folder), folder / SCENARIO
+        try:
+            scenario = loaded(file.read_text(encoding="utf-8"), file)
+        except (OSError, ScenarioError) as error:
+            say(f"{folder}: {error}")
+            continue
+        tasks.append(Task(folder.name, scenario))
+        wanted[folder.name] = finding["property"]
+    for flown in hangar.fly(tasks):
+        violated = flown.margins.get(wanted[flown.name], 1.0) < 0.0
+        states[flown.name] = "known" if violated else "fixed"
+        say(f"{len(states)} of {len(tasks)} findings of the corpus flown again")
+    return states
+
+
+def take_in(folder: Path, corpus: Path) -> None:
+    """Copy a new finding into a corpus."""
+    target = corpus / folder.name
+    if not target.exists():
+        copytree(folder, target)

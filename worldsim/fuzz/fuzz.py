@@ -1,0 +1,220 @@
+"""`qswarm fuzz`: seeds drawn, flown and kept in generations; then its findings made small.
+
+The seeds of a generation are drawn before any of them has flown, so that a result depends on the
+seed and the generations before it, and not on the number of jobs. Even seeds are drawn at random,
+odd ones so that margins fall (worldsim.search.guide).
+"""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from time import monotonic
+from typing import Any, Final, NamedTuple
+
+from netem.wire.shutdown import stop_requests
+from worldsim.fuzz.findings import begin, refly, shrink, take_in
+from worldsim.fuzz.flights import Flown, Hangar, Task
+from worldsim.fuzz.folder import TABLE, Row, SearchFolder, findings_in, read_finding
+from worldsim.fuzz.pages import closing, table
+from worldsim.results.exit_status import FAIL, INTERRUPTED, PASS
+from worldsim.results.progress_line import ProgressLine
+from worldsim.scenario.tables import Scenario
+from worldsim.search.drafts import loaded, objection
+from worldsim.search.guide import GENERATION, Guide
+from worldsim.search.margins import score, violated
+from worldsim.search.trials import Terms, Trial, trial
+
+WORD: Final = "fuzz"
+"""The first word of every seed of numbers."""
+
+
+class Search(NamedTuple):
+    """What is searched, and how."""
+
+    terms: Terms
+    seeds: range
+    folder: Path
+    jobs: int
+    guided: bool
+    """Whether odd seeds lower the margin."""
+    shrinks: int
+    """How many findings of each property are made small."""
+    corpus: Path | None
+    described: Mapping[str, Any]
+    """What search.json says: what must be the same to go on."""
+    beside: Path
+    """The file whose folder the paths of the scenarios are relative to."""
+    quiet: bool = False
+
+
+class Drawn(NamedTuple):
+    """A seed that was drawn."""
+
+    seed: int
+    how: str
+    trial: Trial
+    scenario: Scenario
+
+
+def fuzz(search: Search) -> int:
+    """Search for trouble; print findings and table; return the exit status.
+
+    Raises RunDirectoryError for the folder of another search, before anything is flown.
+    """
+    folder, line = SearchFolder(search.folder), ProgressLine(hidden=search.quiet)
+    folder.open(search.described)
+    with stop_requests() as stop:
+        hangar = Hangar(search.folder, search.jobs, stop)
+        states = refly(search.corpus, hangar, line.update) if search.corpus else {}
+        rows = _fly(search, folder, hangar, line)
+        _keep_findings(search, folder, hangar, line)
+    line.clear()
+    found = [read_finding(each) for each in findings_in(folder.path / "findings")]
+    if search.corpus is not None:
+        states |= _compared(found, folder, search.corpus)
+    text = table(rows.values())
+    (search.folder / TABLE).write_text(text + "\n", encoding="utf-8")
+    for told in _told(search, rows, found, states, text):
+        print(told)
+    if stop.requested:
+        return INTERRUPTED
+    failed = any(row["violated"] for row in rows.values()) or "known" in states.values()
+    return FAIL if failed else PASS
+
+
+def _fly(
+    search: Search, folder: SearchFolder, hangar: Hangar, line: ProgressLine
+) -> dict[int, Row]:
+    """Fly the seeds that have no row yet; return the rows of all seeds, in their order."""
+    rows, progress = folder.rows(), _Progress(search, line)
+    guide = Guide(search.seeds.start) if search.guided else None
+    for generation in _generations(search.seeds):
+        if hangar.stop.requested:
+            break
+        if guide is None and all(seed in rows for seed in generation):
+            continue
+        drawn = [_drawn(search, seed, guide) for seed in generation]
+        tasks = [Task(str(each.seed), each.scenario) for each in drawn if each.seed not in rows]
+        of_seed = {each.seed: each for each in drawn}
+        for flown in hangar.fly(tasks):
+            row = _row(of_seed[int(flown.name)], flown)
+            rows[row["seed"]] = row
+            folder.add(row)
+            if row["violated"]:
+                name = f"{row['violated'][0]}-{row['seed']}"
+                begin(folder.finding(name), of_seed[row["seed"]].trial.text, row)
+            progress.show(rows)
+        if guide is not None:
+            for each in drawn:
+                if each.seed in rows:
+                    guide.learn(each.trial.genes, rows[each.seed]["score"])
+    return {seed: rows[seed] for seed in search.seeds if seed in rows}
+
+
+def _generations(seeds: range) -> Iterator[range]:
+    for first in range(seeds.start, seeds.stop, GENERATION):
+        yield range(first, min(first + GENERATION, seeds.stop))
+
+
+def _drawn(search: Search, seed: int, guide: Guide | None) -> Drawn:
+    """Return the trial of a seed."""
+    guided = guide is not None and seed % 2 == 1
+
+    def check(text: str) -> str:
+        return objection(text, search.beside)
+
+    given: Any = guide.propose() if guide is not None and guided else {}
+    made = trial(f"{WORD}-{seed}", (WORD, seed), search.terms, check, given)
+    if guide is not None:
+        guide.withdraw(given)
+    how = "guided" if guided else "random"
+    return Drawn(seed, how, made, loaded(made.text, search.beside))
+
+
+def _row(drawn: Drawn, flown: Flown) -> Row:
+    """Return the line of a seed."""
+    scenario = drawn.scenario
+    return {
+        "seed": drawn.seed,
+        "how": drawn.how,
+        "violated": violated(flown.margins),
+        "score": score(flown.margins),
+        "margins": {name: round(value, 6) for name, value in flown.margins.items()},
+        "reason": flown.reason,
+        "violated_s": scenario.duration_s,
+        "agents": scenario.fleet.agents,
+        "duration_s": scenario.duration_s,
+        "events": len(scenario.event),
+        "trace_sha256": flown.trace,
+    }
+
+
+class _Progress:
+    """Tells how far a search is, and how long the rest takes."""
+
+    def __init__(self, search: Search, line: ProgressLine) -> None:
+        self._search, self._line = search, line
+        self._began_s, self._flown = monotonic(), 0
+
+    def show(self, rows: Mapping[int, Row]) -> None:
+        self._flown += 1
+        seeds = self._search.seeds
+        done = [rows[seed] for seed in seeds if seed in rows]
+        bad = sum(bool(row["violated"]) for row in done)
+        least = min(row["score"] for row in done)
+        each_s = (monotonic() - self._began_s) / self._flown
+        left_s = each_s * (len(seeds) - len(done))
+        self._line.update(
+            f"{len(done)} of {len(seeds)} seeds, {bad} with a violation, least score {least:.2f},"
+            f" {left_s / 60.0:.0f} min left"
+        )
+
+
+def _keep_findings(
+    search: Search, folder: SearchFolder, hangar: Hangar, line: ProgressLine
+) -> None:
+    """Make the first findings of each property small, those that are not yet."""
+    small: dict[str, int] = {}
+    folders = findings_in(folder.path / "findings")
+    for each in sorted(folders, key=lambda one: int(read_finding(one)["seed"])):
+        finding = read_finding(each)
+        name = finding["property"]
+        small[name] = small.get(name, 0) + 1
+        if small[name] > search.shrinks or finding["shrunk"]:
+            continue
+        if hangar.stop.requested:
+            return
+        shrink(each, hangar, line.update)
+
+
+def _compared(found: list[Row], folder: SearchFolder, corpus: Path) -> dict[str, str]:
+    """Return which findings are new; those are taken into the corpus."""
+    states: dict[str, str] = {}
+    seen = {read_finding(each)["signature"] for each in findings_in(corpus)}
+    for finding in found:
+        name = finding["name"]
+        if not finding["shrunk"]:
+            continue
+        states[name] = "known" if finding["signature"] in seen else "new"
+        if states[name] == "new":
+            seen.add(finding["signature"])
+            take_in(folder.finding(name), corpus)
+    return states
+
+
+def _told(
+    search: Search, rows: Mapping[int, Row], found: list[Row], states: Mapping[str, str], text: str
+) -> Iterator[str]:
+    """Yield what is printed at the end."""
+    yield text
+    yield ""
+    small = [each for each in found if each["shrunk"]]
+    yield from closing(small, states)
+    fixed = sorted(name for name, state in states.items() if state == "fixed")
+    yield from (f"fixed: {name} of the corpus no longer fails" for name in fixed)
+    if small:
+        one = search.folder / "findings" / small[0]["name"]
+        yield f"replay: qswarm sim {one}/scenario.toml    page: {one}/finding.md"
+        yield f"cause:  qswarm cause {one}"
+    missing = len(search.seeds) - len(rows)
+    if missing:
+        yield f"{missing} of {len(search.seeds)} seeds not flown; the same command goes on"
