@@ -83,6 +83,10 @@ def fuzz(
             help="Findings of earlier searches: flown again first; new ones are added.",
         ),
     ] = None,
+    first_only: Annotated[
+        bool,
+        typer.Option("--first-only", help="End the search soon after the first violation."),
+    ] = False,
     quiet: Quiet = False,
 ) -> int:
     """Search random scenarios for one that breaks a controller, and make it small.
@@ -112,6 +116,7 @@ def fuzz(
         described={**described, "first seed": wanted.start, "guided": by_margin},
         beside=beside,
         quiet=quiet,
+        first_only=first_only,
     )
     return search_for_trouble(search)
 

@@ -95,7 +95,7 @@ class _Prober:
                 f"other draws from {tick / self.scenario.fleet.tick_hz:g} s on:"
                 f" {failed} of {flown} fail; {self.flights} flights so far"
             )
-            if self._hangar.stop.requested or (least and flown - failed > spare):
+            if self._hangar.stopped() or (least and flown - failed > spare):
                 break
         return failed / flown
 
@@ -116,11 +116,11 @@ def find_cause(folder: Path, hangar: Hangar, draws: int, say: Say) -> Cause | No
     """
     prober = _Prober(folder, hangar, draws, say)
     if not prober.fails(prober.tables):
-        return None if hangar.stop.requested else Cause(False)
+        return None if hangar.stopped() else Cause(False)
     from_start = prober.share(0)
     certain_s = 0.0 if from_start >= CERTAIN else _certain_s(prober, hangar)
     needed = _needed(prober)
-    if hangar.stop.requested:
+    if hangar.stopped():
         return None
     cause = Cause(True, certain_s, from_start, needed, prober.flights)
     row: Row = {**cause._asdict(), "text": cause.text, "draws": draws}
@@ -134,7 +134,7 @@ def _certain_s(prober: _Prober, hangar: Hangar) -> float | None:
     low, high = 0, _last_tick(prober.finding, prober.scenario)
     if prober.share(high, CERTAIN) < CERTAIN:
         return None
-    while high - low > 1 and not hangar.stop.requested:
+    while high - low > 1 and not hangar.stopped():
         middle = (low + high) // 2
         if prober.share(middle, CERTAIN) >= CERTAIN:
             high = middle

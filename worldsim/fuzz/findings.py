@@ -29,6 +29,8 @@ from worldsim.search.shrink import Shrinker, Size, tidy
 
 TIMED: Final = ("converge", "reform")
 """Properties that are violated where a time runs out."""
+REPEAT: Final = "repeat"
+"""The property for which a scenario is flown twice."""
 BUDGET: Final = 150
 """Flights that shrink one finding at most."""
 EVENTS: Final = 8
@@ -84,16 +86,15 @@ def shrink(folder: Path, hangar: Hangar, say: Say, budget: int = BUDGET) -> Row 
     """
     finding, file = read_finding(folder), folder / SCENARIO
     name, tables = finding["property"], tomllib.loads(file.read_text(encoding="utf-8"))
-    first = hangar.measure("first", loaded(as_toml(tables), file))
-    if first is None:
+    first_s = _violations([tables], file, name, hangar)[0]
+    if hangar.stopped():
         return None
-    first_s = violated_s(first, loaded(as_toml(tables), file), name)
     flights = 0
     if first_s is not None:
         shrinker = Shrinker(tables, first_s, timed=name in TIMED)
         while flights < budget and (batch := shrinker.batch(hangar.jobs)):
             found = _violations(batch, file, name, hangar)
-            if hangar.stop.requested:
+            if hangar.stopped():
                 return None
             flights += len(batch)
             if shrinker.take(zip(batch, found, strict=True)):
@@ -122,7 +123,7 @@ def _violations(batch: list[Tables], file: Path, name: str, hangar: Hangar) -> l
         text = as_toml(tidy(tables))
         if not objection(text, file):
             scenario = loaded(text, file)
-            tasks.append(Task(str(number), scenario, MarginProbe(scenario)))
+            tasks.append(Task(str(number), scenario, MarginProbe(scenario), name == REPEAT))
     found: list[float | None] = [None] * len(batch)
     scenarios = {task.name: task.scenario for task in tasks}
     for flown in hangar.fly(tasks):
@@ -173,7 +174,7 @@ def refly(corpus: Path, hangar: Hangar, say: Say) -> dict[str, str]:
         except (OSError, ScenarioError) as error:
             say(f"{folder}: {error}")
             continue
-        tasks.append(Task(folder.name, scenario))
+        tasks.append(Task(folder.name, scenario, twice=finding["property"] == REPEAT))
         wanted[folder.name] = finding["property"]
     for flown in hangar.fly(tasks):
         violated = flown.margins.get(wanted[flown.name], 1.0) < 0.0

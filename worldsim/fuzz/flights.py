@@ -13,8 +13,9 @@ from worldsim.fuzz.probe import MARGINS_FILE, MarginProbe
 from worldsim.results.overall import FailedRun, Made
 from worldsim.results.run_folder import RunWriteError
 from worldsim.scenario.tables import Scenario
-from worldsim.search.margins import Margins, margins_of, of_error
+from worldsim.search.margins import Margins, margins_of, of_error, of_repetition
 
+AGAIN = "-again"
 WORK = "flights"
 """The folder of the flights at work; it is empty between two runs."""
 
@@ -39,6 +40,8 @@ class Task(NamedTuple):
     name: str
     scenario: Scenario
     probe: FlightProbe | None = None
+    twice: bool = False
+    """Whether it is flown twice, to compare the traces."""
 
 
 class Hangar(NamedTuple):
@@ -57,15 +60,31 @@ class Hangar(NamedTuple):
         rmtree(work, ignore_errors=True)  # of a search that was killed
         work.mkdir(parents=True)
         tasks_of = {task.name: task for task in tasks}
-        jobs = [Job(each.scenario, work / each.name, False, each.probe) for each in tasks]
+        jobs = [
+            Job(each.scenario, work / f"{each.name}{end}", False, each.probe)
+            for each in tasks
+            for end in (("", AGAIN) if each.twice else ("",))
+        ]
+        before: dict[str, Flown] = {}
         try:
             for made in sweep(jobs, self.jobs, self.stop) if jobs else ():
-                flown = _flown(made, tasks_of[made.folder.name])
+                task = tasks_of[made.folder.name.removesuffix(AGAIN)]
+                flown = _flown(made, task)
                 rmtree(made.folder, ignore_errors=True)
-                if flown is not None:
+                if flown is None:
+                    continue
+                if not task.twice:
                     yield flown
+                elif task.name in before:
+                    yield _compared(before.pop(task.name), flown)
+                else:
+                    before[task.name] = flown
         finally:
             rmtree(work, ignore_errors=True)
+
+    def stopped(self) -> bool:
+        """Whether a stop was requested."""
+        return self.stop.requested
 
     def measure(self, name: str, scenario: Scenario) -> Flown | None:
         """Return what a flight showed tick by tick; None where it was cut off."""
@@ -87,6 +106,11 @@ def _flown(made: Made, task: Task) -> Flown | None:
     lines = (made.folder / "events.jsonl").read_text(encoding="utf-8").splitlines()
     events = tuple(json.loads(line) for line in lines)
     return Flown(task.name, margins, summary["reason"], summary["trace_sha256"], measured, events)
+
+
+def _compared(one: Flown, other: Flown) -> Flown:
+    """Return what a flight showed, and whether it showed the same twice."""
+    return one._replace(margins=of_repetition(one.margins, one.trace == other.trace))
 
 
 def violated_s(flown: Flown, scenario: Scenario, name: str) -> float | None:

@@ -11,7 +11,7 @@ from time import monotonic
 from typing import Any, Final, NamedTuple
 
 from netem.wire.shutdown import stop_requests
-from worldsim.fuzz.findings import begin, refly, shrink, take_in
+from worldsim.fuzz.findings import BUDGET, begin, refly, shrink, take_in
 from worldsim.fuzz.flights import Flown, Hangar, Task
 from worldsim.fuzz.folder import TABLE, Row, SearchFolder, findings_in, read_finding
 from worldsim.fuzz.pages import closing, table
@@ -25,6 +25,10 @@ from worldsim.search.trials import Terms, Trial, trial
 
 WORD: Final = "fuzz"
 """The first word of every seed of numbers."""
+
+
+TWICE_EVERY: Final = 8
+"""Every so many seeds are flown twice, and the traces compared."""
 
 
 class Search(NamedTuple):
@@ -44,6 +48,10 @@ class Search(NamedTuple):
     beside: Path
     """The file whose folder the paths of the scenarios are relative to."""
     quiet: bool = False
+    budget: int = BUDGET
+    """Flights that shrink one finding at most."""
+    first_only: bool = False
+    """Whether the search ends with the generation of the first violation."""
 
 
 class Drawn(NamedTuple):
@@ -88,12 +96,16 @@ def _fly(
     rows, progress = folder.rows(), _Progress(search, line)
     guide = Guide(search.seeds.start) if search.guided else None
     for generation in _generations(search.seeds):
-        if hangar.stop.requested:
+        if hangar.stopped() or (search.first_only and _any_violated(rows, search.seeds)):
             break
         if guide is None and all(seed in rows for seed in generation):
             continue
         drawn = [_drawn(search, seed, guide) for seed in generation]
-        tasks = [Task(str(each.seed), each.scenario) for each in drawn if each.seed not in rows]
+        tasks = [
+            Task(str(each.seed), each.scenario, twice=each.seed % TWICE_EVERY == 0)
+            for each in drawn
+            if each.seed not in rows
+        ]
         of_seed = {each.seed: each for each in drawn}
         for flown in hangar.fly(tasks):
             row = _row(of_seed[int(flown.name)], flown)
@@ -108,6 +120,10 @@ def _fly(
                 if each.seed in rows:
                     guide.learn(each.trial.genes, rows[each.seed]["score"])
     return {seed: rows[seed] for seed in search.seeds if seed in rows}
+
+
+def _any_violated(rows: Mapping[int, Row], seeds: range) -> bool:
+    return any(rows[seed]["violated"] for seed in seeds if seed in rows)
 
 
 def _generations(seeds: range) -> Iterator[range]:
@@ -181,9 +197,9 @@ def _keep_findings(
         small[name] = small.get(name, 0) + 1
         if small[name] > search.shrinks or finding["shrunk"]:
             continue
-        if hangar.stop.requested:
+        if hangar.stopped():
             return
-        shrink(each, hangar, line.update)
+        shrink(each, hangar, line.update, search.budget)
 
 
 def _compared(found: list[Row], folder: SearchFolder, corpus: Path) -> dict[str, str]:

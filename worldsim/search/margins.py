@@ -12,13 +12,14 @@ from worldsim.judge.metrics import ROUNDING_M
 from worldsim.results.summary import INVARIANT_WORDS
 
 SAFETY: Final = ("separation", "clearance", "error")
-CONSERVATION: Final = ("I5", "I8")
+CONSERVATION: Final = ("I5", "I8", "repeat")
 LIVENESS: Final = ("converge", "reform", "I2", "I3", "I4", "I6", "I7")
 PROPERTIES: Final = (*SAFETY, *CONSERVATION, *LIVENESS)
 WORDS: Final = {
     "separation": "two vehicles came nearer to each other than separation_m",
     "clearance": "a vehicle came nearer to an obstacle than clearance_m",
     "error": "the flight ended by an error",
+    "repeat": "the same seed flew another way the second time",
     "converge": "the team did not form its formation in the time allowed",
     "reform": "the team did not form its formation again in the time allowed after the last fault",
     **{name: INVARIANT_WORDS[name] for name in ("I2", "I3", "I4", "I5", "I6", "I7", "I8")},
@@ -49,6 +50,11 @@ def margins_of(summary: Mapping[str, Any]) -> Margins:
 def of_error() -> Margins:
     """Return the margins of a flight that an error ended."""
     return {"error": -1.0}
+
+
+def of_repetition(margins: Margins, same: bool) -> Margins:
+    """Return the margins of a flight that was flown twice. same: whether the traces are equal."""
+    return {**margins, "repeat": 1.0 if same else -1.0}
 
 
 def violated(margins: Margins) -> list[str]:

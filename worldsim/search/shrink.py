@@ -263,8 +263,8 @@ def _briefer(tables: Tables, _: float | None) -> Iterator[Tables]:
     """Yield tables of which one fault is shorter, comes once, or at a whole second."""
     for index, event in enumerate(tables.get("event") or ()):
         for_s = event.get("for_s") or 0.0
-        for shorter in (1.0, round(for_s / 2.0, 1)):
-            if 0.0 < shorter < for_s:
+        for shorter in (1.0, float(int(for_s / 2.0))):
+            if 1.0 <= shorter < for_s:
                 yield _changed(tables, index, {"for_s": shorter})
         for key in ("at_s", "for_s"):
             if event.get(key) and event[key] != round(event[key]):
@@ -278,7 +278,7 @@ def _earlier(tables: Tables, violated_s: float | None) -> Iterator[Tables]:
     events = tables.get("event") or []
     first_s = min((each["at_s"] for each in events), default=0.0)
     for by_s in (float(int(each)) for each in (first_s - 1.0, first_s / 2.0, 1.0)):
-        if by_s >= 1.0 and first_s - by_s >= 0.0:
+        if by_s >= 1.0 and first_s - by_s >= 1.0:
             found = copy.deepcopy(tables)
             for event in found["event"]:
                 event["at_s"] = round(event["at_s"] - by_s, 1)

@@ -169,7 +169,7 @@ def _faults(draw: GeneDraw, made: Tables, hurt_s: float, slowest: float) -> list
     first = draw.part("faults")
     count = first.among((0, 1, 2, 3, 5, 8))
     timeline = Timeline(first, {"agent": [], **made, "duration_s": hurt_s}, slowest)
-    events = []
+    events: list[Tables] = []
     for number in range(count):
         event = timeline.next_event(draw.part("event", number))
         if event.keys() & (SPARED if not made.get("obstacle") else {*SPARED, *MOVES}):
@@ -185,7 +185,8 @@ def _faults(draw: GeneDraw, made: Tables, hurt_s: float, slowest: float) -> list
 
 def leaves_a_team(tables: Tables) -> bool:
     """Return whether two agents are left in any case, or one of two: nobody forms nothing."""
-    agents, lost = tables["fleet"]["agents"], 0
+    agents: int = tables["fleet"]["agents"]
+    lost = 0
     for event in tables.get("event") or ():
         if "for_s" not in event:
             for selector in (*event.get("kill", ()), *event.get("leave", ())):
@@ -206,7 +207,8 @@ def _most(selector: int | str, agents: int) -> int:
 def _can_end(event: Tables) -> bool:
     """Return whether a fault has to end: only agents may stay away."""
     if event.keys() & {"kill", "leave"}:
-        return event.get("kill") == ["netem"]
+        struck: list[int | str] = event.get("kill", [])
+        return "netem" in struck
     return not event.keys() & ONCE
 
 

@@ -1,0 +1,17 @@
+"""`qswarm fuzz` finds a planted bug, shrinks it, keeps what replays it, and goes on where it was."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tests.planted_bugs import held_command, searched
+from worldsim.commands.app import command
+from worldsim.fuzz.folder import SearchFolder, findings_in, read_finding
+
+pytestmark = pytest.mark.pure
+
+
+def test_a_planted_bug_is_found_shrunk_and_replayed(tmp_path: Path) -> None:
+    """A vehicle that flies on when its command has expired: seed SEED pauses or kills somebody."""

@@ -1,0 +1,90 @@
+"""Shrinking keeps what makes a scenario fail, and nothing else that can go."""
+
+import tomllib
+
+from tests.random_flights.generate import objection, scenario
+from tests.random_flights.shrink import flies
+from worldsim.scenario.file import as_toml
+from worldsim.search.draws import Tables
+from worldsim.search.shrink import Shrinker, Size, shrunk, tidy
+
+TOO_NEAR = """
+duration_s = 30.0
+obstacle = [{ shape = "sphere", centre_m = [9, 0, 0], radius_m = 0.5 }]
+event = [
+    { at_s = 3.0, kill = [2], for_s = 1.0 },
+    { at_s = 5.0, partition = [[0, 1], [2]], for_s = 2.0 },
+    { at_s = 9.0, heal = true },
+]
+[fleet]
+agents = 4
+start = { kind = "list", positions_m = [[5, 0, 0], [0, 0, 0], [0.3, 0, 0], [2, 0, 0]] }
+[formation]
+file = "pyramidal-wedge"
+[control]
+separation_m = 0.3
+safety_m = 0.7
+[vehicle]
+radius_m = 0.05
+[netem]
+loss_percent = 10.37
+"""
+
+
+def fails(tables: Tables) -> float | None:
+    """Fail wherever an agent is killed whose vehicles have a radius of their own."""
+    killed = any("kill" in event for event in tables.get("event", []))
+    return 3.5 if killed and "radius_m" in tables["vehicle"] else None
+
+
+def test_only_what_makes_it_fail_is_left() -> None:
+    small = shrunk(tomllib.loads(TOO_NEAR), fails)
+    assert small is not None
+    small = tidy(small)
+    assert small["duration_s"] == 4.0
+    assert small["event"] == [{"at_s": 1.0, "kill": [0], "for_s": 1.0}]
+    assert small["vehicle"] == {"radius_m": 0.05}
+    assert Size.of(small) == (1, 2, 4.0)
+    assert len(small["fleet"]["start"]["positions_m"]) == 2
+    assert small.keys() & {"obstacle", "control", "netem"} == set()
+
+
+def test_the_batch_size_changes_no_result() -> None:
+    found = []
+    for count in (1, 3):
+        shrinker = Shrinker(tomllib.loads(TOO_NEAR), 3.5, timed=False)
+        while batch := shrinker.batch(count):
+            shrinker.take((each, fails(each)) for each in batch)
+        found.append(shrinker.smallest)
+    assert found[0] == found[1]
+
+
+def test_a_budget_ends_it_with_what_fails() -> None:
+    small = shrunk(tomllib.loads(TOO_NEAR), fails, budget=3)
+    assert small is not None
+    assert fails(small) == 3.5
+    assert small["control"]
+
+
+def test_agents_that_are_left_are_numbered_anew() -> None:
+    tables = tomllib.loads(TOO_NEAR)
+    parted = [each for each in tables["event"] if "partition" in each]
+
+    def stays_parted(each: Tables) -> float | None:
+        sides = [len(event["partition"]) for event in each.get("event", [])]
+        return 6.0 if 2 in sides else None
+
+    small = shrunk({**tables, "event": parted}, stays_parted)
+    assert small is not None
+    assert small["event"][0]["partition"] == [[0], [1]]
+
+
+def test_what_does_not_fail_is_not_shrunk() -> None:
+    tables = tomllib.loads(scenario(11, 0, steps=40).text)
+    assert shrunk(tables, lambda each: flies(each, "I1")) is None
+
+
+def test_what_check_refuses_is_no_smaller_scenario() -> None:
+    refused = tomllib.loads(TOO_NEAR)
+    assert objection(as_toml(refused))
+    assert flies(refused, "exception") is None
