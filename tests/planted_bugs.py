@@ -31,6 +31,7 @@ from netem.faults import Partition
 from netem.medium import Medium
 from worldsim.fuzz.folder import SearchFolder, findings_in, read_finding
 from worldsim.fuzz.fuzz import Search, fuzz
+from worldsim.results.exit_status import INTERRUPTED, PASS
 from worldsim.search.drafts import loaded
 from worldsim.search.trials import Terms
 from worldsim.truth.world import World
@@ -45,7 +46,15 @@ agents = 5
 tick_hz = 10.0
 start = {{ kind = "box", centre_m = [0, 0, 0], size_m = [4, 4, 1], spacing_m = 0.7 }}
 [formation]
-file = "vertical-lines"
+name = "line"
+[formation.vertices]
+V1 = [0, 0, 0]
+[[formation.queue]]
+name = "Q1"
+vertices = ["V1"]
+shape = {{ kind = "ray", direction = [-1, 0, 0] }}
+[comms]
+local_hz = 10.0
 [vehicle]
 sensors = {sensors}
 """
@@ -223,12 +232,13 @@ def main() -> int:
         began_s, out = monotonic(), sys.stdout
         sys.stdout = (given.out.parent / "planted.log").open("a", encoding="utf-8")
         try:
-            missed += (
-                searched(PLANTS[name], terms, range(first, last), folder, not given.random) == 0
-            )
+            status = searched(PLANTS[name], terms, range(first, last), folder, not given.random)
         finally:
             sys.stdout.close()
             sys.stdout = out
+        if status == INTERRUPTED:
+            return status
+        missed += status == PASS
         print(row(name, folder, began_s), flush=True)
     return 1 if missed else 0
 

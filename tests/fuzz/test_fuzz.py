@@ -1,14 +1,8 @@
 """`qswarm fuzz` finds a planted bug, shrinks it, keeps what replays it, and goes on where it was."""
 
-import json
-import tomllib
 from pathlib import Path
 
 import pytest
-
-from tests.planted_bugs import held_command, searched
-from worldsim.commands.app import command
-from worldsim.fuzz.folder import SearchFolder, findings_in, read_finding
 
 pytestmark = pytest.mark.pure
 

@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from worldsim.commands.options import complain, examples, load_scenario, seeds_of, warn
+from worldsim.commands.options import (
+    Settings,
+    complain,
+    examples,
+    load_scenario,
+    overrides_of,
+    seeds_of,
+    warn,
+)
 from worldsim.results.exit_status import FAIL, INTERRUPTED, PASS
 
 if TYPE_CHECKING:
@@ -57,6 +65,7 @@ def fuzz(
             help="Vary seed, radio and faults of this scenario.",
         ),
     ] = None,
+    settings: Settings = None,
     safety_only: Annotated[
         bool,
         typer.Option(
@@ -101,7 +110,8 @@ def fuzz(
     from worldsim.fuzz.fuzz import fuzz as search_for_trouble
 
     wanted = seeds_of(seeds)
-    terms, described, beside = _terms(controller, base, safety_only)
+    varied = _base(controller, base, settings)
+    terms, described = _terms(controller, base, varied, safety_only)
     by_margin = _guided(guided)
     if corpus is not None and not corpus.is_dir():
         raise typer.BadParameter(f"{corpus}: no such folder; make it first", param_hint="--corpus")
@@ -114,7 +124,7 @@ def fuzz(
         shrinks=shrink,
         corpus=corpus,
         described={**described, "first seed": wanted.start, "guided": by_margin},
-        beside=beside,
+        beside=Path("drawn.toml"),
         quiet=quiet,
         first_only=first_only,
     )
@@ -122,9 +132,9 @@ def fuzz(
 
 
 def _terms(
-    controller: str | None, base: str | None, safety_only: bool
-) -> "tuple[Terms, dict[str, Any], Path]":
-    """Return what all trials share, what search.json says of it, and where paths start."""
+    controller: str | None, base: str | None, varied: "Scenario", safety_only: bool
+) -> "tuple[Terms, dict[str, Any]]":
+    """Return what all trials share, and what search.json says of it."""
     from hashlib import sha256
 
     import msgspec
@@ -132,23 +142,25 @@ def _terms(
     from worldsim.scenario.file import dump
     from worldsim.search.trials import Terms
 
-    varied = _base(controller, base)
-    digest = None if base is None else sha256(dump(varied).encode()).hexdigest()[:12]
     described = {
         "controller": controller,
         "base": base,
-        "base's digest": digest,
+        "base's digest": base and sha256(dump(varied).encode()).hexdigest()[:12],
         "safety only": safety_only,
     }
     tables = None if base is None else msgspec.to_builtins(varied)
-    return Terms(controller, tables, safety_only), described, Path("drawn.toml")
+    return Terms(controller, tables, safety_only), described
 
 
-def _base(controller: str | None, base: str | None) -> "Scenario":
+def _base(controller: str | None, base: str | None, settings: list[str] | None) -> "Scenario":
     """Return the scenario that is varied, or one to check the controller with."""
     from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS
 
-    overrides = {} if controller is None else {"control.controller": controller}
+    if settings and base is None:
+        raise typer.BadParameter("needs --base: otherwise all keys are drawn", param_hint="--set")
+    overrides = overrides_of(settings, None, None, None)
+    if controller is not None:
+        overrides["control.controller"] = controller
     scenario = load_scenario(base or "wedge-9", overrides, VIRTUAL_COMMAND_TICKS)
     if base is not None:
         warn(base, scenario)

@@ -61,7 +61,7 @@ class Hangar(NamedTuple):
         work.mkdir(parents=True)
         tasks_of = {task.name: task for task in tasks}
         jobs = [
-            Job(each.scenario, work / f"{each.name}{end}", False, each.probe)
+            Job(each.scenario, work / f"{each.name}{end}", False, probe=each.probe)
             for each in tasks
             for end in (("", AGAIN) if each.twice else ("",))
         ]
