@@ -176,8 +176,18 @@ def small_terms(name: str) -> Terms:
     return Terms(base=msgspec.to_builtins(loaded(text, Path("planted.toml"))))
 
 
-def searched(plant: Plant, terms: Terms, seeds: range, folder: Path, guided: bool) -> int:
-    """Search with one bug planted, until it is found; return the exit status of the search."""
+def searched(
+    plant: Plant,
+    terms: Terms,
+    seeds: range,
+    folder: Path,
+    guided: bool,
+    budget: int = SHRINK_FLIGHTS,
+) -> int:
+    """Search with one bug planted, until it is found; return the exit status of the search.
+
+    budget: flights that shrink the finding at most.
+    """
     search = Search(
         terms=terms,
         seeds=seeds,
@@ -190,7 +200,7 @@ def searched(plant: Plant, terms: Terms, seeds: range, folder: Path, guided: boo
         beside=Path("planted.toml"),
         quiet=True,
         first_only=True,
-        budget=SHRINK_FLIGHTS,
+        budget=budget,
     )
     with pytest.MonkeyPatch.context() as patch:
         plant(patch)
@@ -221,6 +231,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("runs/planted"))
     parser.add_argument("--only", action="append", choices=sorted(PLANTS))
     parser.add_argument("--random", action="store_true", help="draw all seeds at random")
+    parser.add_argument("--budget", type=int, default=SHRINK_FLIGHTS, help="flights that shrink")
     parser.add_argument("--small", action="store_true", help="vary one small team, not all teams")
     given = parser.parse_args()
     first, last = map(int, given.seeds.split(":"))
@@ -232,7 +243,8 @@ def main() -> int:
         began_s, out = monotonic(), sys.stdout
         sys.stdout = (given.out.parent / "planted.log").open("a", encoding="utf-8")
         try:
-            status = searched(PLANTS[name], terms, range(first, last), folder, not given.random)
+            seeds, guided = range(first, last), not given.random
+            status = searched(PLANTS[name], terms, seeds, folder, guided, given.budget)
         finally:
             sys.stdout.close()
             sys.stdout = out

@@ -1,11 +1,145 @@
-"""`qswarm fuzz` finds a planted bug, shrinks it, keeps what replays it, and goes on where it was."""
+"""`qswarm fuzz` finds a planted bug, makes it small, and `qswarm cause` tells from when on."""
 
+import json
+import tomllib
 from pathlib import Path
 
+import msgspec
 import pytest
 
-pytestmark = pytest.mark.pure
+from netem.wire.shutdown import StopRequest, stop_requests
+from tests.planted_bugs import filter_sign, searched
+from worldsim.commands.app import command
+from worldsim.fuzz.cause import Cause, find_cause
+from worldsim.fuzz.findings import refly
+from worldsim.fuzz.flights import Hangar
+from worldsim.fuzz.folder import SearchFolder, read_finding
+from worldsim.fuzz.pages import curve
+from worldsim.results.exit_status import BAD_INPUT, FAIL
+from worldsim.search.drafts import cautions, loaded
+from worldsim.search.trials import Terms
+
+SEEDS = range(2, 3)
+HUNTERS = """
+name = "hunters"
+[fleet]
+agents = 3
+tick_hz = 10.0
+start = { kind = "list", positions_m = [[0, 0, 0], [2, 0, 0], [9, 0, 0]] }
+[formation]
+file = "pyramidal-wedge"
+[comms]
+local_hz = 10.0
+[control]
+controller = "tests.random_flights.controllers:Chase"
+[expect]
+converge = false
+"""
 
 
-def test_a_planted_bug_is_found_shrunk_and_replayed(tmp_path: Path) -> None:
-    """A vehicle that flies on when its command has expired: seed SEED pauses or kills somebody."""
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Search among hunters, with a sign wrong in the filter that keeps them apart."""
+    folder = tmp_path_factory.mktemp("fuzz") / "search"
+    scenario = loaded(HUNTERS, Path("hunters.toml"))
+    terms = Terms(base=msgspec.to_builtins(scenario), allowed=cautions(scenario))
+    assert searched(filter_sign, terms, SEEDS, folder, guided=False, budget=25) == FAIL
+    return folder
+
+
+@pytest.mark.pure
+def test_a_planted_bug_is_found_and_made_small(found: Path) -> None:
+    rows = SearchFolder(found).rows()
+    assert [rows[seed]["violated"][0] for seed in SEEDS] == ["separation"]
+    folder = found / "findings" / "separation-2"
+    finding = read_finding(folder)
+    assert finding["shrunk"]
+    assert finding["size"]["agents"] == 2
+    assert finding["size"]["faults"] == 0
+    assert finding["size"]["duration_s"] < 0.25 * finding["original_size"]["duration_s"]
+    assert finding["trouble_s"] <= finding["size"]["duration_s"]
+    assert "event" not in tomllib.loads((folder / "scenario.toml").read_text())
+    page = (folder / "finding.md").read_text()
+    assert "Two vehicles came nearer" in page
+    assert "First tick of trouble" in page
+    assert "| separation | safety | 1 | 1 |" in (found / "table.md").read_text()
+
+
+@pytest.mark.pure
+def test_a_finding_is_known_where_it_fails_and_fixed_where_it_does_not(
+    found: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    corpus = tmp_path / "corpus"
+    corpus.mkdir()
+    (found / "findings" / "separation-2").rename(corpus / "separation-2")
+    with stop_requests() as stop:
+        assert refly(corpus, hangar(tmp_path, stop), lambda _: None) == {"separation-2": "fixed"}
+        cause = find_cause(corpus / "separation-2", hangar(tmp_path, stop), 4, lambda _: None)
+        assert cause == Cause(replays=False)
+        filter_sign(monkeypatch)
+        assert refly(corpus, hangar(tmp_path, stop), lambda _: None) == {"separation-2": "known"}
+        cause = find_cause(corpus / "separation-2", hangar(tmp_path, stop), 4, lambda _: None)
+    assert cause is not None
+    assert cause.certain_s == 0.0
+    assert cause.needed is None
+    assert "No draw matters" in (corpus / "separation-2" / "finding.md").read_text()
+    (corpus / "separation-2").rename(found / "findings" / "separation-2")
+
+
+def hangar(folder: Path, stop: StopRequest) -> Hangar:
+    return Hangar(folder / "work", 1, stop)
+
+
+def test_the_folder_of_another_search_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = SearchFolder(tmp_path / "it")
+    folder.open({"base": "wedge-9", "guided": False})
+    folder.add({"seed": 3, "violated": []})
+    folder.open({"base": "wedge-9", "guided": False})
+    assert folder.rows() == {3: {"seed": 3, "violated": []}}
+    assert command(["fuzz", "--out", str(tmp_path / "it"), "--random"]) == BAD_INPUT
+    assert "holds another search: controller" not in capsys.readouterr().err
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "notes.txt").touch()
+    assert command(["fuzz", "--out", str(tmp_path / "full"), "--random"]) == BAD_INPUT
+    assert "no folder of a search" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--seeds", "5"], "--seeds: '5'"),
+        (["--controller", "no.such:Thing"], "control.controller"),
+        (["--base", "no-such"], "no such file"),
+        (["--set", "seed=3"], "--set: needs --base"),
+        (["--corpus", "no-such-folder"], "--corpus: no-such-folder"),
+    ],
+)
+def test_bad_input_is_refused_before_anything_is_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
+) -> None:
+    out = tmp_path / "out"
+    assert command(["fuzz", "--out", str(out), "--random", *arguments]) == BAD_INPUT
+    assert said in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_folder_without_a_finding_has_no_cause(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(["cause", str(tmp_path)]) == BAD_INPUT
+    assert "is not a finding of `qswarm fuzz`" in capsys.readouterr().err
+
+
+def test_a_line_that_was_cut_off_is_flown_again(tmp_path: Path) -> None:
+    folder = SearchFolder(tmp_path)
+    (tmp_path / "seeds.jsonl").write_text(json.dumps({"seed": 1}) + '\n{"seed": 2, "vio')
+    assert list(folder.rows()) == [1]
+    folder.add({"seed": 3})
+    assert list(folder.rows()) == [1, 3]
+
+
+def test_a_curve_shows_its_least_values() -> None:
+    assert curve([0.0, 0.5, 1.0]) == "▁▅█"
+    assert curve([None, 1.0]) == " ▁"

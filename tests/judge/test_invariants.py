@@ -16,7 +16,7 @@ from tests.recording.flights import straight_flight, wedge
 from worldsim.judge.connectivity import Connectivity, rounds_to_all
 from worldsim.judge.finding import InvariantTally
 from worldsim.judge.radio_events import ConditionsChanged, Healed, Partitioned
-from worldsim.judge.run_events import FormationGiven, RoleChanged, RunEvent
+from worldsim.judge.run_events import FormationGiven, RoleChanged, RunEvent, SlowChanged
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge
 from worldsim.scenario.tables import Scenario
@@ -107,6 +107,18 @@ def test_a_shared_place_violates_i4_only_after_a_while() -> None:
     there = tuple(ticks[0].place[5].tolist())
     assert judged(claimed(ticks, 4, there, 29.1))["I4"][1] == 0
     assert judged(claimed(ticks, 4, there, 20.0))["I4"][1] > 150
+
+
+def test_a_step_that_outlasts_a_slow_fault_excuses_a_shared_place() -> None:
+    ticks = flight()
+    there, back = (tuple(ticks[0].place[agent].tolist()) for agent in (5, 4))
+    shared = claimed(claimed(ticks, 4, there, 18.0), 4, back, 25.0)
+    slow = SlowChanged(t_s=5.0, agent=4, planned=True, number=0, delay_s=5.0)
+    ended = msgspec.structs.replace(slow, t_s=20.5, ends=True)
+    assert judged(shared)["I4"][1] > 0
+    assert judged(shared, slow, ended)["I4"][1] == 0
+    brief = msgspec.structs.replace(ended, delay_s=0.5)
+    assert judged(shared, msgspec.structs.replace(slow, delay_s=0.5), brief)["I4"][1] > 0
 
 
 def test_a_change_of_place_in_a_quiet_team_violates_i7_unless_a_fault_precedes_it() -> None:

@@ -54,7 +54,9 @@ def test_nobody_left_is_no_team() -> None:
     assert leaves_a_team(tables)
     tables["event"].append({"at_s": 2.0, "leave": ["vertex:V1"]})
     assert not leaves_a_team(tables)
-    assert leaves_a_team({**tables, "event": [{"at_s": 1.0, "kill": ["all"], "for_s": 2.0}]})
+    all_restart = {"at_s": 1.0, "kill": ["all"], "for_s": 2.0}
+    assert not leaves_a_team({**tables, "event": [all_restart]})
+    assert leaves_a_team({**tables, "event": [{**all_restart, "kill": [0, 1, "netem"]}]})
 
 
 def test_one_gene_changes_and_the_others_stay() -> None:

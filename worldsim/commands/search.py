@@ -140,6 +140,7 @@ def _terms(
     import msgspec
 
     from worldsim.scenario.file import dump
+    from worldsim.search.drafts import cautions
     from worldsim.search.trials import Terms
 
     described = {
@@ -149,7 +150,8 @@ def _terms(
         "safety only": safety_only,
     }
     tables = None if base is None else msgspec.to_builtins(varied)
-    return Terms(controller, tables, safety_only), described
+    allowed = frozenset() if base is None else cautions(varied)
+    return Terms(controller, tables, allowed, safety_only), described
 
 
 def _base(controller: str | None, base: str | None, settings: list[str] | None) -> "Scenario":

@@ -17,7 +17,7 @@ from worldsim.fuzz.folder import SCENARIO, Row, read_finding
 from worldsim.fuzz.probe import Redraw
 from worldsim.scenario.file import as_toml
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
-from worldsim.search.drafts import loaded, objection
+from worldsim.search.drafts import cautions, loaded, objection
 from worldsim.search.draws import Tables
 
 CERTAIN: Final = 0.95
@@ -76,7 +76,7 @@ class _Prober:
     def fails(self, tables: Tables) -> bool:
         """Return whether tables violate the finding's property."""
         text = as_toml(tables)
-        if objection(text, self._file):
+        if objection(text, self._file, cautions(self.scenario)):
             return False
         return self._failed([Task("0", loaded(text, self._file))]) == 1
 

@@ -23,7 +23,7 @@ from worldsim.results.run_folder import write_json
 from worldsim.scenario.file import as_toml
 from worldsim.scenario.tables import CONVERGED_M
 from worldsim.scenario.toml import ScenarioError
-from worldsim.search.drafts import loaded, objection
+from worldsim.search.drafts import cautions, loaded, objection
 from worldsim.search.draws import Tables
 from worldsim.search.shrink import Shrinker, Size, tidy
 
@@ -118,10 +118,10 @@ def _size(shrinker: Shrinker) -> str:
 
 def _violations(batch: list[Tables], file: Path, name: str, hangar: Hangar) -> list[float | None]:
     """Return when each candidate violates a property; None where it does not or cannot fly."""
-    tasks = []
+    tasks, allowed = [], cautions(loaded(file.read_text(encoding="utf-8"), file))
     for number, tables in enumerate(batch):
         text = as_toml(tidy(tables))
-        if not objection(text, file):
+        if not objection(text, file, allowed):
             scenario = loaded(text, file)
             tasks.append(Task(str(number), scenario, MarginProbe(scenario), name == REPEAT))
     found: list[float | None] = [None] * len(batch)

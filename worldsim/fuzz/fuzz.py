@@ -18,6 +18,7 @@ from worldsim.fuzz.pages import closing, table
 from worldsim.results.exit_status import FAIL, INTERRUPTED, PASS
 from worldsim.results.progress_line import ProgressLine
 from worldsim.scenario.tables import Scenario
+from worldsim.scenario.toml import ScenarioError
 from worldsim.search.drafts import loaded, objection
 from worldsim.search.guide import GENERATION, Guide
 from worldsim.search.margins import score, violated
@@ -136,10 +137,14 @@ def _drawn(search: Search, seed: int, guide: Guide | None) -> Drawn:
     guided = guide is not None and seed % 2 == 1
 
     def check(text: str) -> str:
-        return objection(text, search.beside)
+        return objection(text, search.beside, search.terms.allowed)
 
     given: Any = guide.propose() if guide is not None and guided else {}
-    made = trial(f"{WORD}-{seed}", (WORD, seed), search.terms, check, given)
+    name = f"{WORD}-{seed}"
+    try:
+        made = trial(name, (WORD, seed), search.terms, check, given)
+    except LookupError as error:
+        raise ScenarioError(name, "", str(error)) from error
     if guide is not None:
         guide.withdraw(given)
     how = "guided" if guided else "random"

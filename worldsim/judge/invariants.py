@@ -36,6 +36,7 @@ from worldsim.judge.phase import Phase
 from worldsim.judge.radio_events import NetemOutage, RadioRunEvent, Sabotaged
 from worldsim.judge.radio_load import RadioLoad
 from worldsim.judge.run_events import (
+    AgentFaultRunEvent,
     ClockChanged,
     ControllerLogged,
     DiskFilled,
@@ -90,6 +91,8 @@ class Invariants:
         self._boot_s, self._unobserved = scenario.fleet.boot_s, False
         self._fault_s = 0.0
         """When the last fault is over [s; simulated time]."""
+        self._busy_until_s = 0.0
+        """Until when a slow agent may be at a step that it began earlier [s; simulated time]."""
         self._components_due_s = 0.0
         """When connectivity is to be computed anew [s; simulated time]."""
         self._components: Components | None = None
@@ -122,9 +125,7 @@ class Invariants:
             return
         match event:
             case ClockChanged() | PoseChanged() | SlowChanged() | Starved():
-                self._connectivity.handle_agent_fault(event)
-                self._shared.forget()
-                self._fault(event.t_s, event.t_s)
+                self._handle_agent_fault(event)
             case RoleChanged():
                 self._leads.take(event, informed=self._is_informed(event.agent))
             case Restarted() | Joined():
@@ -150,6 +151,17 @@ class Invariants:
             case _:
                 assert_never(event)
 
+    def _handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
+        """Take a change of an agent's fault, which may outlast its end by a step."""
+        self._connectivity.handle_agent_fault(event)
+        self._shared.forget()
+        over_s = event.t_s
+        if isinstance(event, SlowChanged) and event.ends:
+            # A step that was begun before takes its time: the agent says nothing new meanwhile.
+            over_s += event.delay_s
+        self._busy_until_s = max(self._busy_until_s, over_s)
+        self._fault(event.t_s, over_s)
+
     def _handle_radio(self, event: RadioRunEvent) -> None:
         if isinstance(event, Sabotaged):
             return  # whatever somebody sends, it excuses nobody
@@ -173,6 +185,8 @@ class Invariants:
             self._excuse(tick.time_s)
             return
         self.tallies["I6"].count(self._leads.take_excess())
+        if tick.time_s <= self._busy_until_s:
+            self._shared.forget()
         self.tallies["I4"].count(self._shared.count_lasting(tick.time_s, self._twice_s))
         if tick.time_s >= self._settled_s and self._breaches is not None:
             self.tallies["I2"].count(self._breaches.vertices)

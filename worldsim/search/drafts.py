@@ -33,14 +33,25 @@ def loaded(text: str, file: Path) -> Scenario:
     return admit(parse(text, file), file, VIRTUAL_COMMAND_TICKS)
 
 
-def objection(text: str, file: Path = Path("drawn.toml")) -> str:
-    """Return the first error or warning that `qswarm check` has for a scenario; empty: none."""
+def cautions(scenario: Scenario) -> frozenset[str]:
+    """Return the keys that `qswarm check` warns of."""
+    return frozenset(each.key for each in (*warnings_for(scenario), *start_warnings(scenario)))
+
+
+def objection(
+    text: str, file: Path = Path("drawn.toml"), allowed: frozenset[str] = frozenset()
+) -> str:
+    """Return the first error or warning that `qswarm check` has for a scenario; empty: none.
+
+    allowed: keys of which it may warn.
+    """
     try:
         scenario = loaded(text, file)
     except ScenarioError as error:
         return str(error)
     for caution in (*warnings_for(scenario), *start_warnings(scenario)):
-        return f"{file}: {caution.key}: warning: {caution.detail}"
+        if caution.key not in allowed:
+            return f"{file}: {caution.key}: warning: {caution.detail}"
     return ""
 
 

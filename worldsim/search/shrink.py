@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from worldsim.search.draws import Tables
+from worldsim.search.formations import FALLBACK
 from worldsim.search.trials import fair_s, leaves_a_team
 
 LISTS = ("event", "obstacle", "agent")
@@ -169,6 +170,12 @@ def _without_tables(tables: Tables, _: float | None) -> Iterator[Tables]:
             yield copy.deepcopy({key: value for key, value in tables.items() if key != name})
 
 
+def _one_line(tables: Tables, _: float | None) -> Iterator[Tables]:
+    """Yield tables with a formation of one queue, which a team of any size can form."""
+    if tables.get("formation") != FALLBACK:
+        yield copy.deepcopy({**tables, "formation": FALLBACK})
+
+
 def _fewer_agents(tables: Tables, _: float | None) -> Iterator[Tables]:
     agents, start = tables["fleet"]["agents"], tables["fleet"].get("start") or {}
     if start.get("kind") != "list":
@@ -315,6 +322,7 @@ PASSES = (
     _shorter,
     _fewer_events,
     _without_tables,
+    _one_line,
     _fewer_agents,
     _earlier,
     _shorter,

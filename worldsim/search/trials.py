@@ -60,6 +60,8 @@ class Terms(NamedTuple):
     """None: the default, or that of the base."""
     base: Tables | None = None
     """The resolved tables of a scenario that is varied; None: everything is drawn."""
+    allowed: frozenset[str] = frozenset()
+    """The keys of the base that `qswarm check` warns of: the user has been told."""
     safety_only: bool = False
     """Whether nothing is expected but safety and conservation."""
 
@@ -184,14 +186,18 @@ def _faults(draw: GeneDraw, made: Tables, hurt_s: float, slowest: float) -> list
 
 
 def leaves_a_team(tables: Tables) -> bool:
-    """Return whether two agents are left in any case, or one of two: nobody forms nothing."""
+    """Return whether two agents stay in any case, or one of two, and one never stops.
+
+    Only agents know the mission: it is lost with the last process that was given it.
+    """
     agents: int = tables["fleet"]["agents"]
-    lost = 0
+    stopped = lost = 0
     for event in tables.get("event") or ():
-        if "for_s" not in event:
-            for selector in (*event.get("kill", ()), *event.get("leave", ())):
-                lost += _most(selector, agents)
-    return agents - lost >= min(agents, 2 if agents > 2 else 1)
+        for kind in ("kill", "leave", "restart"):
+            count = sum(_most(each, agents) for each in event.get(kind, ()))
+            stopped += count
+            lost += count if kind != "restart" and "for_s" not in event else 0
+    return stopped < agents and agents - lost >= min(agents, 2)
 
 
 def _most(selector: int | str, agents: int) -> int:
