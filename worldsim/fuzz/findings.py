@@ -135,6 +135,9 @@ def explanation(flown: Flown, name: str, duration_s: float) -> Row:
     """Return what a finding's flight tells: its trouble, the events before it, the margins."""
     measured = flown.measured or {}
     trouble_s = trouble_of(measured, name, duration_s)
+    if name == "reform":
+        disturbed = [each["t_s"] for each in flown.events if each["kind"] not in OF_TIMELINE]
+        trouble_s = max([trouble_s, *disturbed])
     before = [each for each in flown.events if each["t_s"] <= trouble_s]
     faults = [each for each in before if each["kind"] not in OF_TIMELINE]
     return {
