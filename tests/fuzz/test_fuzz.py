@@ -16,6 +16,7 @@ from worldsim.fuzz.flights import Hangar
 from worldsim.fuzz.folder import SearchFolder, read_finding
 from worldsim.fuzz.pages import curve
 from worldsim.results.exit_status import BAD_INPUT, FAIL
+from worldsim.results.run_folder import RunDirectoryError
 from worldsim.search.drafts import cautions, loaded
 from worldsim.search.trials import Terms
 
@@ -93,13 +94,18 @@ def hangar(folder: Path, stop: StopRequest) -> Hangar:
 def test_the_folder_of_another_search_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = SearchFolder(tmp_path / "it")
-    folder.open({"base": "wedge-9", "guided": False})
-    folder.add({"seed": 3, "violated": []})
-    folder.open({"base": "wedge-9", "guided": False})
-    assert folder.rows() == {3: {"seed": 3, "violated": []}}
+    folder, terms = SearchFolder(tmp_path / "it"), {"base": "wedge-9", "guided": False}
+    with folder.opened(terms):
+        folder.add({"seed": 3, "violated": []})
+        with (
+            pytest.raises(RunDirectoryError, match="another search is at work in it"),
+            SearchFolder(tmp_path / "it").opened(terms),
+        ):
+            pass
+    with folder.opened(terms):
+        assert folder.rows() == {3: {"seed": 3, "violated": []}}
     assert command(["fuzz", "--out", str(tmp_path / "it"), "--random"]) == BAD_INPUT
-    assert "holds another search: controller" not in capsys.readouterr().err
+    assert "holds another search: base is wedge-9 there" in capsys.readouterr().err
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "notes.txt").touch()
     assert command(["fuzz", "--out", str(tmp_path / "full"), "--random"]) == BAD_INPUT

@@ -1,7 +1,9 @@
 """The folder of a search: what it searches, a line for each seed, its findings."""
 
+import fcntl
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,8 +28,12 @@ class SearchFolder:
         self.path = path
         self._seeds = path / SEEDS
 
-    def open(self, terms: Mapping[str, Any]) -> None:
-        """Begin a search of such terms, or go on with it; another search's folder is refused."""
+    @contextmanager
+    def opened(self, terms: Mapping[str, Any]) -> Iterator[None]:
+        """Begin a search of such terms, or go on with it, and keep others out meanwhile.
+
+        The folder of another search is refused, and one in which a search is at work.
+        """
         kept = self.path / SEARCH
         if kept.exists():
             self._check(json.loads(kept.read_text(encoding="utf-8")), terms)
@@ -39,6 +45,13 @@ class SearchFolder:
             except OSError as error:
                 raise unwritable(self.path, error) from error
             write_json(kept, terms)
+        with kept.open("rb") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                detail = "another search is at work in it; wait for it, or choose another --out"
+                raise RunDirectoryError(self.path, detail) from error
+            yield
 
     def _check(self, kept: Mapping[str, Any], terms: Mapping[str, Any]) -> None:
         for name in terms:

@@ -70,8 +70,7 @@ def fuzz(search: Search) -> int:
     Raises RunDirectoryError for the folder of another search, before anything is flown.
     """
     folder, line = SearchFolder(search.folder), ProgressLine(hidden=search.quiet)
-    folder.open(search.described)
-    with stop_requests() as stop:
+    with folder.opened(search.described), stop_requests() as stop:
         hangar = Hangar(search.folder, search.jobs, stop)
         states = refly(search.corpus, hangar, line.update) if search.corpus else {}
         rows = _fly(search, folder, hangar, line)
