@@ -12,6 +12,7 @@ from pathlib import Path
 from time import process_time
 from typing import NamedTuple
 
+from tests.random_flights.properties import properties
 from worldsim.commands.app import command
 from worldsim.search.drafts import accepted
 from worldsim.search.draws import Draw, Tables
@@ -104,6 +105,8 @@ def draft(draw: Draw, steps: int) -> Tables:
             "min_lambda2": draw.number(0.0, made["fleet"]["agents"]),
         }
     made["event"] = repeated_and_ended(draw, made["event"], made["duration_s"])
+    if draw.chance(0.2):
+        made["expect"]["property"] = properties(draw, made)
     return made
 
 
