@@ -155,6 +155,7 @@ def fake_viewer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     program.write_text('#!/bin/sh\n[ "$1" = analytics ] && exit 0\necho $$ >pid\nexec sleep 600\n')
     program.chmod(0o755)
     monkeypatch.setattr(live_view, "viewer_program", lambda **_: str(program))
+    monkeypatch.chdir(tmp_path)  # where it notes that
     return program
 
 
