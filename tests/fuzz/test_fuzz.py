@@ -11,7 +11,7 @@ from netem.wire.shutdown import StopRequest, stop_requests
 from tests.planted_bugs import filter_sign, searched
 from worldsim.commands.app import command
 from worldsim.fuzz.cause import Cause, find_cause
-from worldsim.fuzz.findings import refly
+from worldsim.fuzz.findings import refly, trouble_of
 from worldsim.fuzz.flights import Hangar
 from worldsim.fuzz.folder import SearchFolder, read_finding
 from worldsim.fuzz.pages import curve
@@ -21,6 +21,8 @@ from worldsim.search.drafts import cautions, loaded
 from worldsim.search.trials import Terms
 
 SEEDS = range(2, 3)
+CORPUS = Path(__file__).parent / "corpus"
+"""What is known to fail, each with its cause."""
 HUNTERS = """
 name = "hunters"
 [fleet]
@@ -149,3 +151,20 @@ def test_a_line_that_was_cut_off_is_flown_again(tmp_path: Path) -> None:
 def test_a_curve_shows_its_least_values() -> None:
     assert curve([0.0, 0.5, 1.0]) == "▁▅█"
     assert curve([None, 1.0]) == " ▁"
+
+
+def test_the_trouble_of_a_time_that_runs_out_is_where_progress_ends() -> None:
+    times = [0.0, 1.0, 2.0, 3.0]
+    stands = {"t_s": times, "slot_error_m": [9.0, None, 7.0, 7.0]}
+    assert trouble_of(stands, "converge", 60.0) == 0.0
+    assert trouble_of({**stands, "slot_error_m": [9.0, 8.0, 7.0, 7.0]}, "converge", 60.0) == 1.0
+    assert trouble_of({**stands, "slot_error_m": [0.1, 0.0, 7.0, 3.0]}, "converge", 60.0) == 1.0
+    assert trouble_of({**stands, "first_s": {"I4": 2.5}}, "I4", 60.0) == 2.5
+
+
+def test_the_findings_of_the_corpus_still_fail(tmp_path: Path) -> None:
+    """One that is mended shows as fixed: then it leaves the corpus."""
+    with stop_requests() as stop:
+        states = refly(CORPUS, hangar(tmp_path, stop), lambda _: None)
+    assert states == dict.fromkeys(states, "known")
+    assert len(states) == len(list(CORPUS.iterdir()))

@@ -33,6 +33,8 @@ REPEAT: Final = "repeat"
 """The property for which a scenario is flown twice."""
 BUDGET: Final = 150
 """Flights that shrink one finding at most."""
+POINTS: Final = 240
+"""How many values of each margin a finding keeps at most."""
 EVENTS: Final = 8
 """How many events before the trouble are kept."""
 OF_TIMELINE: Final = ("slot", "queue", "role")
@@ -135,7 +137,7 @@ def explanation(flown: Flown, name: str, duration_s: float) -> Row:
     """Return what a finding's flight tells: its trouble, the events before it, the margins."""
     measured = flown.measured or {}
     trouble_s = trouble_of(measured, name, duration_s)
-    if name == "reform":
+    if name in TIMED:
         disturbed = [each["t_s"] for each in flown.events if each["kind"] not in OF_TIMELINE]
         trouble_s = max([trouble_s, *disturbed])
     before = [each for each in flown.events if each["t_s"] <= trouble_s]
@@ -145,25 +147,37 @@ def explanation(flown: Flown, name: str, duration_s: float) -> Row:
         "trouble_s": trouble_s,
         "last_event": faults[-1] if faults else None,
         "events": before[-EVENTS:],
-        "margins": {name: values for name, values in measured.items() if name != "first_s"},
+        "margins": {name: thinned(rows) for name, rows in measured.items() if name != "first_s"},
         "trace_sha256": flown.trace,
     }
+
+
+def thinned(values: list[float | None]) -> list[float | None]:
+    """Return at most POINTS values over the same time, each the least of its part."""
+    parts = -(-len(values) // POINTS) or 1
+    found: list[float | None] = []
+    for first in range(0, len(values), parts):
+        known = [each for each in values[first : first + parts] if each is not None]
+        found.append(min(known, default=None))
+    return found
 
 
 def trouble_of(measured: Any, name: str, duration_s: float) -> float:
     """Return the first tick of trouble [s]: of the violation, or of the way to it.
 
-    Of a time that runs out it is the tick from which on an agent was never in its slot again.
+    Of a time that runs out it is the last tick in which all agents were in their slots; if they
+    never were, the last in which the farthest agent still came nearer.
     """
     first_s = (measured.get("first_s") or {}).get(name)
     if first_s is not None:
         return float(first_s)
+    if name not in TIMED:
+        return duration_s
     times, errors = measured.get("t_s") or [], measured.get("slot_error_m") or []
-    trouble_s = duration_s if name not in TIMED else 0.0
-    for t_s, error_m in zip(times, errors, strict=True):
-        if name in TIMED and error_m is not None and error_m <= CONVERGED_M:
-            trouble_s = t_s
-    return float(trouble_s)
+    known = [(t_s, each) for t_s, each in zip(times, errors, strict=True) if each is not None]
+    in_place = [t_s for t_s, error_m in known if error_m <= CONVERGED_M]
+    nearer = [t_s for t_s, error_m in known if error_m > known[-1][1] + CONVERGED_M]
+    return float(max(in_place or nearer, default=0.0))
 
 
 def refly(corpus: Path, hangar: Hangar, say: Say) -> dict[str, str]:
