@@ -10,8 +10,7 @@ from agent.codec import decode_observation
 from agent.config import AgentSetup
 from agent.messages import Observation
 from agent.rejection import RejectedError
-from agent.step_page import StepGuard
-from agent.stepping import AgentStepper
+from agent.stepping import AgentStepper, StepNotes
 from netem.wire.bus import Bus
 from netem.wire.frame import BATCH_RING, Delivery, WireError, pack, unpack_delivery
 from netem.wire.latency import LatencyHistogram
@@ -20,11 +19,11 @@ from netem.wire.latency import LatencyHistogram
 class FreeRunningAgent:
     """An agent on wall-clock pace; about once a second it reports how late frames were used."""
 
-    def __init__(self, bus: Bus, setup: AgentSetup, guard: StepGuard | None = None) -> None:
+    def __init__(self, bus: Bus, setup: AgentSetup, notes: StepNotes | None = None) -> None:
         self.inputs = bus.subscriber("observation", setup.id)
         """Each makes the agent step: the newest observation."""
         command, radio = bus.publisher("command", setup.id), bus.publisher("tx", setup.id)
-        self._stepper = AgentStepper(setup, command, radio, guard)
+        self._stepper = AgentStepper(setup, command, radio, notes)
         self._batches = bus.subscriber("rx", setup.id, BATCH_RING)
         self._early: deque[Delivery] = deque(maxlen=BATCH_RING)
         self._incarnation = setup.incarnation

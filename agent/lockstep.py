@@ -7,8 +7,7 @@ from agent.codec import decode_observation
 from agent.config import AgentSetup
 from agent.messages import Observation
 from agent.rejection import RejectedError
-from agent.step_page import StepGuard
-from agent.stepping import AgentStepper
+from agent.stepping import AgentStepper, StepNotes
 from netem.wire.barrier import LOCKSTEP_RING, LockstepError, check_slot
 from netem.wire.bus import Bus
 from netem.wire.frame import Batch, Inbox, WireError, unpack_batch, unpack_inbox
@@ -17,12 +16,12 @@ from netem.wire.frame import Batch, Inbox, WireError, unpack_batch, unpack_inbox
 class LockstepAgent:
     """An agent in lockstep."""
 
-    def __init__(self, bus: Bus, setup: AgentSetup, guard: StepGuard | None = None) -> None:
+    def __init__(self, bus: Bus, setup: AgentSetup, notes: StepNotes | None = None) -> None:
         self.inputs = bus.subscriber("rx", setup.id, LOCKSTEP_RING)
         """Each makes the agent step: an inbox."""
         command = bus.publisher("command", setup.id, lockstep=True)
         radio = bus.publisher("tx", setup.id, lockstep=True)
-        self._stepper = AgentStepper(setup, command, radio, guard)
+        self._stepper = AgentStepper(setup, command, radio, notes)
 
     def observe(self, data: bytes) -> None:
         """Step on an encoded inbox. Raises LockstepError if it, or a part of it, is malformed."""

@@ -15,8 +15,10 @@ import msgspec
 from agent.config import AgentSetup
 from agent.controller import ControllerError, FailedProgramError
 from agent.free_running import FreeRunningAgent
+from agent.input_log import InputLog
 from agent.lockstep import LockstepAgent
 from agent.step_page import StepGuard
+from agent.stepping import StepNotes
 from netem.wire.access import AccessError, login_of
 from netem.wire.barrier import LockstepError
 from netem.wire.bus import Bus, RefusedError
@@ -45,6 +47,16 @@ class Patience(NamedTuple):
 BY_HAND = Patience()
 
 
+class Kept(NamedTuple):
+    """Where an agent's process notes what it does, beside its messages."""
+
+    row: "memoryview[int] | None" = None  # of a StepPage, for its steps
+    inputs: Path | None = None  # folder for a log of all that it is given; None: it keeps none
+
+
+NOTHING_KEPT = Kept()
+
+
 def launched(long_lease: bool) -> Patience:
     """Return the patience of an agent that a launcher ends: it waits while netem is down."""
     return Patience(long_lease, open_within_s=A_DAY_S, silence_s=inf)
@@ -60,18 +72,18 @@ def run(
     connect: str,
     patience: Patience = BY_HAND,
     users: Path | None = None,
-    row: "memoryview[int] | None" = None,
+    kept: Kept = NOTHING_KEPT,
 ) -> int:
     """Fly one agent; print an error in one line to stderr. Returns the exit status.
 
-    row: where the agent notes its steps, of a StepPage.
+    kept: where the agent notes what it does.
     """
     try:
         keys = Keys(run_name)
     except ValueError as error:
         return _failed(agent, error, 2)
     try:
-        return fly(agent, keys, connect, patience, users, row)
+        return fly(agent, keys, connect, patience, users, kept)
     except (WorldGoneError, LockstepError, FailedProgramError) as error:
         return _failed(agent, error, 1)
     except (AccessError, SessionError, RefusedError, ControllerError) as error:
@@ -89,14 +101,14 @@ def fly(
     connect: str,
     patience: Patience = BY_HAND,
     users: Path | None = None,
-    row: "memoryview[int] | None" = None,
+    kept: Kept = NOTHING_KEPT,
 ) -> int:
     """Fly one agent of a run until the run is over; return 0.
 
-    users: the file of passwords, if the router wants one. row: of a StepPage, for this agent's
-    steps. Raises SessionError without a router, AccessError without a password, RefusedError if the
-    world has no such agent, ControllerError if its controller cannot be loaded, WorldGoneError if
-    the world is not there, LockstepError for a message out of turn.
+    users: the file of passwords, if the router wants one. kept: where the agent notes what it does.
+    Raises SessionError without a router, AccessError without a password, RefusedError if the world
+    has no such agent, ControllerError if its controller cannot be loaded, WorldGoneError if the
+    world is not there, LockstepError for a message out of turn.
     """
     login = login_of(users, agent_name(agent)) if users is not None else None
     lease, within_s = patience.long_lease, patience.open_within_s
@@ -105,10 +117,16 @@ def fly(
         bus = Bus(session, keys)
         setup = _setup(bus, agent, keys.run, stop)
         if setup is not None:
-            guard = StepGuard(row, 1.0 / setup.tick_hz)
+            notes = StepNotes(StepGuard(kept.row, 1.0 / setup.tick_hz), _inputs(kept, setup))
             ending = RunEnd(bus.subscriber("over"), stop)
-            _run_shell(bus, setup, guard, ending, patience.silence_s)
+            _run_shell(bus, setup, notes, ending, patience.silence_s)
+            if notes.inputs is not None:
+                notes.inputs.close()
     return 0
+
+
+def _inputs(kept: Kept, setup: AgentSetup) -> InputLog | None:
+    return InputLog(kept.inputs, setup) if kept.inputs is not None else None
 
 
 def _setup(bus: Bus, agent: int, run: str, stop: StopRequest) -> AgentSetup | None:
@@ -141,10 +159,10 @@ def checked_setup(answer: bytes) -> AgentSetup:
 
 
 def _run_shell(
-    bus: Bus, setup: AgentSetup, guard: StepGuard, ending: RunEnd, silence_s: float
+    bus: Bus, setup: AgentSetup, notes: StepNotes, ending: RunEnd, silence_s: float
 ) -> None:
     shell = (
-        LockstepAgent(bus, setup, guard) if setup.lockstep else FreeRunningAgent(bus, setup, guard)
+        LockstepAgent(bus, setup, notes) if setup.lockstep else FreeRunningAgent(bus, setup, notes)
     )
     _wait_for_listener(bus, ending)
     bus.declare_alive(f"agent-{setup.id}")

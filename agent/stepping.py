@@ -2,10 +2,12 @@
 
 import sys
 import time
+from typing import NamedTuple
 
 from agent.codec import encode
 from agent.config import AgentSetup
 from agent.core import Agent
+from agent.input_log import InputLog
 from agent.late_frames import LateFrames
 from agent.messages import Observation
 from agent.step_page import StepGuard
@@ -13,13 +15,22 @@ from netem.wire.bus import Put
 from netem.wire.frame import Batch, Outgoing, Transmission, pack
 
 
+class StepNotes(NamedTuple):
+    """Where an agent's process notes its steps, beside its messages."""
+
+    guard: StepGuard
+    inputs: InputLog | None = None  # gets all that the agent is given
+
+
 class AgentStepper:
     """Runs an agent's core, publishes what it says, and prints its controller's log."""
 
     def __init__(
-        self, setup: AgentSetup, command: Put, radio: Put, guard: StepGuard | None = None
+        self, setup: AgentSetup, command: Put, radio: Put, notes: StepNotes | None = None
     ) -> None:
-        self._guard = guard if guard is not None else StepGuard(None, 1.0 / setup.tick_hz)
+        if notes is None:
+            notes = StepNotes(StepGuard(None, 1.0 / setup.tick_hz))
+        self._guard, self._inputs = notes
         self._guard.enter()
         self.core = Agent(setup)
         self._late = LateFrames() if setup.lockstep else None
@@ -31,6 +42,8 @@ class AgentStepper:
 
     def receive(self, batch: Batch, now_s: float) -> None:
         """Hand the frames of a batch to the core. now_s: Observation time [s]."""
+        if self._inputs is not None:
+            self._inputs.hear(batch.frames)
         for frame in batch.frames:
             self.core.receive(frame.source, frame.channel, frame.payload, now_s)
 
@@ -39,6 +52,8 @@ class AgentStepper:
 
         A step that is to take long does so.
         """
+        if self._inputs is not None:
+            self._inputs.step(observation)
         self._guard.enter()
         outbox = self.core.step(observation)
         self._guard.leave()

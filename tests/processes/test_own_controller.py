@@ -75,7 +75,7 @@ def test_controllers_agree_in_their_own_words_under_each_clock(
     flights = {
         "virtual": ("sim", "--duration", "4"),
         "lockstep": ("run", "--lockstep", "--duration", "4"),
-        "processes": ("run", "--duration", "5"),
+        "processes": ("run", "--duration", "5", "--record-inputs"),
     }
     for name, (kind, *options) in flights.items():
         run = tmp_path / name
@@ -83,7 +83,11 @@ def test_controllers_agree_in_their_own_words_under_each_clock(
         assert fleet.status(40.0) == 0, fleet.text
         assert_agreed(run)
     assert trace_of(tmp_path / "lockstep") == trace_of(tmp_path / "virtual")
-    assert "knows of 9" in (tmp_path / "processes" / "logs" / "agent-4.log").read_text()
+    free = tmp_path / "processes"
+    assert "knows of 9" in (free / "logs" / "agent-4.log").read_text()
+    asked = start(*QSWARM, "replay", str(free), "--agent", "4", "--from", "4")
+    assert asked.status(20.0) == 0, asked.text
+    assert "known = 9\n" in asked.text
 
 
 SLOW = """

@@ -159,7 +159,7 @@ def test_a_free_running_fleet_and_a_folder_without_a_run_are_refused(
     (run / "summary.json").write_text(json.dumps({**summary, "mode": "processes"}))
     capsys.readouterr()
     assert command(["replay", str(run), "--agent", "0"]) == 2
-    assert "run the scenario with --lockstep" in capsys.readouterr().err
+    assert "run it with --record-inputs or --lockstep" in capsys.readouterr().err
     assert command(["replay", str(tmp_path), "--agent", "0"]) == 2
     assert "no scenario.toml in it" in capsys.readouterr().err
 

@@ -149,6 +149,14 @@ LiveWeb = Annotated[
         help="Show it in a browser on this host; prints the address, and one for viewers.",
     ),
 ]
+RecordInputs = Annotated[
+    bool,
+    typer.Option(
+        "--record-inputs",
+        help="Keep all that each agent is given, for `qswarm replay`; in lockstep and virtual time"
+        " it can be made again.",
+    ),
+]
 Verify = Annotated[
     bool,
     typer.Option(

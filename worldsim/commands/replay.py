@@ -41,7 +41,8 @@ def replay(
 ) -> int:
     """Ask one agent's controller again, with all that it sensed in a run.
 
-    A run in virtual time or in lockstep is flown again for that, and its trace compared. Each step
+    A run in virtual time or in lockstep is flown again for that, and its trace compared; one of
+    `qswarm run --record-inputs` has it all in its folder, also free-running. Each step
     shows where the agent was, whom it heard, what it wanted, and what the safety filter made of it.
     """
     from worldsim.replay.replay import ReplayError, replay_of

@@ -19,6 +19,7 @@ from worldsim.commands.options import (
     OnOverload,
     Out,
     Quiet,
+    RecordInputs,
     ScenarioFile,
     ScenarioFiles,
     Seed,
@@ -65,6 +66,7 @@ def run(
     out: Out = None,
     no_recording: NoRecording = False,
     verify: Verify = False,
+    record_inputs: RecordInputs = False,
     live: Live = False,
     live_web: LiveWeb = False,
     quiet: Quiet = False,
@@ -99,7 +101,13 @@ def run(
     shown = live_view_of(live, live_web, no_recording)
     directory = RunDirectory.create(out, loaded)
     terms = RunOptions(
-        loaded.name, speed, not no_recording, lockstep, shards, on_overload=on_overload
+        loaded.name,
+        speed,
+        not no_recording,
+        lockstep,
+        shards,
+        on_overload=on_overload,
+        inputs=record_inputs,
     )
     fly = run_twice if verify else run_once
     return shown.watch(directory.recording, lambda: fly(loaded, directory, terms, output))

@@ -9,6 +9,7 @@ import signal
 import socket
 import time
 from functools import partial
+from pathlib import Path
 
 from netem import process as netem_process
 from netem.wire.access import OPERATOR, AccessControl, write_users
@@ -234,10 +235,18 @@ class Launcher:
             long_lease=self._options.lockstep,
             users=self._directory.users,
             steps=self._steps.page,
+            inputs=self._inputs(),
             counts=self._counts,
             commands=self._scenario.commands,
         )
         return Zygote(self._zygote_end, config).serve()
+
+    def _inputs(self) -> Path | None:
+        """Return the folder in which agents keep what they are given; None where they do not."""
+        if not self._options.inputs:
+            return None
+        self._directory.inputs.mkdir()
+        return self._directory.inputs
 
     def _run_netem(self, shard: int) -> int:
         for end in (self._zygote, self._world, self._world_end):

@@ -41,6 +41,7 @@ class RunOptions(NamedTuple):
     users: Path | None = None  # file of passwords, where the router requires one
     on_overload: OnOverload = "go"  # what is done when ticks are late; not in lockstep
     trace: bool = False  # whether the trace is kept as a file; in lockstep alone
+    inputs: bool = False  # whether agents keep all that they are given
     launched_s: float | None = None  # when the launcher started [s; monotonic clock], if one did
 
     @property

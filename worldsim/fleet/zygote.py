@@ -58,6 +58,7 @@ class AgentProcessConfig(NamedTuple):
     long_lease: bool = False  # a silent agent keeps its session for long (lockstep)
     users: Path | None = None  # file of passwords, where the router requires one
     steps: StepPage | None = None  # where agents note their steps
+    inputs: Path | None = None  # folder where agents keep all that they are given
     counts: IntruderCounts | None = None  # where intruders count their messages
     commands: Mapping[int, tuple[str, ...]] = NO_COMMANDS  # of each foreign agent, by id
 
@@ -227,8 +228,9 @@ class Zygote:
             told = foreign_agent.options_of(agent, config.run, config.endpoint, config.users)
             return foreign_agent.become(agent, command, told)
         row = config.steps.row(agent) if config.steps is not None else None
+        kept = agent_process.Kept(row, config.inputs)
         patience = agent_process.launched(config.long_lease)
-        return agent_process.run(agent, config.run, config.endpoint, patience, config.users, row)
+        return agent_process.run(agent, config.run, config.endpoint, patience, config.users, kept)
 
     def _reap(self, exit_descriptor: int, pid: int) -> None:
         if self._agents[pid].agent in self._config.commands:

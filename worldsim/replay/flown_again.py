@@ -8,8 +8,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from agent.controller import FaultyControllerError
+from agent.input_log import Life
 from worldsim.engine.virtual import VirtualFleet
-from worldsim.replay.inputs import Life, LifeRecorder
+from worldsim.replay.inputs import LifeRecorder
 from worldsim.scenario.tables import Scenario
 
 

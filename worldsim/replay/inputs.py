@@ -1,31 +1,15 @@
-"""What one agent was given in a run: the frames that it heard and its observations, in order."""
+"""What one agent is given in a flight in virtual time, as its processes would keep it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple
 
 from agent.config import AgentSetup
+from agent.input_log import Life, StepInputs
 from agent.messages import Observation
 from netem.wire.frame import Frame
 
 
-class StepInputs(NamedTuple):
-    """What the agent was given before and at one step."""
-
-    frames: tuple[Frame, ...]  # heard since the step before
-    observation: Observation
-
-
-@dataclass(frozen=True, slots=True)
-class Life:
-    """One process of the agent, from its start to its end."""
-
-    setup: AgentSetup
-    steps: list[StepInputs] = field(default_factory=list)
-
-
 class LifeRecorder:
-    """Keeps the lives of one agent of a flight in virtual time; see worldsim.engine.virtual."""
+    """Keeps the lives of one agent of a flight; see worldsim.engine.virtual."""
 
     def __init__(self, agent: int) -> None:
         self.agent = agent
@@ -33,7 +17,7 @@ class LifeRecorder:
 
     def begin(self, setup: AgentSetup) -> None:
         """Note that a process of the agent starts."""
-        self.lives.append(Life(setup))
+        self.lives.append(Life(setup, []))
 
     def step(self, frames: Sequence[Frame], observation: Observation) -> None:
         """Note what the agent is given at a step."""

@@ -5,11 +5,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from agent.input_log import InputLogError, Life, logged_lives
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS, admit
 from worldsim.recording.layout import SUMMARY_FILE
 from worldsim.replay.flown_again import flown_again
-from worldsim.replay.inputs import Life
 from worldsim.replay.steps import Ask, Span, Step, steps
+from worldsim.results.run_folder import INPUTS
 from worldsim.scenario.file import load
 from worldsim.scenario.tables import Scenario
 
@@ -49,16 +50,27 @@ def replay_of(
     if not 0 <= agent < scenario.rows:
         raise ReplayError(f"--agent {agent}: the run has the agents 0 to {scenario.rows - 1}")
     summary = _summary(run / SUMMARY_FILE)
+    recorded = _recorded(run, agent)
+    if recorded:
+        return Replay(scenario, recorded, None)
     mode = summary.get("mode", "virtual")
     if mode not in REPEATABLE:
         raise ReplayError(
             f"{run}: a free-running fleet flies no flight twice, so what agent {agent} was given"
-            " is not known; run the scenario with --lockstep, or in virtual time"
+            " is not known; run it with --record-inputs or --lockstep, or in virtual time"
         )
     again = flown_again(scenario, agent, lambda time_s: on_progress(time_s, scenario.duration_s))
     if not again.lives:
         raise ReplayError(f"{run}: agent {agent} never started")
     return Replay(scenario, again.lives, again.failure or _doubt(summary, again.trace_sha256))
+
+
+def _recorded(run: Path, agent: int) -> list[Life]:
+    """Return what an agent's processes were given, where they kept it."""
+    try:
+        return logged_lives(run / INPUTS, agent)
+    except InputLogError as error:
+        raise ReplayError(str(error)) from error
 
 
 def _doubt(summary: dict[str, Any], trace_sha256: str) -> str | None:

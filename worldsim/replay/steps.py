@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from agent.controller import Controller, Intent, Senses
 from agent.core import Agent
+from agent.input_log import Life
 from agent.messages import Vector
-from worldsim.replay.inputs import Life
 
 Ask = Callable[[Controller, Senses], Intent]
 

@@ -20,6 +20,8 @@ RESERVE = ".reserve"
 RESERVED_B = 128 * 1024
 """Room for a summary [bytes]."""
 Content = TypeVar("Content", bound=Mapping[str, Any])
+INPUTS = "inputs"
+"""The folder of what agents were given, where they kept it; see agent.input_log."""
 USERS = "users"
 """The file of the processes' passwords, there while the run lasts."""
 
@@ -50,6 +52,7 @@ class RunDirectory:
         self.recording = path / RECORDING_FILE
         self.logs = path / "logs"
         self.summary = path / SUMMARY_FILE
+        self.inputs = path / INPUTS
         self._events = path / "events.jsonl"
         self._events_lost = False
         self._appended = self._events
