@@ -407,6 +407,12 @@ class Agent:
         near = [each for each in senses.neighbours[:MAX_HEARD] if _is_sendable(each.position)]
         return tuple([(each.id, each.position) for each in near])
 
+    def _heard(self, now_s: float) -> tuple[int, ...]:
+        """Return the ids of those heard directly: by beacons, or by datagrams where it has none."""
+        if self._services.beacons:
+            return self._neighbours.sorted_ids
+        return self._datagrams.senders(now_s)
+
     def _report(self, senses: Senses, intent: Intent) -> Report | None:
         """Return what the controller has to tell, and count its datagrams; None for nothing."""
         log = self._controller.log(senses.now_s)
@@ -437,7 +443,7 @@ class Agent:
             force=intent.force,
             target=intent.target,
             place=intent.place,
-            heard=self._neighbours.sorted_ids[:MAX_HEARD],
+            heard=self._heard(senses.now_s)[:MAX_HEARD],
             rejected=rejected,
             mission=self._missions.key,
             tier=intent.words.tier,

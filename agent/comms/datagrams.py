@@ -11,6 +11,8 @@ from agent.messages import Datagram
 from agent.rejection import RejectedError
 from netem.wire.channels import CHANNELS, LOCAL, MULTIHOP, Channel
 
+HEARD_S: Final = 2.0
+"""Who sent a datagram within this time is heard [s]."""
 MAX_INBOX: Final = 16
 """Most datagrams of one sender in one step; more of them are rejected as "overflow"."""
 
@@ -26,6 +28,8 @@ class Datagrams:
         self._slack_s = slack_s
         self._multihop = round_period_s < inf
         self._heard: dict[int, list[tuple[Channel, Datagram]]] = {}
+        self._last_s: dict[int, float] = {}
+        """When each agent was heard last [s]."""
 
     def receive(self, source: int, channel: Channel, payload: bytes, now_s: float) -> None:
         """Take a frame that holds a datagram. Raises RejectedError."""
@@ -39,6 +43,13 @@ class Datagrams:
         if len(heard) >= MAX_INBOX:
             raise RejectedError("overflow", f"agent {source} says more than is taken in one step")
         heard.append((channel, datagram))
+        self._last_s[source] = now_s
+
+    def senders(self, now_s: float) -> tuple[int, ...]:
+        """Return the ids of those heard of late, sorted."""
+        for source in [each for each, at_s in self._last_s.items() if now_s - at_s > HEARD_S]:
+            del self._last_s[source]
+        return tuple(sorted(self._last_s))
 
     def take(self, now_s: float) -> tuple[Received, ...]:
         """Return what has come since the last call, sorted by source, channel and stamp."""

@@ -106,6 +106,7 @@ def test_the_inbox_is_heard_once_and_told() -> None:
     assert heard is not None
     assert after is not None
     assert (heard.received, heard.sent, heard.oldest_s) == ((1, 4), (2, 8), 0.05)
+    assert core.step(observation(3)).command.telemetry.heard == (7,)
     assert dict(heard.signals) == {"heard": 1.0, "z": 0.5}
     assert (after.received, after.oldest_s) == ((0, 0), 0.0)
     assert heard.log == ("hears 1",)

@@ -64,11 +64,14 @@ SHOWN = {
 """The layers that each tab's view shows."""
 
 
-def blueprint_of(scenario: Scenario) -> rrb.Blueprint:
-    """Return the viewer's default layout of a scenario's run."""
+def blueprint_of(scenario: Scenario, signals: Sequence[str] = ()) -> rrb.Blueprint:
+    """Return the viewer's default layout of a scenario's run.
+
+    signals: the names of those that controllers state, as far as they are known.
+    """
     forms = scenario.control.controller == FORMING
     tabs = {
-        MOTION: _motion(bool(scenario.obstacle), forms),
+        MOTION: _motion(bool(scenario.obstacle), forms, signals),
         NETWORK: _network(scenario.control.allocation == "assignment", forms),
         STRUCTURE: _structure(),
         FAULTS: _faults(),
@@ -142,7 +145,7 @@ def _page(question: str, plots: Sequence[Plot]) -> rrb.Horizontal:
     return rrb.Horizontal(main, side, column_shares=[9, 5], name=question.capitalize())
 
 
-def _motion(obstacles: bool, forms: bool) -> list[Plot]:
+def _motion(obstacles: bool, forms: bool, signals: Sequence[str]) -> list[Plot]:
     """Return plots of the motion; obstacles: whether there are any; forms: whether slots are."""
     slots = [_series("Distance to own slot [m]", layout.SLOT_ERROR)]
     distance = [_series("Distance to nearest obstacle [m]", layout.OBSTACLE_DISTANCE)]
@@ -150,8 +153,8 @@ def _motion(obstacles: bool, forms: bool) -> list[Plot]:
         _series("Distance to nearest vehicle [m]", layout.SEPARATION),
         *(distance if obstacles else ()),
         *(slots if forms else ()),
+        *_signal_plots(signals),
         rrb.Tabs(
-            *(() if forms else (_signals(),)),
             _series("Control force |u| [m/s]", layout.FORCE),
             _series("Wanted turn [deg], left positive", layout.TURN_DEG),
         ),
@@ -257,14 +260,10 @@ def _event_view(levels: Sequence[str], root: str = "") -> rrb.TextLogView:
     return rrb.TextLogView(origin=root + layout.EVENTS, name=name, columns=columns, rows=listed)
 
 
-def _signals() -> rrb.TimeSeriesView:
-    """Return the curves of all that controllers state of themselves."""
-    return rrb.TimeSeriesView(
-        origin="/",
-        contents=f"{layout.SIGNALS}/**",
-        name="Signals of the controllers",
-        plot_legend=rrb.PlotLegend(visible=True),
-    )
+def _signal_plots(names: Sequence[str]) -> list[Plot]:
+    """Return a tab for each number that controllers state of themselves, where there are any."""
+    shown = [_series(f"Signal {name}", layout.signal_entity(name)) for name in names]
+    return [rrb.Tabs(*shown)] if shown else []
 
 
 def _series(name: str, origin: str, named: bool = False) -> rrb.TimeSeriesView:

@@ -8,6 +8,7 @@ import rerun as rr
 from agent.messages import Report
 from worldsim.judge.tick import Tick
 from worldsim.recording import layout
+from worldsim.recording.agent_colours import AgentColours
 from worldsim.recording.columns import ColumnBlock
 from worldsim.recording.components import SCALARS
 from worldsim.recording.static_entities import SERIES_WIDTH
@@ -15,10 +16,15 @@ from worldsim.scenario.tables import SLOTS_PER_TICK
 
 
 class ControllerColumns:
-    """Makes the columns of one block of ticks after the other; agents: rows of the world."""
+    """Makes the columns of one block of ticks after the other.
 
-    def __init__(self, agents: int) -> None:
-        self._agents = agents
+    agents: rows of the world; colours: those of the agents' curves.
+    """
+
+    def __init__(self, agents: int, colours: AgentColours) -> None:
+        self._agents, self._colours = agents, colours
+        self.known: list[str] = []
+        """The names of the signals so far, in the order in which they came."""
         self._named: set[str] = set()
         """The entities whose series have names."""
         self._told: dict[int, dict[int, Report]] = {}
@@ -34,6 +40,8 @@ class ControllerColumns:
         for name in sorted({name for tick in ticks for name in tick.signals}):
             rows = [row for row, tick in enumerate(ticks) if name in tick.signals]
             values = np.stack([ticks[row].signals[name] for row in rows])
+            if name not in self.known:
+                self.known.append(name)
             entity = layout.signal_entity(name)
             yield from self._names(entity)
             yield ColumnBlock(entity, rows, [SCALARS.rows(values)])
@@ -58,5 +66,6 @@ class ControllerColumns:
         if entity not in self._named:
             self._named.add(entity)
             names = layout.agent_names(self._agents)
-            styles = rr.SeriesLines.columns(names=names, widths=[SERIES_WIDTH] * len(names))
+            widths, colours = [SERIES_WIDTH] * len(names), self._colours.series()
+            styles = rr.SeriesLines.columns(names=names, widths=widths, colors=colours)
             yield ColumnBlock(entity, (), styles.partition([len(names)]))

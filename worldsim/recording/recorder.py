@@ -124,10 +124,11 @@ class RunRecorder:
         self._guidance = GuidanceColumns(scenario) if forms else None
         self._sensing = SensingColumns(scenario)
         self._beliefs = BeliefColumns(scenario.rows)
-        self._controllers = ControllerColumns(scenario.rows)
+        self._controllers = ControllerColumns(scenario.rows, self._colours)
         self._team_view = TeamView(1.0 / tick_hz)
         self._ticks_per_block = max(1, round(tick_hz * BLOCK_S))
         self._blocks_sent = 0
+        self._shown_signals: tuple[str, ...] = ()
         self._seen: list[tuple[Tick, Figures]] = []
         """The ticks whose detail is yet to be sent."""
         self._ticks: list[Tick] = []
@@ -240,6 +241,7 @@ class RunRecorder:
         if self._ticks:
             self._send(self._ticks, self._blocks())
             self._seen.extend(zip(self._ticks, self._figures, strict=True))
+        self._show_signals()
         self._log_formation()
         if self._events:
             self._send_events()
@@ -247,6 +249,13 @@ class RunRecorder:
         if self._blocks_sent % DETAIL_BLOCKS == 0:
             self._send_detail()
         self._flush()
+
+    def _show_signals(self) -> None:
+        """Give each signal a plot of its own, once its name is known."""
+        known = tuple(self._controllers.known)
+        if known != self._shown_signals:
+            self._shown_signals = known
+            self._stream.send_blueprint(blueprint_of(self._scenario, known))
 
     def _send(self, ticks: Sequence[Tick], blocks: Iterator[ColumnBlock]) -> None:
         times = _BlockTimes(ticks)

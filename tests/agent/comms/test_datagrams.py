@@ -3,7 +3,7 @@
 import pytest
 
 from agent.codec import add_checksum, encode, holds_datagram
-from agent.comms.datagrams import MAX_INBOX, Datagrams
+from agent.comms.datagrams import HEARD_S, MAX_INBOX, Datagrams
 from agent.controller import Outgoing
 from agent.messages import DATAGRAM_HEAD_B, MAX_DATAGRAM_B, Datagram
 from agent.rejection import RejectedError
@@ -74,3 +74,12 @@ def test_nothing_is_sent_on_a_multihop_channel_that_is_off() -> None:
     off = Datagrams(SLACK_S, OFF)
     frames = off.frames(1.0, (Outgoing("multihop", b"m"), Outgoing("local", b"l")))
     assert [channel for channel, _ in frames] == [LOCAL]
+
+
+def test_who_sent_of_late_is_heard() -> None:
+    datagrams = Datagrams(SLACK_S, ROUND_S)
+    datagrams.receive(7, LOCAL, said(1.0), 1.0)
+    datagrams.receive(2, MULTIHOP, said(2.0), 2.0)
+    assert datagrams.senders(2.5) == (2, 7)
+    assert datagrams.senders(1.0 + HEARD_S + 0.1) == (2,)
+    assert datagrams.senders(2.0 + HEARD_S + 0.1) == ()
