@@ -38,8 +38,6 @@ MAX_SETUP_B = 256 * 1024
 class Patience(NamedTuple):
     """How long an agent waits for others that are silent."""
 
-    long_lease: bool = False
-    """Whether its session survives a long pause of its own process."""
     open_within_s: float = OPEN_TIMEOUT_S
     silence_s: float = SILENCE_S
 
@@ -57,9 +55,8 @@ class Kept(NamedTuple):
 NOTHING_KEPT = Kept()
 
 
-def launched(long_lease: bool) -> Patience:
-    """Return the patience of an agent that a launcher ends: it waits while netem is down."""
-    return Patience(long_lease, open_within_s=A_DAY_S, silence_s=inf)
+LAUNCHED = Patience(open_within_s=A_DAY_S, silence_s=inf)
+"""Of an agent that a launcher ends: it waits while netem is down."""
 
 
 class WorldGoneError(RuntimeError):
@@ -111,8 +108,7 @@ def fly(
     world is not there, LockstepError for a message out of turn.
     """
     login = login_of(users, agent_name(agent)) if users is not None else None
-    lease, within_s = patience.long_lease, patience.open_within_s
-    with open_client(connect, within_s, long_lease=lease, login=login) as session:
+    with open_client(connect, patience.open_within_s, login=login) as session:
         stop = StopRequest()
         bus = Bus(session, keys)
         setup = _setup(bus, agent, keys.run, stop)

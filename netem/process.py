@@ -41,8 +41,6 @@ class SilenceError(RuntimeError):
 class ServingOptions(NamedTuple):
     """How a medium treats other processes that are silent."""
 
-    long_lease: bool = False
-    """Whether it keeps the sessions of those that are silent for long."""
     patient: bool = False
     """Whether it waits for the world without end: a launcher ends it."""
 
@@ -135,7 +133,7 @@ def serve(
     Raises SessionError when it cannot listen or connect, AccessError without a password,
     SilenceError when the world is gone, LockstepError when a message is missing or of another slot.
     """
-    with _opened(endpoint, shard, options.long_lease, access) as session:
+    with _opened(endpoint, shard, access) as session:
         stop = StopRequest()
         state = "is connected to" if shard else "listens at"
         print(f"{medium_name(shard)} {state} {endpoint}, for one run", flush=True)
@@ -151,13 +149,11 @@ def serve(
     return 0
 
 
-def _opened(
-    endpoint: str, shard: int, long_lease: bool, access: AccessControl | None
-) -> zenoh.Session:
+def _opened(endpoint: str, shard: int, access: AccessControl | None) -> zenoh.Session:
     if not shard:
-        return open_router(endpoint, long_lease, access)
+        return open_router(endpoint, access)
     login = access.login(medium_name(shard)) if access is not None else None
-    return open_client(endpoint, long_lease=long_lease, login=login)
+    return open_client(endpoint, login=login)
 
 
 def _serve_run(

@@ -16,8 +16,10 @@ from netem.wire.connections import HANDSHAKE_WITHIN_S, MAX_PENDING, MAX_SESSIONS
 
 OPEN_TIMEOUT_S = 8.0
 MAX_MESSAGE_B = 4 * 1024 * 1024
-LONG_LEASE_S = 24 * 3600
-"""Lease of a session in lockstep: a process that is paused sends no keep-alives for so long."""
+LEASE_S = 24 * 3600
+"""Lease of a session: a process that is paused sends no keep-alives for so long. A process that has
+ended closes its socket, which is noticed at once. Where the lease of a paused one runs out, Zenoh's
+router waits for room in its full socket, and forwards nothing to anybody until it continues."""
 
 _RUNTIMES = ("acc", "net", "rx", "tx")
 """What Zenoh calls its groups of threads, beside that of the application."""
@@ -35,18 +37,15 @@ class SessionError(RuntimeError):
     """A session could not be opened; the text says why in one line."""
 
 
-def open_router(
-    listen: str, long_lease: bool = False, access: AccessControl | None = None
-) -> zenoh.Session:
+def open_router(listen: str, access: AccessControl | None = None) -> zenoh.Session:
     """Open this host's router at ``listen``, for example ``tcp/127.0.0.1:7447``.
 
-    long_lease: keep sessions of processes that are silent for long. access: None allows every
-    process everything. Raises :class:`SessionError` when the endpoint is malformed, not loopback or
-    in use.
+    access: None allows every process everything. Raises :class:`SessionError` when the endpoint is
+    malformed, not loopback or in use.
     """
     _refuse_all_but_loopback(listen)
     try:
-        return _open(router_config(listen, long_lease, access), ROUTER_THREADS)
+        return _open(router_config(listen, access), ROUTER_THREADS)
     except zenoh.ZError as error:
         raise SessionError(f"{listen}: {_cause(error)}") from error
 
@@ -54,17 +53,16 @@ def open_router(
 def open_client(
     connect: str,
     timeout_s: float = OPEN_TIMEOUT_S,
-    long_lease: bool = False,
     login: Login | None = None,
 ) -> zenoh.Session:
     """Open a client of the router at ``connect``; later the client reconnects by itself.
 
-    long_lease: keep the session though this process is silent for long. login: for a router with
-    access control. Raises :class:`SessionError` when no router answers within ``timeout_s`` [s].
+    login: for a router with access control. Raises :class:`SessionError` when no router answers
+    within ``timeout_s`` [s].
     """
     _address(connect)
     try:
-        return _open(client_config(connect, timeout_s, long_lease, login), CLIENT_THREADS)
+        return _open(client_config(connect, timeout_s, login), CLIENT_THREADS)
     except zenoh.ZError as error:
         raise SessionError(f"no router answers at {connect} within {timeout_s:g} s") from error
 
@@ -85,9 +83,7 @@ def _open(config: zenoh.Config, threads: str) -> zenoh.Session:
         raise SessionError(f"Zenoh cannot start: {' '.join(str(error).split())}") from error
 
 
-def router_config(
-    listen: str, long_lease: bool = False, access: AccessControl | None = None
-) -> zenoh.Config:
+def router_config(listen: str, access: AccessControl | None = None) -> zenoh.Config:
     """Return the configuration of a router that listens at one endpoint."""
     router: dict[str, Any] = {
         "mode": "router",
@@ -100,16 +96,14 @@ def router_config(
         "accept_timeout": round(1000 * HANDSHAKE_WITHIN_S),
     }
     if access is None:
-        return _config(router, long_lease, {}, limits)
+        return _config(router, {}, limits)
     # Zenoh wants a user name of a router, too, though the router connects to nothing.
     passwords = {"user": "router", "password": "", "dictionary_file": str(access.users)}
     own = router | {"access_control": access.config()}
-    return _config(own, long_lease, passwords, limits)
+    return _config(own, passwords, limits)
 
 
-def client_config(
-    connect: str, timeout_s: float, long_lease: bool = False, login: Login | None = None
-) -> zenoh.Config:
+def client_config(connect: str, timeout_s: float, login: Login | None = None) -> zenoh.Config:
     """Return the configuration of a client, which listens at no endpoint."""
     retry = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2}
     return _config(
@@ -123,23 +117,21 @@ def client_config(
                 "retry": retry,
             },
         },
-        long_lease,
         login._asdict() if login is not None else {},
     )
 
 
 def _config(
     own: dict[str, Any],
-    long_lease: bool,
     passwords: dict[str, str],
     limits: dict[str, int] | None = None,
 ) -> zenoh.Config:
-    lease = {"tx": {"lease": LONG_LEASE_S * 1000}} if long_lease else {}
+    link = {"rx": {"max_message_size": MAX_MESSAGE_B}, "tx": {"lease": LEASE_S * 1000}}
     common = {
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "adminspace": {"enabled": False},
         "transport": {
-            "link": {"rx": {"max_message_size": MAX_MESSAGE_B}, **lease},
+            "link": link,
             "shared_memory": {"enabled": False},
             **({"unicast": limits} if limits else {}),
             **({"auth": {"usrpwd": passwords}} if passwords else {}),

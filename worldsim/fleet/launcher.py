@@ -232,7 +232,6 @@ class Launcher:
             self._options.run,
             self._endpoint,
             self._directory.logs,
-            long_lease=self._options.lockstep,
             users=self._directory.users,
             steps=self._steps.page,
             inputs=self._inputs(),
@@ -251,7 +250,7 @@ class Launcher:
     def _run_netem(self, shard: int) -> int:
         for end in (self._zygote, self._world, self._world_end):
             end.close()
-        options = netem_process.ServingOptions(self._options.lockstep, patient=True)
+        options = netem_process.ServingOptions(patient=True)
         return netem_process.run(self._endpoint, shard, options, self._access)
 
     def _run_world(self) -> int:

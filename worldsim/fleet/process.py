@@ -63,7 +63,7 @@ def run(
     """
     try:
         login = login_of(options.users, "world") if options.users is not None else None
-        with open_client(connect, long_lease=options.lockstep, login=login) as session:
+        with open_client(connect, login=login) as session:
             return conduct(session, scenario, directory(), options, link_of)
     except (AccessError, SessionError, StartupError, RunDirectoryError) as error:
         print(f"world: {error}", file=sys.stderr)

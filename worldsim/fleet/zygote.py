@@ -55,7 +55,6 @@ class AgentProcessConfig(NamedTuple):
     run: str  # name of the run
     endpoint: str  # of the Zenoh router
     logs: Path  # folder of the log files
-    long_lease: bool = False  # a silent agent keeps its session for long (lockstep)
     users: Path | None = None  # file of passwords, where the router requires one
     steps: StepPage | None = None  # where agents note their steps
     inputs: Path | None = None  # folder where agents keep all that they are given
@@ -229,7 +228,7 @@ class Zygote:
             return foreign_agent.become(agent, command, told)
         row = config.steps.row(agent) if config.steps is not None else None
         kept = agent_process.Kept(row, config.inputs)
-        patience = agent_process.launched(config.long_lease)
+        patience = agent_process.LAUNCHED
         return agent_process.run(agent, config.run, config.endpoint, patience, config.users, kept)
 
     def _reap(self, exit_descriptor: int, pid: int) -> None:
