@@ -3,7 +3,8 @@
 import signal
 import traceback
 from collections.abc import Iterable, Mapping
-from math import isfinite
+from math import inf, isfinite
+from operator import index
 from re import fullmatch
 from typing import Final
 
@@ -19,6 +20,7 @@ from agent.controller import (
     Intent,
     Outgoing,
     Senses,
+    Words,
     load,
 )
 from agent.controller_log import Logging, LogLimiter
@@ -31,17 +33,21 @@ from agent.messages import (
     MAX_SIGNALS,
     MAX_SPEED_MPS,
     SIGNAL_NAME,
+    Place,
     Vector,
 )
 from agent.parameters import made
 from netem.compiled import UnloadableError
 from netem.wire.channels import CHANNELS
 
+MAX_INDEX: Final = 2**15
+"""Queues and ranks are below it."""
 NUMBERS: Final = 13
 """Numbers in an intent besides its target: three vectors, two tilt angles, yaw and force."""
 SMALL = min(MAX_SPEED_MPS, MAX_ANGLE_RAD)
 """Numbers whose absolute values add up to no more than this are within every bound."""
 
+MESSAGE_FIELDS: Final = 2
 MAX_DATAGRAMS: Final = 8
 """Most datagrams that a controller sends in one tick."""
 
@@ -69,6 +75,8 @@ class CheckedController:
         except BaseException as error:
             raise self._fault("in its constructor", error) from error
         self._decide = decide
+        self._stated: set[str] = set()
+        """The names of the signals so far."""
         logs = isinstance(self._controller, Logging)
         self._limiter = LogLimiter() if logs else None
 
@@ -76,12 +84,24 @@ class CheckedController:
         """Return the controller's intent, in plain floats within the bounds of a command."""
         try:
             if self._decide is not None:
-                return plain(self._decide(self._controller, senses))
-            return plain(self._controller.decide(senses))
+                intent = plain(self._decide(self._controller, senses))
+            else:
+                intent = plain(self._controller.decide(senses))
+            if intent.signals:
+                self._note_signals(intent.signals)
         except ProgramError as error:
             raise self._program_fault(f"at {senses.now_s:g} s", error) from None
         except BaseException as error:
             raise self._fault(f"at {senses.now_s:g} s", error) from error
+        return intent
+
+    def _note_signals(self, signals: Mapping[str, float]) -> None:
+        """Raise ValueError where the controller has stated too many different signals."""
+        self._stated.update(signals)
+        if len(self._stated) > MAX_SIGNALS:
+            named = ", ".join(sorted(self._stated)[:MAX_SIGNALS])
+            detail = f"{len(self._stated)} different signals so far, {named} ..."
+            raise ValueError(f"{detail}; at most {MAX_SIGNALS} are allowed in all")
 
     def log(self, now_s: float) -> tuple[str, ...]:
         """Return the lines that the controller has written, no more than may be told now."""
@@ -129,6 +149,8 @@ def plain(intent: Intent) -> Intent:
         intent = replace(
             intent, messages=_messages(intent.messages), signals=_signals(intent.signals)
         )
+    if not _claims_soundly(intent):
+        intent = _with_sound_claims(intent)
     numbers = (
         *intent.wanted,
         *intent.velocity,
@@ -141,7 +163,38 @@ def plain(intent: Intent) -> Intent:
     total = sum(map(abs, (*numbers, *target)))
     # The fast path, nearly always taken: one sum shows that all are plain, finite and small.
     sound = type(total) is float and total <= SMALL and intent.force >= 0.0
-    return intent if sound and len(numbers) == NUMBERS else _converted(intent)
+    tuples = type(intent.wanted) is type(intent.velocity) is type(intent.heading_for) is tuple
+    return intent if sound and tuples and len(numbers) == NUMBERS else _converted(intent)
+
+
+def _claims_soundly(intent: Intent) -> bool:
+    """Return whether an intent's claim is of the right types and bounds."""
+    place = intent.place
+    placed = place is None or (
+        type(place) is Place and 0 <= place.queue < MAX_INDEX and 0 <= place.rank < MAX_INDEX
+    )
+    return placed and 0.0 <= intent.cost_m < inf and type(intent.words) is Words
+
+
+def _with_sound_claims(intent: Intent) -> Intent:
+    """Return an intent with its claim in the right types. Raises ValueError or TypeError."""
+    if not isinstance(intent.words, Words):
+        raise TypeError(f"the Intent's words are {type(intent.words).__name__}, no Words")
+    cost_m = float(intent.cost_m)
+    if not 0.0 <= cost_m < inf:
+        raise ValueError(f"the Intent's cost_m is {cost_m:g}; it is a distance, at least 0")
+    place = None if intent.place is None else _place(intent.place)
+    return replace(intent, cost_m=cost_m, place=place, words=Words(*intent.words))
+
+
+def _place(given: Iterable[int]) -> Place:
+    try:
+        queue, rank = (index(each) for each in given)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"the Intent's place is {given!r:.80}, no queue and rank") from error
+    if not (0 <= queue < MAX_INDEX and 0 <= rank < MAX_INDEX):
+        raise ValueError(f"the Intent's place is {given!r:.80}; at most {MAX_INDEX - 1} each")
+    return Place(queue, rank)
 
 
 def _converted(intent: Intent) -> Intent:
@@ -162,22 +215,29 @@ def _converted(intent: Intent) -> Intent:
 
 def _messages(given: Iterable[Outgoing]) -> tuple[Outgoing, ...]:
     """Return an intent's messages as bytes on a known channel; others' buffers are copied."""
-    messages = []
-    for channel, data in given:
+    messages: list[Outgoing] = []
+    for each in given:
+        if not isinstance(each, tuple | list) or len(each) != MESSAGE_FIELDS:
+            raise TypeError(f"{each!r:.80} among the Intent's messages is no Outgoing")
+        channel, data = each
         if channel not in CHANNELS:
             raise ValueError(f"the channel {channel!r} of a message is none of {CHANNELS}")
         if not isinstance(data, bytes | bytearray | memoryview):
             raise TypeError(f"a message holds {type(data).__name__}, not bytes")
-        if len(data) > MAX_DATAGRAM_B:
-            raise ValueError(f"a message has {len(data)} B; at most {MAX_DATAGRAM_B} B are allowed")
-        messages.append(Outgoing(channel, bytes(data)))
-    if len(messages) > MAX_DATAGRAMS:
-        raise ValueError(f"{len(messages)} messages in one tick; at most {MAX_DATAGRAMS}")
+        plain_data = bytes(data)  # a memoryview counts items, which may be longer
+        if len(plain_data) > MAX_DATAGRAM_B:
+            detail = f"{len(plain_data)} B; at most {MAX_DATAGRAM_B} B are allowed"
+            raise ValueError(f"a message has {detail}")
+        if len(messages) == MAX_DATAGRAMS:
+            raise ValueError(f"more than {MAX_DATAGRAMS} messages in one tick")
+        messages.append(Outgoing(CHANNELS[CHANNELS.index(channel)], plain_data))
     return tuple(messages)
 
 
 def _signals(given: Mapping[str, float]) -> dict[str, float]:
     """Return an intent's signals as plain floats by name."""
+    if not isinstance(given, Mapping):
+        raise TypeError(f"the Intent's signals are {type(given).__name__}, no mapping of names")
     if len(given) > MAX_SIGNALS:
         raise ValueError(f"{len(given)} signals; at most {MAX_SIGNALS} are allowed")
     signals = {}
@@ -185,11 +245,20 @@ def _signals(given: Mapping[str, float]) -> dict[str, float]:
         if not isinstance(name, str) or fullmatch(SIGNAL_NAME, name) is None:
             detail = "lower-case letters, digits and _, at most 32, a letter first"
             raise ValueError(f"{name!r} is no name of a signal: {detail}")
-        number = float(value)
-        if not isfinite(number) or abs(number) > MAX_SIGNAL:
-            raise ValueError(f"the signal {name!r} is {number:g}; at most {MAX_SIGNAL:g}")
-        signals[name] = number
+        signals[str.__str__(name)] = _signal(name, value)
     return signals
+
+
+def _signal(name: str, value: object) -> float:
+    if isinstance(value, str | bytes):
+        raise TypeError(f"the signal {name!r} is {value!r:.40}, no number")
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"the signal {name!r} is no number: {error}") from error
+    if not isfinite(number) or abs(number) > MAX_SIGNAL:
+        raise ValueError(f"the signal {name!r} is {number:g}; at most {MAX_SIGNAL:g}")
+    return number
 
 
 def _vector(name: str, given: Iterable[float], bound: float) -> Vector:

@@ -23,7 +23,7 @@ class Logging:
         if "_log_lines" not in self.__dict__:
             self._log_lines = []
         if len(self._log_lines) <= LINES_PER_S:  # the limiter counts no more of one tick
-            self._log_lines.append(" ".join(map(str, values)))
+            self._log_lines.append(" ".join(map(str, values))[:MAX_LOG_CHARACTERS])
 
     def take_log(self) -> list[str]:
         """Return the lines written since the last call."""
@@ -61,4 +61,6 @@ class LogLimiter:
 
 
 def _one_line(text: str) -> str:
-    return " ".join(text.splitlines())[:MAX_LOG_CHARACTERS]
+    """Return a text in one line that any file can hold."""
+    line = " ".join(str(text).splitlines())[:MAX_LOG_CHARACTERS]
+    return line.encode("utf-8", "replace").decode("utf-8")

@@ -39,6 +39,7 @@ class Life(NamedTuple):
 
     setup: AgentSetup
     steps: list[StepInputs]
+    cut: bool = False  # whether its log ends amid a step
 
 
 def log_path(folder: Path, agent: int, incarnation: int) -> Path:
@@ -93,7 +94,8 @@ def _life(file: Path) -> Life:
             )
             values = _values(unpacker)
             setup = msgspec.json.decode(msgspec.convert(next(values, b""), bytes), type=AgentSetup)
-            return Life(setup, list(_steps(values)))
+            steps = list(_steps(values))
+            return Life(setup, steps, cut=unpacker.tell() < file.stat().st_size)
     except (OSError, ValueError, TypeError, RejectedError, msgspec.MsgspecError) as error:
         raise InputLogError(f"{file}: no log of inputs: {error}") from error
 

@@ -212,7 +212,13 @@ MAX_SIGNALS: Final = 16
 MAX_SIGNAL: Final = 1e12
 """Largest absolute value of a signal."""
 SIGNAL_NAME: Final = "^[a-z][a-z0-9_]{0,31}$"
-SignalName = Annotated[str, Meta(pattern=SIGNAL_NAME)]
+SignalName = Annotated[
+    str,
+    Meta(
+        pattern=SIGNAL_NAME,
+        description="a name of lower-case letters, digits and '_', at most 32, a letter first",
+    ),
+]
 Signal = Annotated[float, Meta(ge=-MAX_SIGNAL, le=MAX_SIGNAL)]
 MAX_LOG_LINES: Final = 4
 """Most log lines in one telemetry."""

@@ -29,7 +29,7 @@ def test_it_comes_back_as_it_was_written(tmp_path: Path) -> None:
     InputLog(tmp_path, replace(AGENT_SETUP, incarnation=1)).close()
     first, second = logged_lives(tmp_path, 0)
     assert first.setup == AGENT_SETUP
-    assert first.steps == kept
+    assert (first.steps, first.cut) == (kept, False)
     assert (second.setup.incarnation, second.steps) == (1, [])
     assert logged_lives(tmp_path, 5) == []
 
@@ -40,7 +40,8 @@ def test_what_a_killed_process_left_is_read_to_its_last_whole_step(tmp_path: Pat
     whole = file.read_bytes()
     for cut in (1, 20):
         file.write_bytes(whole[:-cut])
-        assert logged_lives(tmp_path, 0)[0].steps == kept[:-1]
+        (life,) = logged_lives(tmp_path, 0)
+        assert (life.steps, life.cut) == (kept[:-1], True)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """A controller's own words, signals, log, services and filter modes, at the core and its check."""
 
+from array import array
 from math import inf, nan
 from typing import Any
 
@@ -9,10 +10,10 @@ from msgspec.structs import replace
 from agent.checked_controller import MAX_DATAGRAMS, plain
 from agent.codec import add_checksum, decode_beacon, decode_command, encode, holds_datagram
 from agent.config import AgentSetup, Control, Vehicle
-from agent.controller import ControllerError, Intent, Outgoing, Senses
+from agent.controller import ControllerError, FaultyControllerError, Intent, Outgoing, Senses
 from agent.controller_log import LINES_PER_S, Logging, LogLimiter
 from agent.core import Agent
-from agent.messages import MAX_DATAGRAM_B, MAX_LOG_LINES, MAX_SIGNALS, Datagram
+from agent.messages import MAX_DATAGRAM_B, MAX_LOG_LINES, MAX_SIGNALS, Datagram, Place
 from agent.services import SERVICES, Services, ServicesError, services_of
 from netem.wire.channels import LOCAL, MULTIHOP
 from tests.agent.comms.builders import beacon
@@ -140,7 +141,17 @@ def test_a_datagram_of_the_future_contradicts_the_clock_as_a_beacon_does() -> No
         ({"signals": {"Über": 1.0}}, "no name of a signal"),
         ({"signals": {"x": nan}}, "'x' is nan"),
         ({"signals": {"x": inf}}, "'x' is inf"),
-        ({"signals": {"x": "much"}}, "could not convert"),
+        ({"signals": {"x": "2.5"}}, "'x' is '2.5', no number"),
+        ({"signals": {"x": 10**400}}, "'x' is no number"),
+        ({"signals": [1.0]}, "list, no mapping"),
+        ({"messages": (("local", memoryview(array("d", [1.0] * 1000))),)}, "8000 B"),
+        ({"messages": Outgoing("local", b"")}, "is no Outgoing"),
+        ({"messages": (Outgoing("local", b"") for _ in iter(int, 1))}, "more than 8 messages"),
+        ({"place": (0, 0, 0)}, "place is .* no queue and rank"),
+        ({"place": "Q1"}, "place is 'Q1'"),
+        ({"place": Place(10**30, 0)}, "at most 32767"),
+        ({"cost_m": nan}, "cost_m is nan"),
+        ({"words": None}, "no Words"),
         ({"signals": {f"s{k}": 0.0 for k in range(MAX_SIGNALS + 1)}}, "signals; at most"),
     ],
 )
@@ -154,6 +165,26 @@ def test_words_and_signals_become_plain() -> None:
     assert plain(given).messages == (Outgoing("local", b"x"),)
     assert plain(given).signals == {"n": 3.0}
 
+    class Name(str):
+        __slots__ = ()
+
+    named = plain(replace(HOVER, signals={Name("n"): 1}, messages=((Name("local"), b""),)))  # type: ignore[arg-type]
+    assert type(next(iter(named.signals))) is type(named.messages[0].channel) is str
+    listed = plain(replace(HOVER, velocity=[0.1, 0, 0], place=[1, 2]))  # type: ignore[arg-type]
+    assert (listed.velocity, listed.place) == ((0.1, 0.0, 0.0), Place(1, 2))
+
+
+class Inventive(Chatty):
+    def decide(self, senses: Senses) -> Intent:
+        return replace(HOVER, signals={f"s{round(20 * senses.now_s)}": 1.0})
+
+
+def test_the_names_of_all_signals_are_bounded() -> None:
+    core = agent(Inventive)
+    with pytest.raises(FaultyControllerError, match="17 different signals so far, s0, s1"):
+        for tick in range(MAX_SIGNALS + 1):
+            core.step(observation(tick))
+
 
 def test_a_log_is_limited_each_second_and_says_what_it_left_out() -> None:
     limiter = LogLimiter()
@@ -161,6 +192,7 @@ def test_a_log_is_limited_each_second_and_says_what_it_left_out() -> None:
     assert all(len(each) <= MAX_LOG_LINES for each in told)
     assert sum(map(len, told)) == LINES_PER_S
     assert told[0][0] == "line 0 more"
+    assert LogLimiter().limited(["\ud800 lone"], 0.0) == ("? lone",)
     assert limiter.limited([], 1.0) == (f"({9 * 20 - LINES_PER_S} lines left out: 10 a second)",)
     assert limiter.limited(["again"], 1.05) == ("again",)
 

@@ -86,9 +86,16 @@ def test_always_names_the_worst_value_of_any_agent_at_any_tick() -> None:
 
 
 def test_a_signal_that_nobody_states_is_not_judged() -> None:
-    judge = judged(ticks_of(steady(1.0, 1.0, 1.0)), Property(signal="y", at_most=1.0))
-    assert judge.expectations()[-1].held is None
-    assert judge.shortcomings().unjudged == ["always y <= 1"]
+    for must in ("always", "eventually", "settle"):
+        wanted = Property(signal="y", at_most=1.0, must=must)  # type: ignore[arg-type]
+        judge = judged(ticks_of(steady(1.0, 1.0, 1.0)), wanted)
+        assert judge.expectations()[-1].held is None
+        assert judge.shortcomings().unjudged == [f"{must} y <= 1"]
+
+
+def test_a_limit_beyond_the_end_of_the_run_is_not_missed() -> None:
+    wanted = Property(signal="x", at_least=1.0, must="eventually", within_s=50.0)
+    assert found(ticks_of(steady(0.0, 0.0, 0.0)), wanted).held is None
 
 
 @pytest.mark.parametrize(
@@ -100,6 +107,7 @@ def test_a_signal_that_nobody_states_is_not_judged() -> None:
         (None, 2.5, None, None),
         (2.0, 2.5, None, False),
         (4.0, 2.5, None, None),
+        (50.0, 2.9, None, None),
     ],
 )
 def test_eventually_is_timed(
@@ -223,6 +231,7 @@ def test_the_judges_own_figures_are_those_of_the_truth() -> None:
         ('signal = "x"\nat_most = 1\ncounted = "after"', "has no event"),
         ('signal = "x"\nat_most = 1\nwhere = [{ signal = "y" }]', r"where\[0\]: needs a bound"),
         ('signal = "x"\nat_most = nan', r"property\[0\].at_most"),
+        ('signal = "x"\nat_most = 1\n[[expect.property]]\nsignal = "x"\nat_most = 1', "called"),
     ],
 )
 def test_a_property_that_makes_no_sense_is_refused_by_its_key(given: str, why: str) -> None:
@@ -245,5 +254,5 @@ def test_each_is_told_in_words() -> None:
     assert expectation_texts(rows, Circumstances(END_S, (), ())) == [
         "always x <= 0.5: at worst 1 (required <= 0.5; margin -0.5)",
         "agreed: from 0 s on (required within 4 s; margin 4 s)",
-        "x >= 9 at last: never, or not for long enough (required by the end)",
+        "x >= 9, once at least: never, or not to the end (required by the end)",
     ]

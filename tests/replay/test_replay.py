@@ -137,9 +137,10 @@ def test_a_run_that_flies_otherwise_today_is_doubted(
     ("arguments", "why"),
     [
         (["--agent", "7"], "the run has the agents 0 to 1"),
-        (["--agent", "0", "--from", "50"], "no step from 50 s on"),
+        (["--agent", "0", "--from", "50"], "no step from 50 s: none comes later"),
         (["--agent", "0", "--from", "1", "--to", "0.5"], "is before --from"),
         (["--agent", "0", "--from", "nan"], "nan"),
+        (["--agent", "1", "--from", "0.52", "--to", "0.53"], "the next is at 0.562 s"),
     ],
 )
 def test_what_cannot_be_replayed_is_refused(

@@ -24,6 +24,7 @@ def test_numbers_are_numbers_and_flags_are_not() -> None:
         ("netem.loss_percent=1,,2", "has no value, or an empty one"),
         ("netem.loss_percent=50,0,50.0", "has the value 50.0 twice"),
         ("seed=1,2", "is varied by --seeds"),
+        ("name=a,b", "changes no flight"),
     ],
 )
 def test_what_is_no_axis_is_refused(text: str, says: str) -> None:

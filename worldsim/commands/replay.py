@@ -91,6 +91,9 @@ def _show(found: "Replay", span: "Span", pdb: bool, json: bool) -> int:
         complain(str(error))
         return FAIL
     if shown == 0:
-        complain(f"no step from {span.from_s:g} s on: the agent did not fly then")
+        next_s = found.next_step_s(span.from_s)
+        later = "none comes later" if next_s is None else f"the next is at {next_s:.3f} s"
+        until = "" if span.to_s == inf else f" to {span.to_s:g} s"
+        complain(f"the agent has no step from {span.from_s:g} s{until}: {later}")
         return BAD_INPUT
     return PASS

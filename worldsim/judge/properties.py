@@ -135,10 +135,11 @@ class PropertyMonitor:
         held: bool | None
         if got_s is not None:
             held = within_s is None or got_s <= within_s
-        elif at_s is not None or not (whole or self._is_late(ended_s)):
-            held = None
+        elif self._worst is None or at_s is not None:
+            held = None  # nobody stated it at a tick that counts, or it has still to last
         else:
-            held = False
+            too_late = whole if within_s is None else self._is_late(ended_s)
+            held = False if too_late else None
         return Expectation(name=self._name, wanted=within_s, got=got_s, held=held)
 
     def _is_late(self, time_s: float) -> bool:

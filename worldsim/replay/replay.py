@@ -30,6 +30,11 @@ class Replay(NamedTuple):
     doubt: str | None
     """Why it may not be what happened in the run, or ends early; None: it is."""
 
+    def next_step_s(self, from_s: float) -> float | None:
+        """Return the time of the agent's first step from a time on [s]; None: it has none."""
+        times_s = (each.observation.time_s for life in self.lives for each in life.steps)
+        return next((time_s for time_s in times_s if time_s >= from_s), None)
+
     def steps(self, span: Span, ask: Ask | None = None) -> Iterator[Step]:
         """Yield the steps of a span; see worldsim.replay.steps."""
         return steps(self.lives, span, ask)
@@ -52,7 +57,7 @@ def replay_of(
     summary = _summary(run / SUMMARY_FILE)
     recorded = _recorded(run, agent)
     if recorded:
-        return Replay(scenario, recorded, None)
+        return Replay(scenario, recorded, _cut(recorded))
     mode = summary.get("mode", "virtual")
     if mode not in REPEATABLE:
         raise ReplayError(
@@ -71,6 +76,15 @@ def _recorded(run: Path, agent: int) -> list[Life]:
         return logged_lives(run / INPUTS, agent)
     except InputLogError as error:
         raise ReplayError(str(error)) from error
+
+
+def _cut(lives: list[Life]) -> str | None:
+    """Return where the log of a process is cut off; None where all are whole."""
+    for life in lives:
+        if life.cut:
+            end_s = life.steps[-1].observation.time_s if life.steps else 0.0
+            return f"what process {life.setup.incarnation} was given is cut off after {end_s:.3f} s"
+    return None
 
 
 def _doubt(summary: dict[str, Any], trace_sha256: str) -> str | None:

@@ -12,6 +12,7 @@ STARTS = ("join at ", "restart at ")
 """An expectation's name begins so where agents were to start and found no room."""
 OWN = ("always ", "eventually ", "settle ")
 """An expectation's name begins so where it is a property of the user's own."""
+UNSEEN = "no tick that counts has a value"
 NEARLY_S = 0.1
 """A time that lacks less of what it has to be is not told exactly."""
 MAX_NAMED = 4
@@ -243,7 +244,7 @@ def _own(row: ExpectationRow) -> str:
     """Return what a run showed of a property of the user's own, whose name begins with a verb."""
     what, required, got, margin = _own_cells(row)
     verb, _, title = what.partition(" ")
-    words = {"always": f"always {title}", "eventually": f"{title} at last", "settle": title}
+    words = {"always": f"always {title}", "eventually": f"{title}, once at least", "settle": title}
     left = f"; margin {margin}" if margin else ""
     return f"{words.get(verb, what)}: {got} (required {required}{left})"
 
@@ -251,13 +252,18 @@ def _own(row: ExpectationRow) -> str:
 def _own_cells(row: ExpectationRow) -> Cells:
     wanted, got, margin = row["wanted"], row["got"], row["margin"]
     if not row["name"].startswith("always "):
-        held_s = "never, or not for long enough" if got is None else f"from {got:.3g} s on"
+        held_s = f"from {got:.3g} s on" if got is not None else _not_held(row)
         required = "by the end" if wanted is None else f"within {wanted:g} s"
         return Cells(row["name"], required, held_s, "" if margin is None else f"{margin:.3g} s")
     if got is None or margin is None:
-        return Cells(row["name"], f"{wanted:.6g}", "no tick counted, or nobody states it", "")
+        none = UNSEEN if row["held"] is None else "at worst without a finite value"
+        return Cells(row["name"], f"{wanted:.6g}", none, "")
     relation = ">=" if abs(got - wanted - margin) <= abs(wanted - got - margin) else "<="
     return Cells(row["name"], f"{relation} {wanted:.6g}", f"at worst {got:.6g}", f"{margin:.3g}")
+
+
+def _not_held(row: ExpectationRow) -> str:
+    return f"not so far, or {UNSEEN}" if row["held"] is None else "never, or not to the end"
 
 
 def _timed_cells(row: ExpectationRow, got: str) -> tuple[str, str, str]:

@@ -11,8 +11,12 @@ OF_TEAM = ("running", "parted")
 
 def properties_consistent(scenario: Scenario) -> Problem | None:
     """Return the problem of the first property that says too little, or contradicts itself."""
+    titles: set[str] = set()
     for index, each in enumerate(scenario.expect.property):
         key = f"expect.property[{index}]"
+        if f"{each.must} {each.title}" in titles:
+            return Problem(f"{key}.name", f"another property is called {each.title!r} too")
+        titles.add(f"{each.must} {each.title}")
         for at, condition in each.conditions():
             problem = _condition_problem(f"{key}{at}", condition, scenario)
             if problem is not None:

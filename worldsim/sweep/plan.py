@@ -14,6 +14,8 @@ MAX_FLIGHTS = 1_000_000
 OWN_OPTIONS = {"seed": "--seeds"}
 """Keys that an option of their own varies."""
 _OPENING, _CLOSING, _QUOTES = "[{", "]}", "\"'"
+IDLE = ("name", "schema")
+"""Keys that change no flight."""
 
 
 Settings = tuple[tuple[str, str], ...]
@@ -97,6 +99,8 @@ def axis_of(text: str) -> Axis:
         raise PlanError(f"{text!r}; write it as netem.loss_percent=0,30,50")
     if key in OWN_OPTIONS:
         raise PlanError(f"{key}: is varied by {OWN_OPTIONS[key]}")
+    if key in IDLE:
+        raise PlanError(f"{key}: changes no flight")
     values = tuple(part.strip() for part in _split(listed))
     if not all(values):
         raise PlanError(f"{key}: has no value, or an empty one; write it as {key}=A,B,C")
