@@ -2,19 +2,26 @@
 
 ``python -m tests.scheme_figures --seeds 0:20`` flies each scheme in each situation in virtual time,
 and prints a row of the table in docs/schemes.md for each: how many seeds converged, and when; the
-least separation, with the safety filter on; the links that a member hears, needs, and uses (needs
-and hears); N_c,i, the members of its queues that it hears; and the bytes that an agent sends.
-A flight ends SETTLED_S after its last change has converged.
+least separation, with the safety filter on, and in a second flight of the same time in which it
+only watches; the share of the steps in which the filter that is on acts; the links that a member
+hears, needs, and uses (needs and hears); N_c,i, the members of its queues that it hears; and the
+bytes that an agent sends. A flight ends SETTLED_S after its last change has converged.
+
+``--flights FILE`` keeps the figures of each flight, and flies none of those that it has: a run that
+was stopped goes on, and more seeds are added to it. It is to be a new file for each commit.
 """
 
 import argparse
+import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fnmatch import fnmatch
+from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
 import numpy as np
+from msgspec.structs import replace
 
 from agent.messages import Place
 from agent.qstructure.formation import formation_of
@@ -180,16 +187,29 @@ def measured(scheme: str, fleet: str, situation: str, seed: int) -> dict[str, An
     scenario = scenario_of(scheme, fleet, situation, seed)
     watcher = LinkWatcher(scenario, SCHEMES[scheme].links_needed)
     flight = fly(scenario, watcher, should_stop=lambda: watcher.settled)
+    acted = [
+        each for each in flight.loop.controllers.filter_use().acted_fraction if each is not None
+    ]
     counts = np.array(watcher.counts)
     rows = flight.loop.radio_use.bytes_per_s(flight.medium_counters)
     sent = [float(np.mean([each for each in row if each is not None])) for row in rows.values()]
     return {
         "converge_s": [each["converge_s"] for each in watcher.stages()],
         "separation_m": flight.loop.judge.min_separation_m,
+        "watched_m": watched_m(scenario, flight.loop.world.slot),
+        "acted": float(np.mean(acted)),
         "mean": counts.mean(axis=0).tolist(),
         "most": counts.max(axis=0).tolist(),
         "bytes_per_s": sum(sent),
     }
+
+
+def watched_m(scenario: Scenario, slots: int) -> float:
+    """Fly again for so many slots with the filter only watching; return the least separation."""
+    watching = replace(scenario, control=replace(scenario.control, safety_filter="watch"))
+    flown = iter(range(slots))
+    flight = fly(watching, should_stop=lambda: next(flown, None) is None)
+    return flight.loop.judge.min_separation_m
 
 
 def line_of(names: Sequence[str], flown: list[dict[str, Any]]) -> str:
@@ -212,6 +232,8 @@ def line_of(names: Sequence[str], flown: list[dict[str, Any]]) -> str:
         f"{len(times)} of {len(flown)}",
         took,
         f"{least:.2f}",
+        f"{min(each['watched_m'] for each in flown):.2f}",
+        f"{100 * np.mean([each['acted'] for each in flown]):.1f}",
         heard,
         needed,
         used,
@@ -219,6 +241,45 @@ def line_of(names: Sequence[str], flown: list[dict[str, Any]]) -> str:
         f"{sent:.0f}",
     )
     return f"| {' | '.join(cells)} |"
+
+
+HEADINGS = (
+    "fleet | situation | scheme | converged | median, worst [s] | separation [m] | watched [m]"
+    " | filter [%] | heard | needed | used | N_c,i | B/s"
+)
+
+
+class Kept:
+    """The figures of flights by fleet, situation, scheme and seed, in a file of JSON lines."""
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+        lines = path.read_text("utf-8").splitlines() if path and path.exists() else []
+        self._rows = {tuple(name): row for name, row in map(json.loads, lines)}
+
+    def flown(self, row: tuple[str, str, str], seeds: range, jobs: int) -> list[dict[str, Any]]:
+        """Return the figures of a scheme's flights, those that are missing flown now."""
+        fleet, situation, scheme = row
+        missing = [seed for seed in seeds if (*row, seed) not in self._rows]
+
+        def fly_one(seed: int) -> dict[str, Any]:
+            return measured(scheme, fleet, situation, seed)
+
+        for seed, figures in answers(missing, fly_one, jobs, DEADLINE_S):
+            self._rows[(*row, seed)] = figures
+            if self._path is not None:
+                with self._path.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps([(*row, seed), figures]) + "\n")
+        return [self._rows[(*row, seed)] for seed in seeds]
+
+
+def rows_like(given: argparse.Namespace) -> Iterator[tuple[str, str, str]]:
+    """Yield the fleet, situation and scheme of the rows that are asked for."""
+    for fleet in [each for each in FLEETS if fnmatch(each, given.fleet)]:
+        for situation in [each for each in SITUATIONS if fnmatch(each, given.situation)]:
+            for scheme in SCHEMES:
+                if any(fnmatch(scheme, name) for name in given.schemes):
+                    yield fleet, situation, scheme
 
 
 def main() -> int:
@@ -229,26 +290,15 @@ def main() -> int:
     parser.add_argument("--situation", default="*")
     parser.add_argument("--seeds", default="0:20", help="first and last + 1")
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--flights", type=Path, help="a file that keeps each flight's figures")
     given = parser.parse_args()
     seeds = range(*map(int, given.seeds.split(":")))
-    print(
-        "| fleet | situation | scheme | converged | median, worst [s] | separation [m] | heard |"
-        " needed | used | N_c,i | B/s |\n" + "|---" * 11 + "|"
-    )
-    good = True
-    for fleet in [each for each in FLEETS if fnmatch(each, given.fleet)]:
-        for situation in [each for each in SITUATIONS if fnmatch(each, given.situation)]:
-            for scheme in SCHEMES:
-                if not any(fnmatch(scheme, name) for name in given.schemes):
-                    continue
-
-                def fly_one(seed: int, row: tuple[str, str, str] = (scheme, fleet, situation)):
-                    return measured(*row, seed)
-
-                made = list(answers(seeds, fly_one, given.jobs, DEADLINE_S))
-                line = line_of((fleet, situation, scheme), [each.row for each in made])
-                print(line, flush=True)
-                good = good and not any("failure" in each.row for each in made)
+    print(f"| {HEADINGS} |\n" + "|---" * len(HEADINGS.split(" | ")) + "|")
+    kept, good = Kept(given.flights), True
+    for row in rows_like(given):
+        flown = kept.flown(row, seeds, given.jobs)
+        print(line_of(row, flown), flush=True)
+        good = good and not any("failure" in each for each in flown)
     return 0 if good else 1
 
 
