@@ -3,6 +3,7 @@
 import pytest
 
 from tests.random_flights.children import Answer
+from tests.remark_5_figures import measured
 from tests.scheme_figures import (
     HEADINGS,
     SCHEMES,
@@ -44,6 +45,17 @@ def test_agents_come_nearer_where_the_filter_only_watches():
     flight = fly(scenario)
     assert watched_m(scenario, flight.loop.world.slot) < 0.25 < flight.loop.judge.min_separation_m
     assert max(flight.loop.controllers.filter_use().acted_fraction) > 0.0
+
+
+def test_remark_5_a_wedge_with_a_radio_range_of_one_spacing():
+    """One leads the vertex, the first of each queue is a sub-vertex, the last a member."""
+    formed = measured(SCHEMES["q_structure"], 1.05, seed=1)
+    assert formed["converge_s"] is not None
+    assert [round(9 * share) for share in formed["roles"]] == [4, 4, 1, 0]
+    assert sorted(formed["tiers"]) == [0, *[1] * 4, *[2] * 4]
+    assert formed["heard"] == formed["needed"] == pytest.approx(16 / 9), (
+        "somebody hears more than parent and children"
+    )
 
 
 def test_a_flight_that_is_kept_is_not_flown_again(tmp_path, monkeypatch):
