@@ -116,10 +116,14 @@ class LinkWatcher(Watcher):
         self._follows_graph = scenario.control.controller == "leader_follower"
         self.counts: list[tuple[int, int, int, int]] = []
         """Heard, needed, used and N_c,i, of each member at each tick."""
+        self.filtered = False
+        """Whether a safety filter has changed a velocity, by however little."""
 
     def tick(self, tick: Tick, figures: Figures) -> None:
         """Take a tick, in order."""
         super().tick(tick, figures)
+        assert tick.filtered_mps is not None, "ticks are recorded"
+        self.filtered = self.filtered or bool((tick.filtered_mps > 0.0).any())
         if tick.time_s >= LISTENED_S:
             self._count(tick)
 
@@ -193,10 +197,12 @@ def measured(scheme: str, fleet: str, situation: str, seed: int) -> dict[str, An
     counts = np.array(watcher.counts)
     rows = flight.loop.radio_use.bytes_per_s(flight.medium_counters)
     sent = [float(np.mean([each for each in row if each is not None])) for row in rows.values()]
+    least_m, slots = flight.loop.judge.min_separation_m, flight.loop.world.slot
     return {
         "converge_s": [each["converge_s"] for each in watcher.stages()],
-        "separation_m": flight.loop.judge.min_separation_m,
-        "watched_m": watched_m(scenario, flight.loop.world.slot),
+        "separation_m": least_m,
+        # Where the filter changed nothing, the second flight would be the same.
+        "watched_m": watched_m(scenario, slots) if watcher.filtered else least_m,
         "acted": float(np.mean(acted)),
         "mean": counts.mean(axis=0).tolist(),
         "most": counts.max(axis=0).tolist(),
