@@ -111,7 +111,7 @@ class OccupiedSlots:
     ) -> frozenset[Place]:
         """Return the places that are occupied now; silent: by unidentified vehicles."""
         agents = self._agents
-        held = self._held(mission, holders)
+        held = self.held(mission, holders, agents)
         seen = {*silent}
         if self._senses_vehicles:
             recent = [place for place in self._recent if place not in seen]
@@ -122,12 +122,12 @@ class OccupiedSlots:
         self.seen = _first_to_fill(seen - held)
         return (reported - held).union(seen - held)
 
-    def _held(self, mission: Flown, holders: Sequence[Holder]) -> set[Place]:
-        """Return the places in which the agents that claim them stand."""
+    def held(self, mission: Flown, holders: Sequence[Holder], agents: int) -> set[Place]:
+        """Return the places in which the agents that claim them stand. agents: size of the team."""
         held = set()
         for place, position in holders:
             if place is not None:
-                point = self._points.point(mission, self._agents, place)
+                point = self._points.point(mission, agents, place)
                 if point is not None and apart(point, position) < HELD_M:
                     held.add(place)
         return held

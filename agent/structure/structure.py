@@ -26,6 +26,7 @@ from agent.messages import (
 )
 from agent.places.occupied_slots import Holder, OccupiedSlots
 from agent.places.place_points import OwnTarget
+from agent.qstructure.formation import NO_PLACES
 from agent.structure.claim import NO_QUEUE, Claim
 from agent.structure.convergecast import OwnPart
 from agent.structure.destination import Destination
@@ -192,7 +193,7 @@ class Structure:
         else:
             self._leader_place.choose(view, self.claim)
         self._followed = any(_follows(h, self._own_id) for h in view.heard)
-        self._report(view)
+        self._report(view, mission)
 
     def _relocate(self, view: View, place: Place) -> None:
         """Take the place that follows from the mission before."""
@@ -244,14 +245,31 @@ class Structure:
                 reported.update(Place(*place) for place in summary.blocked)
         peers: list[Holder] = []
         if reported or senses.silent or self._blocked or self._occupied.remembers:
-            own = view.target(self.claim)
-            peers = [(h.place, h.position) for h in view.heard]
-            peers.append((own.place if own is not None else None, view.here))
+            peers = self._holders(view)
         self._blocked = view.blocked = self._occupied.update(
             senses, mission, peers, self.agents, frozenset(reported)
         )
 
-    def _report(self, view: View) -> None:
+    def _holders(self, view: View) -> list[Holder]:
+        """Return the members heard and the own agent, with their places."""
+        own = view.target(self.claim)
+        peers: list[Holder] = [(h.place, h.position) for h in view.heard]
+        return [*peers, (own.place if own is not None else None, view.here)]
+
+    def _taken_from_team(
+        self, view: View, mission: Flown, reported: Sequence[tuple[int, int]]
+    ) -> frozenset[Place]:
+        """Return the places that members see taken, less those in which the leader hears a member.
+
+        Who sees a member but does not hear it takes it for unidentified. A place that is counted as
+        taken and as held by a member too would be missing in the shares of the team.
+        """
+        if not reported:
+            return NO_PLACES
+        places = frozenset([Place(*place) for place in reported])
+        return places - self._occupied.held(mission, self._holders(view), self.agents)
+
+    def _report(self, view: View, mission: Flown) -> None:
         """Bring up to date what goes up each tree; as a leader, the own summary."""
         if self._gathering is not None:
             oldest_s = self._slow.oldest_s(view.now_s, view.timing)
@@ -264,7 +282,7 @@ class Structure:
             subtree = self._slow.collect(v, own, self._occupied.seen, view.now_s, view.timing)
             if leads and self._leader is not None:
                 # Only what is seen goes down, not what came down before: that would never end.
-                blocked = frozenset([Place(*place) for place in subtree.blocked])
+                blocked = self._taken_from_team(view, mission, subtree.blocked)
                 population = self._head_count.population(
                     view,
                     self._direct.heard,

@@ -57,6 +57,18 @@ def test_remark_5_a_line_with_a_radio_range_of_one_spacing():
     assert flips == 0
 
 
+def test_who_sees_a_member_but_does_not_hear_it_takes_no_place_from_the_team():
+    """Two metres of sight and 1.2 m of radio: members see others that they do not hear.
+
+    What it reports as taken is held by members that the leader hears, and stays in the shares.
+    """
+    fleet = VirtualFleet(load(WEDGE, {"seed": "4", "netem.range_m": "1.2", "duration_s": "12"}))
+    fly(fleet, 12.0)
+    places = sorted(tuple(each.place) for each in telemetry_of(fleet))
+    assert places == [(0, 0), *[(queue, rank) for queue in range(4) for rank in (1, 2)]]
+    assert fleet.loop.judge.min_separation_m >= 0.25
+
+
 def test_fig_4_five_agents_on_one_queue():
     """r2 and r3 hear r1, r3 hears r4, r4 hears r5: r3 and r4 are sub-vertices of tiers 1 and 2.
 
