@@ -41,7 +41,7 @@ from netem.compiled import UnloadableError
 from netem.wire.channels import CHANNELS
 
 MAX_INDEX: Final = 2**15
-"""Queues and ranks are below it."""
+"""Queues and ranks are below it, and at least -1, as on the wire."""
 NUMBERS: Final = 13
 """Numbers in an intent besides its target: three vectors, two tilt angles, yaw and force."""
 SMALL = min(MAX_SPEED_MPS, MAX_ANGLE_RAD)
@@ -171,7 +171,7 @@ def _claims_soundly(intent: Intent) -> bool:
     """Return whether an intent's claim is of the right types and bounds."""
     place = intent.place
     placed = place is None or (
-        type(place) is Place and 0 <= place.queue < MAX_INDEX and 0 <= place.rank < MAX_INDEX
+        type(place) is Place and -1 <= place.queue < MAX_INDEX and -1 <= place.rank < MAX_INDEX
     )
     return placed and 0.0 <= intent.cost_m < inf and type(intent.words) is Words
 
@@ -192,7 +192,7 @@ def _place(given: Iterable[int]) -> Place:
         queue, rank = (index(each) for each in given)
     except (TypeError, ValueError) as error:
         raise ValueError(f"the Intent's place is {given!r:.80}, no queue and rank") from error
-    if not (0 <= queue < MAX_INDEX and 0 <= rank < MAX_INDEX):
+    if not (-1 <= queue < MAX_INDEX and -1 <= rank < MAX_INDEX):
         raise ValueError(f"the Intent's place is {given!r:.80}; at most {MAX_INDEX - 1} each")
     return Place(queue, rank)
 
