@@ -29,6 +29,8 @@ from agent.structure.queue_map import QueueMap
 from netem import link
 from netem.faults import Partition
 from netem.medium import Medium
+from worldsim.campaign.flight_site import LocalSite
+from worldsim.fuzz.flights import WORK
 from worldsim.fuzz.folder import SearchFolder, findings_in, read_finding
 from worldsim.fuzz.fuzz import Search, fuzz
 from worldsim.results.exit_status import INTERRUPTED, PASS
@@ -192,7 +194,7 @@ def searched(
         terms=terms,
         seeds=seeds,
         folder=folder,
-        jobs=1,
+        site=LocalSite(1, folder / WORK),
         guided=guided,
         shrinks=1,
         corpus=None,

@@ -2,6 +2,8 @@
 
 import json
 import tomllib
+from collections.abc import Iterable, Iterator
+from itertools import islice
 from pathlib import Path
 
 import msgspec
@@ -9,13 +11,16 @@ import pytest
 
 from netem.wire.shutdown import StopRequest, stop_requests
 from tests.planted_bugs import filter_sign, searched
+from tests.small_scenario import SMALL
+from worldsim.campaign.flight_site import FlightSite, Flown, LocalSite, Order, SiteError
 from worldsim.commands.app import command
 from worldsim.fuzz.cause import Cause, find_cause
 from worldsim.fuzz.findings import refly, trouble_of
 from worldsim.fuzz.flights import Hangar
 from worldsim.fuzz.folder import SearchFolder, read_finding
+from worldsim.fuzz.fuzz import Search, fuzz
 from worldsim.fuzz.pages import curve
-from worldsim.results.exit_status import BAD_INPUT, FAIL
+from worldsim.results.exit_status import BAD_INPUT, FAIL, INCONCLUSIVE, PASS
 from worldsim.results.run_folder import RunDirectoryError
 from worldsim.search.drafts import cautions, loaded
 from worldsim.search.trials import Terms
@@ -90,7 +95,41 @@ def test_a_finding_is_known_where_it_fails_and_fixed_where_it_does_not(
 
 
 def hangar(folder: Path, stop: StopRequest) -> Hangar:
-    return Hangar(folder / "work", 1, stop)
+    return Hangar(LocalSite(1, folder / "work"), stop)
+
+
+class _Leaving(LocalSite):
+    """A cluster that goes away after two flights."""
+
+    def fly(self, orders: Iterable[Order], stop: StopRequest) -> Iterator[Flown]:
+        yield from islice(super().fly(orders, stop), 2)
+        raise SiteError("tcp://10.0.0.5:8786: the scheduler is gone")
+
+
+def test_a_search_goes_on_elsewhere_where_its_cluster_went_away(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    terms = Terms(base=msgspec.to_builtins(loaded(SMALL, Path("small.toml"))), safety_only=True)
+
+    def search(site: FlightSite) -> Search:
+        return Search(
+            terms=terms,
+            seeds=range(1, 4),
+            folder=tmp_path / "it",
+            site=site,
+            guided=False,
+            shrinks=0,
+            corpus=None,
+            described={},
+            beside=Path("small.toml"),
+            quiet=True,
+        )
+
+    assert fuzz(search(_Leaving(1, tmp_path / "one"))) == INCONCLUSIVE
+    assert "1 of 3 seeds not flown; the same command goes on" in (told := capsys.readouterr().out)
+    assert "the scheduler is gone" in told
+    assert fuzz(search(LocalSite(1, tmp_path / "two"))) == PASS
+    assert sorted(SearchFolder(tmp_path / "it").rows()) == [1, 2, 3]
 
 
 def test_the_folder_of_another_search_is_refused(

@@ -83,8 +83,8 @@ class ClusterSite:
         for future in active:
             future.cancel()
 
-    def threads(self) -> int:
-        """Return how many flights can be flown at once. Raises SiteError without a scheduler."""
+    def at_once(self) -> int:
+        """Return how many threads the workers have. Raises SiteError without a scheduler."""
         try:
             return sum(self._client.nthreads().values())
         except (OSError, RuntimeError) as error:
@@ -141,7 +141,7 @@ class _Room:
 
     def look(self) -> None:
         """Ask the cluster. Raises SiteError where it has had no worker for long."""
-        threads, now_s = self._site.threads(), time.monotonic()
+        threads, now_s = self._site.at_once(), time.monotonic()
         self._seen_s = now_s if threads else self._seen_s
         if now_s - self._seen_s > WORKERLESS_S:
             raise SiteError(f"the cluster has had no worker for {WORKERLESS_S:g} s")

@@ -5,12 +5,13 @@ an order when it has room for it, so that an order may depend on what was flown 
 leaves nothing but what is returned; its scenario with its seed repeats it.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from shutil import rmtree
 from typing import NamedTuple, Protocol
 
 from netem.wire.shutdown import StopRequest
+from worldsim.campaign.flight import FlightProbe
 from worldsim.campaign.pool import Job, sweep
 from worldsim.results.overall import FailedRun, Made, Result
 from worldsim.results.run_folder import RunWriteError
@@ -23,16 +24,21 @@ class SiteError(Exception):
 
 
 class Order(NamedTuple):
-    """One flight to fly."""
+    """One flight to fly.
+
+    probe: looks into the flight, in its process. wanted: names of the files to be returned.
+    """
 
     key: str  # names it among the others; letters, digits and dashes
     scenario: Scenario
+    probe: FlightProbe | None = None
+    wanted: tuple[str, ...] = ()
 
 
 class Flown(NamedTuple):
     """What one flight showed; without a summary where an error ended it, a controller's as a rule.
 
-    details: the traceback of such an error, where there is one.
+    details: the traceback of such an error, where there is one. files: what was wanted, by name.
     """
 
     key: str
@@ -40,10 +46,14 @@ class Flown(NamedTuple):
     reason: str | None
     summary: Summary | None
     details: str = ""
+    files: Mapping[str, bytes] = {}
 
 
 class FlightSite(Protocol):
     """Flies orders."""
+
+    def at_once(self) -> int:
+        """Return how many flights can be flown at once. Raises SiteError where that is unknown."""
 
     def fly(self, orders: Iterable[Order], stop: StopRequest) -> Iterator[Flown]:
         """Yield what each order showed, as soon as it is there.
@@ -67,6 +77,10 @@ class LocalSite:
         self._scratch = scratch
         self._on_poll = on_poll
 
+    def at_once(self) -> int:
+        """Return the number of workers."""
+        return self._workers
+
     def fly(self, orders: Iterable[Order], stop: StopRequest) -> Iterator[Flown]:
         """Yield what each order showed.
 
@@ -78,7 +92,7 @@ class LocalSite:
             for order in orders:
                 folder = self._scratch / order.key
                 active[folder] = order
-                yield Job(order.scenario, folder, recording=False)
+                yield Job(order.scenario, folder, recording=False, probe=order.probe)
 
         rmtree(self._scratch, ignore_errors=True)  # of a sweep that was killed
         try:
@@ -86,9 +100,10 @@ class LocalSite:
                 order = active.pop(made.folder)
                 if isinstance(made, FailedRun) and made.outcome == "inconclusive":
                     raise RunWriteError(made.folder, made.error)  # no flight: it is flown again
+                flown = flown_of(order, made)
                 rmtree(made.folder, ignore_errors=True)
                 if not (stop.requested and is_cut_off(made, order.scenario)):
-                    yield flown_of(order.key, made)
+                    yield flown
         finally:
             rmtree(self._scratch, ignore_errors=True)
 
@@ -98,8 +113,10 @@ def is_cut_off(made: Made, scenario: Scenario) -> bool:
     return isinstance(made, Result) and made.summary["duration_s"] < scenario.duration_s - 1e-6
 
 
-def flown_of(key: str, made: Made) -> Flown:
-    """Return what a run of a campaign showed."""
-    if isinstance(made, Result):
-        return Flown(key, made.outcome, made.summary["reason"], made.summary)
-    return Flown(key, made.outcome, made.error, None, made.details)
+def flown_of(order: Order, made: Made) -> Flown:
+    """Return what a run of a campaign showed, with the files that are wanted of it."""
+    if isinstance(made, FailedRun):
+        return Flown(order.key, made.outcome, made.error, None, made.details)
+    paths = {name: made.folder / name for name in order.wanted}
+    files = {name: path.read_bytes() for name, path in paths.items() if path.exists()}
+    return Flown(order.key, made.outcome, made.summary["reason"], made.summary, files=files)

@@ -1,6 +1,5 @@
 """The commands that search for trouble: ``fuzz`` and ``cause``."""
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +14,7 @@ from worldsim.commands.options import (
     seeds_of,
     warn,
 )
+from worldsim.commands.sites import Cluster, FlightsAtOnce, flight_site, local_site
 from worldsim.results.exit_status import FAIL, INTERRUPTED, PASS
 
 if TYPE_CHECKING:
@@ -23,10 +23,6 @@ if TYPE_CHECKING:
 
 commands = typer.Typer()
 
-Jobs = Annotated[
-    int | None,
-    typer.Option(metavar="N", min=1, help="Number of parallel flights.", show_default="all cores"),
-]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print the result only, no progress.")]
 
 
@@ -36,6 +32,7 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="Print the result only, no 
         "qswarm fuzz --controller carousel.ring:Carousel --safety-only --out runs/carousel",
         "qswarm fuzz --base wedge-9 --seeds 0:1000 --jobs 2 --out runs/wedge",
         "qswarm fuzz --corpus corpus --seeds 0:1000 --out runs/tonight",
+        "qswarm fuzz --seeds 0:10000 --cluster tcp://10.0.0.5:8786 --out runs/weekend",
         "qswarm sim runs/fuzz/findings/I4-13/scenario.toml",
         "qswarm cause runs/fuzz/findings/I4-13",
     )
@@ -72,7 +69,8 @@ def fuzz(
             "--safety-only", help="Expect no formation: for a controller that forms none."
         ),
     ] = False,
-    jobs: Jobs = None,
+    jobs: FlightsAtOnce = None,
+    cluster: Cluster = None,
     guided: Annotated[
         bool | None,
         typer.Option(
@@ -106,6 +104,7 @@ def fuzz(
     DIR/findings/NAME/scenario.toml, which `qswarm sim` replays, and finding.md, which explains it.
     Ctrl-C stops the search; the same command goes on with it. Exit status 1: a violation was found.
     """
+    from worldsim.fuzz.flights import WORK
     from worldsim.fuzz.fuzz import Search
     from worldsim.fuzz.fuzz import fuzz as search_for_trouble
 
@@ -115,20 +114,21 @@ def fuzz(
     by_margin = _guided(guided)
     if corpus is not None and not corpus.is_dir():
         raise typer.BadParameter(f"{corpus}: no such folder; make it first", param_hint="--corpus")
-    search = Search(
-        terms=terms,
-        seeds=wanted,
-        folder=out,
-        jobs=jobs or len(os.sched_getaffinity(0)),
-        guided=by_margin,
-        shrinks=shrink,
-        corpus=corpus,
-        described={**described, "first seed": wanted.start, "guided": by_margin},
-        beside=Path("drawn.toml"),
-        quiet=quiet,
-        first_only=first_only,
-    )
-    return search_for_trouble(search)
+    with flight_site(cluster, jobs, [varied], out / WORK) as site:
+        search = Search(
+            terms=terms,
+            seeds=wanted,
+            folder=out,
+            site=site,
+            guided=by_margin,
+            shrinks=shrink,
+            corpus=corpus,
+            described={**described, "first seed": wanted.start, "guided": by_margin},
+            beside=Path("drawn.toml"),
+            quiet=quiet,
+            first_only=first_only,
+        )
+        return search_for_trouble(search)
 
 
 def _terms(
@@ -190,7 +190,7 @@ def cause(
     draws: Annotated[
         int, typer.Option(metavar="N", min=2, max=1000, help="Other draws at each tick.")
     ] = 20,
-    jobs: Jobs = None,
+    jobs: FlightsAtOnce = None,
     quiet: Quiet = False,
 ) -> int:
     """Find the tick from which on a finding's failure was certain.
@@ -202,12 +202,12 @@ def cause(
     """
     from netem.wire.shutdown import stop_requests
     from worldsim.fuzz.cause import find_cause
-    from worldsim.fuzz.flights import Hangar
+    from worldsim.fuzz.flights import WORK, Hangar
     from worldsim.results.progress_line import ProgressLine
 
     line = ProgressLine(hidden=quiet)
     with stop_requests() as stop:
-        hangar = Hangar(finding, jobs or len(os.sched_getaffinity(0)), stop)
+        hangar = Hangar(local_site(jobs, finding / WORK), stop)
         found = find_cause(finding, hangar, draws, line.update)
     line.clear()
     if found is None:

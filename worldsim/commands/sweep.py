@@ -1,10 +1,8 @@
 """The commands about many flights: ``sweep`` flies a grid by seeds, ``compare`` compares two."""
 
-import os
 import shlex
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,10 +21,10 @@ from worldsim.commands.options import (
     overrides_of,
     seeds_of,
 )
+from worldsim.commands.sites import Cluster, FlightsAtOnce, flight_site
 from worldsim.results.exit_status import PASS
 
 if TYPE_CHECKING:
-    from worldsim.campaign.flight_site import FlightSite
     from worldsim.results.progress_line import ProgressLine
     from worldsim.scenario.tables import Scenario
     from worldsim.sweep.plan import FlightKey, Plan
@@ -61,17 +59,8 @@ def sweep(
         str,
         typer.Option(metavar="A:B", help="Fly each cell with the seeds from A to B, without B."),
     ] = "0:20",
-    jobs: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=1, help="Flights at once.", show_default="all cores"),
-    ] = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option(
-            metavar="tcp://HOST:PORT",
-            help="Fly on this Dask cluster instead of this host (needs qswarm[cluster]).",
-        ),
-    ] = None,
+    jobs: FlightsAtOnce = None,
+    cluster: Cluster = None,
     agents: Agents = None,
     duration: Duration = None,
     settings: Settings = None,
@@ -99,13 +88,11 @@ def sweep(
     from worldsim.sweep.sweep_text import repeat_text
 
     base = overrides_of(settings, agents, None, duration)
-    if cluster is not None and jobs is not None:
-        raise typer.BadParameter("its workers decide that (--jobs)", param_hint="--cluster")
     plan = _plan(vary, seeds, base)
     line = ProgressLine(hidden=quiet)
     flown = _loaded(scenario, plan, base, line)
     folder = out or folder_named_after_now(f"sweep-{flown.name}")
-    with _site(cluster, jobs, flown, folder / SCRATCH) as site:
+    with flight_site(cluster, jobs, flown.scenarios.values(), folder / SCRATCH) as site:
         journal = Journal(folder, identity := identity_of(flown))
         if journal.rows and identity["commit_dirty"]:
             complain(f"{folder}: warning: qswarm's own files differ from its commit, then or now")
@@ -175,26 +162,6 @@ def _check_kinds(folders: tuple[Path, Path], kinds: list[str]) -> None:
     if kinds[0] != kinds[1]:
         detail = f"holds {kinds[1]}, and {folders[0]} holds {kinds[0]}: compare two of a kind"
         raise RunDirectoryError(folders[1], detail)
-
-
-@contextmanager
-def _site(
-    cluster: str | None, jobs: int | None, flown: "Sweep", scratch: Path
-) -> "Iterator[FlightSite]":
-    """Yield where flights are flown. Raises SiteError where a cluster cannot fly them."""
-    from worldsim.campaign.flight_site import LocalSite
-
-    if cluster is None:
-        yield LocalSite(jobs or len(os.sched_getaffinity(0)), scratch)
-        return
-    from worldsim.campaign.cluster_site import ClusterSite
-    from worldsim.campaign.controller_code import user_controllers
-
-    site = ClusterSite(cluster, user_controllers(flown.scenarios.values()))
-    try:
-        yield site
-    finally:
-        site.close()
 
 
 def _plan(vary: list[str], seeds: str, base: Mapping[str, str]) -> "Plan":

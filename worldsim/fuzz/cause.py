@@ -88,7 +88,7 @@ class _Prober:
         spare = self._draws - int(least * self._draws + 0.999)
         failed = flown = 0
         while flown < self._draws:
-            count = min(max(self._hangar.jobs, 4), self._draws - flown)
+            count = min(max(self._hangar.at_once, 4), self._draws - flown)
             failed += self._failed([self._task(tick, flown + k) for k in range(count)])
             flown += count
             self._say(

@@ -94,7 +94,7 @@ def shrink(folder: Path, hangar: Hangar, say: Say, budget: int = BUDGET) -> Row 
     flights = 0
     if first_s is not None:
         shrinker = Shrinker(tables, first_s, timed=name in TIMED)
-        while flights < budget and (batch := shrinker.batch(hangar.jobs)):
+        while flights < budget and (batch := shrinker.batch(hangar.at_once)):
             found = _violations(batch, file, name, hangar)
             if hangar.stopped():
                 return None

@@ -1,23 +1,21 @@
-"""Flights of scenarios on the campaign's pool, each with its margins; no folder of them is kept."""
+"""Flights of scenarios at a site, each with its margins; nothing else is kept of them."""
 
 import json
-from collections.abc import Iterator, Mapping
-from pathlib import Path
-from shutil import rmtree
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from netem.wire.shutdown import StopRequest
 from worldsim.campaign.flight import FlightProbe
-from worldsim.campaign.pool import Job, sweep
+from worldsim.campaign.flight_site import FlightSite, Order
+from worldsim.campaign.flight_site import Flown as Shown
 from worldsim.fuzz.probe import MARGINS_FILE, MarginProbe
-from worldsim.results.overall import FailedRun, Made
-from worldsim.results.run_folder import RunWriteError
 from worldsim.scenario.tables import Scenario
 from worldsim.search.margins import Margins, margins_of, of_error, of_repetition
 
 AGAIN = "-again"
+EVENTS_FILE = "events.jsonl"
 WORK = "flights"
-"""The folder of the flights at work; it is empty between two runs."""
+"""The folder of the flights at work on this host; it is gone between two runs."""
 
 
 class Flown(NamedTuple):
@@ -45,42 +43,33 @@ class Task(NamedTuple):
 
 
 class Hangar(NamedTuple):
-    """Where flights are made: in a folder, so many at once, until a stop is requested."""
+    """Where flights are made: at a site, until a stop is requested."""
 
-    folder: Path
-    jobs: int
+    site: FlightSite
     stop: StopRequest
 
-    def fly(self, tasks: list[Task]) -> Iterator[Flown]:
+    def fly(self, tasks: Iterable[Task]) -> Iterator[Flown]:
         """Yield what each flight showed, as they end; a flight that was cut off is left out.
 
-        Raises RunWriteError where the disk is full.
+        Raises SiteError where the site can fly no more, RunWriteError where its disk is full.
         """
-        work = self.folder / WORK
-        rmtree(work, ignore_errors=True)  # of a search that was killed
-        work.mkdir(parents=True)
         tasks_of = {task.name: task for task in tasks}
-        jobs = [
-            Job(each.scenario, work / f"{each.name}{end}", False, probe=each.probe)
-            for each in tasks
-            for end in (("", AGAIN) if each.twice else ("",))
-        ]
+        orders = [order for task in tasks_of.values() for order in _orders(task)]
         before: dict[str, Flown] = {}
-        try:
-            for made in sweep(jobs, self.jobs, self.stop) if jobs else ():
-                task = tasks_of[made.folder.name.removesuffix(AGAIN)]
-                flown = _flown(made, task)
-                rmtree(made.folder, ignore_errors=True)
-                if flown is None:
-                    continue
-                if not task.twice:
-                    yield flown
-                elif task.name in before:
-                    yield _compared(before.pop(task.name), flown)
-                else:
-                    before[task.name] = flown
-        finally:
-            rmtree(work, ignore_errors=True)
+        for shown in self.site.fly(orders, self.stop) if orders else ():
+            task = tasks_of[shown.key.removesuffix(AGAIN)]
+            flown = _flown(shown, task)
+            if not task.twice:
+                yield flown
+            elif task.name in before:
+                yield _compared(before.pop(task.name), flown)
+            else:
+                before[task.name] = flown
+
+    @property
+    def at_once(self) -> int:
+        """How many flights are made at once."""
+        return max(1, self.site.at_once())
 
     def stopped(self) -> bool:
         """Whether a stop was requested."""
@@ -91,21 +80,22 @@ class Hangar(NamedTuple):
         return next(self.fly([Task(name, scenario, MarginProbe(scenario))]), None)
 
 
-def _flown(made: Made, task: Task) -> Flown | None:
-    if isinstance(made, FailedRun):
-        if made.outcome == "inconclusive":
-            raise RunWriteError(made.folder, made.error)
-        return Flown(task.name, of_error(), made.error, None)
-    summary = made.summary
-    if summary["duration_s"] < task.scenario.duration_s - 1.0 / task.scenario.fleet.tick_hz:
-        return None
-    margins = margins_of(summary)
-    if not isinstance(task.probe, MarginProbe):
-        return Flown(task.name, margins, summary["reason"], summary["trace_sha256"])
-    measured = json.loads((made.folder / MARGINS_FILE).read_text(encoding="utf-8"))
-    lines = (made.folder / "events.jsonl").read_text(encoding="utf-8").splitlines()
+def _orders(task: Task) -> Iterator[Order]:
+    wanted = (MARGINS_FILE, EVENTS_FILE) if isinstance(task.probe, MarginProbe) else ()
+    for end in ("", AGAIN) if task.twice else ("",):
+        yield Order(f"{task.name}{end}", task.scenario, task.probe, wanted)
+
+
+def _flown(shown: Shown, task: Task) -> Flown:
+    summary = shown.summary
+    if summary is None:
+        return Flown(task.name, of_error(), shown.reason, None)
+    flown = Flown(task.name, margins_of(summary), summary["reason"], summary["trace_sha256"])
+    if not shown.files:
+        return flown
+    lines = shown.files[EVENTS_FILE].decode("utf-8").splitlines()
     events = tuple(json.loads(line) for line in lines)
-    return Flown(task.name, margins, summary["reason"], summary["trace_sha256"], measured, events)
+    return flown._replace(measured=json.loads(shown.files[MARGINS_FILE]), events=events)
 
 
 def _compared(one: Flown, other: Flown) -> Flown:

@@ -11,11 +11,12 @@ from time import monotonic
 from typing import Any, Final, NamedTuple
 
 from netem.wire.shutdown import stop_requests
+from worldsim.campaign.flight_site import FlightSite, SiteError
 from worldsim.fuzz.findings import BUDGET, begin, refly, shrink, take_in
 from worldsim.fuzz.flights import Flown, Hangar, Task
 from worldsim.fuzz.folder import TABLE, Row, SearchFolder, findings_in, read_finding
 from worldsim.fuzz.pages import closing, table
-from worldsim.results.exit_status import FAIL, INTERRUPTED, PASS
+from worldsim.results.exit_status import FAIL, INCONCLUSIVE, INTERRUPTED, PASS
 from worldsim.results.progress_line import ProgressLine
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
@@ -38,7 +39,8 @@ class Search(NamedTuple):
     terms: Terms
     seeds: range
     folder: Path
-    jobs: int
+    site: FlightSite
+    """Where it is flown."""
     guided: bool
     """Whether odd seeds lower the margin."""
     shrinks: int
@@ -70,29 +72,36 @@ def fuzz(search: Search) -> int:
     Raises RunDirectoryError for the folder of another search, before anything is flown.
     """
     folder, line = SearchFolder(search.folder), ProgressLine(hidden=search.quiet)
+    states: dict[str, str] = {}
+    lost = ""
     with folder.opened(search.described), stop_requests() as stop:
-        hangar = Hangar(search.folder, search.jobs, stop)
-        states = refly(search.corpus, hangar, line.update) if search.corpus else {}
-        rows = _fly(search, folder, hangar, line)
-        _keep_findings(search, folder, hangar, line)
+        hangar = Hangar(search.site, stop)
+        try:
+            if search.corpus is not None:
+                states = refly(search.corpus, hangar, line.update)
+            _fly(search, folder, hangar, line)
+            _keep_findings(search, folder, hangar, line)
+        except SiteError as error:
+            lost = str(error)
     line.clear()
+    rows = {seed: row for seed, row in sorted(folder.rows().items()) if seed in search.seeds}
     found = [read_finding(each) for each in findings_in(folder.path / "findings")]
     if search.corpus is not None:
         states |= _compared(found, folder, search.corpus)
     text = table(rows.values())
     (search.folder / TABLE).write_text(text + "\n", encoding="utf-8")
-    for told in _told(search, rows, found, states, text):
+    for told in (*_told(search, rows, found, states, text), *([lost] if lost else [])):
         print(told)
     if stop.requested:
         return INTERRUPTED
+    if lost:
+        return INCONCLUSIVE
     failed = any(row["violated"] for row in rows.values()) or "known" in states.values()
     return FAIL if failed else PASS
 
 
-def _fly(
-    search: Search, folder: SearchFolder, hangar: Hangar, line: ProgressLine
-) -> dict[int, Row]:
-    """Fly the seeds that have no row yet; return the rows of all seeds, in their order."""
+def _fly(search: Search, folder: SearchFolder, hangar: Hangar, line: ProgressLine) -> None:
+    """Fly the seeds that have no row yet."""
     rows, progress = folder.rows(), _Progress(search, line)
     guide = Guide(search.seeds.start) if search.guided else None
     for generation in _generations(search.seeds):
@@ -119,7 +128,6 @@ def _fly(
             for each in drawn:
                 if each.seed in rows:
                     guide.learn(each.trial.genes, rows[each.seed]["score"])
-    return {seed: rows[seed] for seed in search.seeds if seed in rows}
 
 
 def _any_violated(rows: Mapping[int, Row], seeds: range) -> bool:
