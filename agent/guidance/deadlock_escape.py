@@ -8,6 +8,9 @@ two agents on one level, the lower id goes up. Directly above or below a vehicle
 on which it is. It keeps on round the vehicle the way that it began, and so does the other one: two
 that chose anew on the way would undo what they had gained.
 
+So near to a vehicle that a noisy sensor leaves open only the way back, no agent gets round. One
+that has stood by a vehicle for some seconds backs off from it first.
+
 Round an obstacle it goes along the surface, to the side to which the way to the target leans there,
 or up where it does not lean. A side that brings no progress for some seconds is changed for the
 next one, a quarter turn on.
@@ -42,6 +45,14 @@ LEANS: Final = 0.02
 """Sine of the angle between the way and the line to a point from which the way leans to a side."""
 SIDE_S: Final = 5.0
 """How long one side of an obstacle is tried."""
+STANDS_M: Final = 0.1
+"""An agent that has not moved so far stands [m]."""
+STANDS_S: Final = 4.0
+"""An agent that has stood so long by a vehicle backs off."""
+BACK_S: Final = 2.0
+"""How long it backs off."""
+BACK: Final = 2.0
+"""Length of the way back: the way to the target, of 1 at most, is taken off it."""
 
 
 class DeadlockEscape:
@@ -56,6 +67,9 @@ class DeadlockEscape:
         """Where it goes past a vehicle, of unit length [world axes]."""
         self._side: Vector | None = None
         self._side_s = 0.0
+        self._stood_at: Vector = ZERO
+        self._stood_s = 0.0
+        """Where it stands on its way, and since when [s]."""
 
     @property
     def rounds_obstacle(self) -> bool:
@@ -63,15 +77,18 @@ class DeadlockEscape:
         return self._side is not None
 
     def direction(self, senses: Senses, target: Vector) -> Vector | None:
-        """Return the unit vector of the escape [world axes]; None where nothing holds the agent.
+        """Return the vector of the escape [world axes]; None where nothing holds the agent.
 
-        target [m; world frame].
+        target [m; world frame]. Its length is 1, or BACK where the agent backs off.
         """
         if self._is_free(senses, target):
             self._past = self._side = None
+            self._stood_at, self._stood_s = senses.position, senses.now_s
             return None
         if senses.now_s - self._since_s < PATIENCE_S:
             return None
+        if self._backs_off(senses):
+            return _way_back(senses.vehicles)
         way = _way(senses.position, target)
         vehicle = _nearest_ahead(way, senses.vehicles, VEHICLE_NEAR_M)
         if vehicle is None:
@@ -80,6 +97,16 @@ class DeadlockEscape:
             return self._round_obstacle(senses, way) if lags else None
         self._past = _across(self._past or self._first_way_past(senses, vehicle), vehicle)
         return self._past
+
+    def _backs_off(self, senses: Senses) -> bool:
+        """Whether it has stood on its way for so long that it backs off for a while."""
+        standing_s = senses.now_s - self._stood_s
+        if standing_s > STANDS_S + BACK_S or (
+            standing_s <= STANDS_S and apart(senses.position, self._stood_at) > STANDS_M
+        ):
+            self._stood_at, self._stood_s = senses.position, senses.now_s
+            return False
+        return standing_s > STANDS_S
 
     def _is_free(self, senses: Senses, target: Vector) -> bool:
         """Whether the agent has arrived or has a new target; notes its progress."""
@@ -132,6 +159,15 @@ def _way(position: Vector, target: Vector) -> Vector:
     x, y, z = target[0] - position[0], target[1] - position[1], target[2] - position[2]
     away = max(hypot(x, y, z), 1e-9)
     return (x / away, y / away, z / away)
+
+
+def _way_back(vehicles: Sequence[Vector]) -> Vector | None:
+    """Return the vector away from the nearest vehicle, of length BACK; None if none is near."""
+    nearest = min(vehicles, key=lambda each: hypot(*each), default=None)
+    if nearest is None or not 0.0 < hypot(*nearest) < VEHICLE_NEAR_M:
+        return None
+    x, y, z = _way(ZERO, nearest)
+    return (-BACK * x, -BACK * y, -BACK * z)
 
 
 def _nearest_ahead(way: Vector, points: Sequence[Vector], near_m: float) -> Vector | None:

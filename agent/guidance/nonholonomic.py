@@ -68,8 +68,9 @@ def _scale(forward: float, climb: float, bounds: Sequence[Bound], yaw: float, tu
             square = forward * forward + climb * climb
             retreat = max(0.0, -approach)
             across = sqrt(max(0.0, square - retreat * retreat))
-            if across * scale > bound.across_limit + ROUNDING_MPS:
-                scale = bound.across_limit / across
+            beside = across - bound.leaving * retreat
+            if beside * scale > bound.across_limit + ROUNDING_MPS:
+                scale = bound.across_limit / beside
     return scale
 
 

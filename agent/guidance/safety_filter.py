@@ -27,6 +27,11 @@ LEAST_EVADING_S: Final = 1e-9
 INNER_SHARE: Final = 0.7
 """Share of the margin for noise within which a vehicle only flies away: noise turns the measured
 line to the other vehicle, and a speed across that line is then a speed towards it."""
+LEAVING: Final = 0.5
+"""Speed across, in speeds away, that a vehicle within that share may fly: a straight way back may
+not be open to it. It still leaves if the measured line is turned by 63 degrees."""
+SURE_OF_LINE: Final = 0.7
+"""Margin for noise, in least distances, up to which noise turns that line by 45 degrees at most."""
 ROUNDING_MPS: Final = 1e-12
 """Tolerance: a velocity that slides along a limit of zero exceeds it by rounding."""
 
@@ -41,6 +46,7 @@ class Bound(NamedTuple):
     away: Vector  # unit vector away from the vehicle or surface [world axes]
     limit: float  # of the speed towards it [m/s]
     across_limit: float = inf  # of the speed across the line to it [m/s]
+    leaving: float = 0.0  # how much the speed away adds to the limit across
     surface_velocity: Vector = ZERO  # of an approaching surface [m/s; world axes]
 
 
@@ -80,6 +86,7 @@ class RangingFilter:
         turning_m = d_ob + margins.noise_m
         self._max_speed = max_speed
         self._inner_m = d_ob + INNER_SHARE * margins.noise_m
+        self._leaving = LEAVING if margins.noise_m <= SURE_OF_LINE * d_ob else 0.0
         margin_m = reach * reach / turning_m
         self._rate = margins.share / horizon_s
         if margins.retreats:
@@ -102,7 +109,8 @@ class RangingFilter:
             limit = self._rate * (gap if self._retreats else max(0.0, gap))
             turning = self._turning_hz * max(0.0, r - self._inner_m)
             across_limit = max(self._creep, turning) if r < self._stop_m else inf
-            found.append(Bound((-x / r, -y / r, -z / r), limit, across_limit))
+            leaving = self._leaving if r < self._inner_m else 0.0
+            found.append(Bound((-x / r, -y / r, -z / r), limit, across_limit, leaving))
         return found
 
     def bounds_of_moving(

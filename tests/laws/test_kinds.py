@@ -8,7 +8,7 @@ import pytest
 from agent.config import Vehicle
 from agent.guidance import safety_monitor
 from agent.guidance.nonholonomic import forward_limited
-from agent.guidance.safety_filter import Bound, approach_of
+from agent.guidance.safety_filter import INNER_SHARE, Bound, Margins, RangingFilter, approach_of
 from agent.guidance.sight import Braking
 from tests.laws.kinds import Craft, anything, least_distance, straight
 
@@ -68,6 +68,26 @@ def test_a_way_ahead_keeps_its_bounds_wherever_it_may_turn():
         for turn in (-sway, -0.4 * sway, 0.0, 0.7 * sway, sway):
             there = (forward * cos(yaw + turn), forward * sin(yaw + turn), w)
             assert approach_of(there, bound) <= bound.limit + 1e-9
+
+
+def test_a_way_ahead_beside_a_vehicle_that_noise_hides_leads_away_from_it():
+    random, noise_m, flown = Random(9), 0.1, 0
+    beside = RangingFilter(D_OB, 0.5, 0.1, Margins(noise_m=noise_m))
+    for _ in range(4000):
+        there = straight(random, tuple(random.gauss(0, 1) for _ in range(3)), 0)
+        true_m = random.uniform(D_OB, D_OB + 0.6 * noise_m)
+        there = tuple(true_m * each for each in there)
+        error = straight(random, tuple(random.gauss(0, 1) for _ in range(3)), 0)
+        error_m = random.uniform(0.0, noise_m)
+        sensed = tuple(a + error_m * b for a, b in zip(there, error, strict=True))
+        if hypot(*sensed) > D_OB + INNER_SHARE * noise_m:
+            continue
+        yaw = random.uniform(-pi, pi)
+        flying = forward_limited(anything(random, None, 0), beside.bounds([sensed]), yaw, 0.1)
+        approach = sum(a * b for a, b in zip(flying, there, strict=True)) / true_m
+        assert approach <= 1e-9
+        flown += hypot(*flying) > 0.01
+    assert flown > 100
 
 
 def test_a_way_ahead_is_only_shortened():
