@@ -258,8 +258,5 @@ def _group(view: View, place: Place | None) -> int | None:
 
 
 def _all_led(view: View) -> bool:
-    """Whether each vertex that is available has a leader."""
-    for v, summary in enumerate(view.summaries):
-        if summary is None and view.map.vertex_places[v] not in view.blocked:
-            return False
-    return True
+    """Whether each vertex that somebody is to lead has a leader."""
+    return not view.vacant

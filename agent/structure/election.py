@@ -65,6 +65,7 @@ class Election:
             if (
                 trees[v].root is None
                 and not self._is_led(view, v)
+                and not view.is_spare(v)
                 and self._is_next(view, claim, trees[v], v, direct)
             ):
                 self.lead(view, claim, trees[v], v)

@@ -187,11 +187,7 @@ class Leader:
 
 def _unevenness(view: View, population: Population, blocked: frozenset[Place]) -> Unevenness:
     """Return what is to be ordered; nothing where the direct rule gives the queues."""
-    vacant = [
-        v
-        for v, place in enumerate(view.map.vertex_places)
-        if population.holders[v] == 0 and place not in blocked
-    ]
+    vacant = [v for v in view.map.led(population.total, blocked) if population.holders[v] == 0]
     shares = view.map.members(population.total, blocked)
     if not vacant and _all_hear_all(view, population):
         return Unevenness(shares, {})

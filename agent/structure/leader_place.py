@@ -1,4 +1,9 @@
-"""Where a leader stands: in its vertex, or in its queue while a vehicle has taken that (E18)."""
+"""Where a leader stands: in its vertex, or in its queue while a vehicle has taken that (E18).
+
+In a team that is smaller than the number of vertices some leaders have no place in theirs.
+"""
+
+from math import inf
 
 from agent.structure.claim import Claim
 from agent.structure.direct_rule import DirectRule
@@ -17,6 +22,16 @@ class LeaderPlace:
         self._numbers, self._direct = numbers, direct
         self._misplaced_since_s: float | None = None
         """Since when the leader stands in a vertex that is taken, or beside a free one [s]."""
+        self._spare_since_s = inf
+        """Since when the vertex is to stay empty [s]."""
+
+    def is_spare(self, view: View, claim: Claim) -> bool:
+        """Whether the own vertex is to stay empty, and has been for long enough."""
+        if not view.is_spare(claim.vertex):
+            self._spare_since_s = inf
+        else:
+            self._spare_since_s = min(self._spare_since_s, view.now_s)
+        return view.now_s - self._spare_since_s > view.timing.resettle_s
 
     def choose(self, view: View, claim: Claim) -> None:
         """Keep the place, or change it once it has been the wrong one for long enough."""

@@ -93,10 +93,11 @@ class QueueChoice:
         if own_m == inf:  # no number, or one that a full queue has no place for
             own_m = view.way_to(claim.queue, view.counts[claim.queue])
         ways_m = {j: _way_to(view, j) for j, number in enumerate(takers) if number > 0}
+        ways_m = {j: way_m for j, way_m in ways_m.items() if way_m < inf}
+        if own_m == inf:  # the queue has no place for any member: whoever is in it is to leave
+            own_m = max(ways_m.values(), default=0.0)
         return tuple(
-            Candidate(round(10.0 * (way_m - own_m)), self._own_id, j)
-            for j, way_m in ways_m.items()
-            if way_m < inf and own_m < inf
+            Candidate(round(10.0 * (way_m - own_m)), self._own_id, j) for j, way_m in ways_m.items()
         )
 
 

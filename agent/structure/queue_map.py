@@ -97,6 +97,7 @@ class QueueMap:
         self._places: list[list[Place]] = [[] for _ in numbers]
         """The places of each queue by rank, as far as they were asked for."""
         self.members = lru_cache(maxsize=64)(self._members)
+        self.led = lru_cache(maxsize=64)(self._led)
         self.blocked_numbers = lru_cache(maxsize=64)(self._blocked_numbers)
         self._closed_row = lru_cache(maxsize=64)(self._measured_row)
         self._nearest_pairs: list[tuple[int, int]] | None = None
@@ -142,10 +143,13 @@ class QueueMap:
         """
         wanted = [*shares]
         for v in vacant:
-            through = [j for j in range(self.queues) if v in self.vertices_of[j]]
-            if not any(counts[j] for j in through):
-                wanted[through[0]] += 1
+            if not any(counts[j] for j in self.queues_through(v)):
+                wanted[self.queues_through(v)[0]] += 1
         return tuple(wanted)
+
+    def queues_through(self, vertex: int) -> list[int]:
+        """Return the queues that have a vertex."""
+        return [j for j in range(self.queues) if vertex in self.vertices_of[j]]
 
     def vertex_slot(self, vertex: int) -> Slot | None:
         """Return a vertex's slot."""
@@ -229,6 +233,22 @@ class QueueMap:
                 own[place.queue] += 1
         counts = self.formation.divide(agents, blocked)
         return tuple(max(0, count - held) for count, held in zip(counts, own, strict=True))
+
+    def _led(self, agents: int, blocked: frozenset[Place] = NO_PLACES) -> tuple[int, ...]:
+        """Return the vertices that somebody is to lead: those available, in a team of that many.
+
+        A team that is smaller than the number of vertices leaves some empty. agents: 0 where
+        nobody has counted.
+        """
+        small = 0 < agents < self.vertices
+        filled = self.formation.layout(agents, blocked).slots if small else self.vertex_of
+        return tuple(
+            [
+                v
+                for v, place in enumerate(self.vertex_places)
+                if place not in blocked and place in filled
+            ]
+        )
 
 
 map_of = lru_cache(MAPS_KEPT)(QueueMap)

@@ -172,7 +172,9 @@ class Structure:
 
     def _step_down(self, view: View, vertex: int) -> None:
         """Make way for a leader that is nearer."""
-        queue = NO_QUEUE if self._map.is_common(vertex) else self.claim.queue
+        self._lead_no_more(view, NO_QUEUE if self._map.is_common(vertex) else self.claim.queue)
+
+    def _lead_no_more(self, view: View, queue: int) -> None:
         self.claim.give_up(queue, view.now_s)
         self._election.key, self._leader, self._slow.news = None, None, True
 
@@ -191,7 +193,7 @@ class Structure:
         if not self.claim.leads:
             self._decide_as_member(view)
         else:
-            self._leader_place.choose(view, self.claim)
+            self._decide_as_leader(view)
         self._followed = any(_follows(h, self._own_id) for h in view.heard)
         self._report(view, mission)
 
@@ -214,6 +216,14 @@ class Structure:
             self._leader = Leader(claim.vertex, key, view.now_s, self._round_s, view.expected)
             self._head_count.note_own(view, claim)
         self._slow.news = True
+
+    def _decide_as_leader(self, view: View) -> None:
+        """Choose the place, or make way where the team is too small for all vertices."""
+        if self._leader_place.is_spare(view, self.claim):
+            vacant = min(view.vacant, key=view.to_vertex, default=self.claim.vertex)
+            self._lead_no_more(view, self._map.queues_through(vacant)[0])
+        else:
+            self._leader_place.choose(view, self.claim)
 
     def _decide_as_member(self, view: View) -> None:
         claim = self.claim

@@ -126,14 +126,16 @@ class View:
 
     @property
     def vacant(self) -> list[int]:
-        """The vertices that are available, and of whose leader nothing was heard."""
+        """The vertices that somebody is to lead, and of whose leader nothing was heard."""
         if self._vacant is None:
-            self._vacant = [
-                v
-                for v, summary in enumerate(self.summaries)
-                if summary is None and self.map.vertex_places[v] not in self.blocked
-            ]
+            led = self.map.led(self.total, self.blocked)
+            self._vacant = [v for v in led if self.summaries[v] is None]
         return self._vacant
+
+    def is_spare(self, vertex: int) -> bool:
+        """Whether a vertex stays empty, for the team is too small to fill all that there are."""
+        place = self.map.vertex_places[vertex]
+        return place not in self.blocked and vertex not in self.map.led(self.total, self.blocked)
 
     @property
     def wanted(self) -> tuple[int, ...]:
