@@ -78,8 +78,6 @@ class Tree:
 
     def take_root(self, key: RootKey, now_s: float) -> None:
         """Become the root."""
-        if self.root is not None:
-            self._make_void(self.root)
         self.root, self.version, self.advanced_s = key, version_at(now_s), now_s
 
     def follow_root(
