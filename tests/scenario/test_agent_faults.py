@@ -30,6 +30,11 @@ WEDGE = Path("deploy/scenarios/wedge-9.toml")
         ("starve = { agents = [1] }", "starve.cpu_percent", "is missing"),
         ("starve = { agents = [1], cpu_percent = 100 }", "starve.cpu_percent", "99"),
         ("starve = { agents = [1], cpu_percent = 9, period_s = 0 }", "starve.period_s", "0.05"),
+        (
+            "starve = { agents = [1], cpu_percent = 9 }",
+            "starve.period_s",
+            "0.5; 9 % of it is 45 ms, less than a tick of 50 ms: steps may never take place; 0.56",
+        ),
         ("intruder = { agents = [0, 1, 2, 3, 4, 5, 6, 7, 8] }", "intruder.agents", "at most 8"),
         ("pose = { agents = ['queue:X'], noise_m = 1 }", "pose.agents[0]", "no queue 'X'"),
     ],

@@ -281,7 +281,7 @@ class EventChecks:
 
     def _agent_fault(self, kind: str, fault: AgentFault, at_s: float) -> Iterator[Problem]:
         yield from self._selectors(f"{kind}.agents", fault.agents)
-        broken = agent_fault_problem(fault, at_s)
+        broken = agent_fault_problem(fault, at_s, self._scenario.fleet.tick_hz)
         if broken is not None:
             yield broken.within(kind)
 

@@ -1,6 +1,7 @@
 """Random timelines: events of every kind, many of them at the same times and over each other."""
 
 from collections.abc import Callable
+from math import ceil
 
 from worldsim.search.draws import Draw, Tables
 from worldsim.search.fleets import lattice
@@ -153,8 +154,10 @@ class Timeline:
         return {"bias_m": bias_m, "noise_m": noise_m, "bias_yaw_deg": draw.number(-180, 180, 0)}
 
     def _starve(self) -> Tables:
-        draw = self._draw
-        return {"cpu_percent": draw.whole(1, 99), "period_s": draw.among((0.05, 0.5, 3.0))}
+        draw, tick_s = self._draw, 1.0 / self._scenario["fleet"].get("tick_hz", 20.0)
+        period_s = draw.among((max(0.05, 1.25 * tick_s), 0.5, 3.0))
+        least = ceil(100.0 * tick_s / period_s)  # it must run for a tick of each period
+        return {"cpu_percent": draw.whole(least, 99), "period_s": period_s}
 
     def _clock(self) -> Tables:
         draw = self._draw
