@@ -90,3 +90,26 @@ def test_a_restarted_survivor_that_has_heard_nobody_is_not_judged() -> None:
     """It has no reason to take what it senses for the vehicle of a member."""
     before_the_death = survivor_flight(APEX, 1.9).ticks
     assert survivor_flight(APEX, 0.6, restarted=True).ticks == before_the_death
+
+
+@pytest.mark.parametrize(
+    ("away_m", "noise_m", "doubtful"),
+    [(0.45, 0.0, False), (0.501, 0.0, True), (0.55, 0.0, False), (0.45, 0.1, True)],
+)
+def test_a_vehicle_half_a_spacing_from_a_place_may_or_may_not_take_it(
+    away_m: float, noise_m: float, doubtful: bool
+) -> None:
+    """In doubt, what the agents claim counts: here nobody claims the apex, so it is taken."""
+    vehicles, phase = HoveringVehicles(1.0, noise_m), Judge(SCENARIO).phases[0]
+    for tick in straight_flight(SCENARIO):
+        position = tick.position.copy()
+        position[-1] = (0.0, 0.0, away_m)  # the apex stands in the origin
+        place = tick.place.copy()
+        place[:, 1] = np.maximum(place[:, 1], 1)
+        seen = replace(tick, position=position, place=place)
+        vehicles.see(seen)
+        if tick.time_s > UNIDENTIFIED_AFTER_S + 0.1:
+            break
+    assert vehicles.is_doubtful(seen, phase, TEAM) == doubtful
+    taken = doubtful or away_m < 0.5
+    assert vehicles.places_left_out(seen, phase, TEAM) == ({APEX} if taken else frozenset())

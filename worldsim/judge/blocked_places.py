@@ -1,8 +1,9 @@
 """What a component can know of the places that hovering vehicles take from it (E18).
 
-It cannot know of a vehicle that none of its agents surely senses. Nor can it know that a place is
-free that a vehicle has left, where an agent of it sensed the vehicle and none has come near since:
-agents then remember the vehicle, for a limited time.
+It cannot know of a vehicle that none of its agents surely senses, nor whether one takes a place
+that hovers half a spacing from it, give or take what the sensor's noise hides. Nor can it know that
+a place is free that a vehicle has left, where an agent of it sensed the vehicle and none has come
+near since: agents then remember the vehicle, for a limited time.
 """
 
 from collections.abc import Sequence
@@ -71,6 +72,8 @@ class BlockedPlaces:
     def _is_unclear(
         self, tick: Tick, phase: Phase, rows: list[int], occupied: frozenset[Place]
     ) -> bool:
+        if self._hovering.is_doubtful(tick, phase, rows):
+            return True
         if occupied:
             seen = self._watchers.seen_by(tick.position, rows)
             if occupied != self._hovering.occupied_places(tick, phase, rows, seen):

@@ -8,6 +8,7 @@ does not.
 from collections import deque
 from collections.abc import Sequence
 from math import dist
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,15 +23,21 @@ from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import CONVERGED_M
 from worldsim.truth.vehicle import Floats
 
+UNSURE_M: Final = 0.01
+"""Besides noise, an agent may be wrong by so much about where a vehicle is [m]."""
+
 
 class HoveringVehicles:
     """Finds the layout that hovering vehicles leave to a team. It must see every tick.
 
-    spacing: d_ir [m].
+    spacing: d_ir [m]; noise_m: by how much agents may err about where a vehicle is.
     """
 
-    def __init__(self, spacing: float) -> None:
+    def __init__(self, spacing: float, noise_m: float = 0.0) -> None:
         self._targets = PlacePoints(spacing)
+        unsure_m = 2.0 * (noise_m + UNSURE_M)  # a vehicle takes what is within half the spacing
+        self._surely_taken = PlacePoints(spacing - unsure_m)
+        self._maybe_taken = PlacePoints(spacing + unsure_m)
         self._positions: deque[tuple[float, Floats]] = deque()
 
     def see(self, tick: Tick) -> None:
@@ -64,16 +71,20 @@ class HoveringVehicles:
 
         seen: which vehicles count (N,); None: all.
         """
+        positions = self._others(tick, team, seen)
+        return self.places_near(tick, phase, team, positions) if positions else NO_PLACES
+
+    def _others(
+        self, tick: Tick, team: list[int], seen: NDArray[np.bool_] | None = None
+    ) -> list[Vector]:
+        """Return where vehicles outside a team (rows) hover [m; world frame]. seen: which count."""
         if len(team) == len(tick.alive):
-            return NO_PLACES
+            return []
         others = self.hovering(tick)
         others[team] = False
         if seen is not None:
             others &= seen
-        if not others.any():
-            return NO_PLACES
-        positions = [(x, y, z) for x, y, z in tick.position[others].tolist()]
-        return self.places_near(tick, phase, team, positions)
+        return [(x, y, z) for x, y, z in tick.position[others].tolist()]
 
     def places_near(
         self,
@@ -88,6 +99,33 @@ class HoveringVehicles:
         occupied: places that others take.
         """
         return self._targets.taken_by(_flown(tick, phase), len(team), positions, occupied)
+
+    def is_doubtful(self, tick: Tick, phase: Phase, team: list[int]) -> bool:
+        """Whether a team (rows) may or may not take a place for taken."""
+        surely, maybe = self._bounds(tick, phase, team)
+        return surely != maybe
+
+    def places_left_out(self, tick: Tick, phase: Phase, team: list[int]) -> frozenset[Place]:
+        """Return the places that others take from a team (rows), in doubt as its agents see it."""
+        surely, maybe = self._bounds(tick, phase, team)
+        if surely == maybe:
+            return surely
+        claims = phase.claims(tick)
+        claimed = {Place(*claims[row]) for row in team}
+        return surely | (maybe - claimed)
+
+    def _bounds(
+        self, tick: Tick, phase: Phase, team: list[int]
+    ) -> tuple[frozenset[Place], frozenset[Place]]:
+        """Return the places that others surely take from a team, and those that they may take."""
+        positions = self._others(tick, team)
+        if not positions:
+            return NO_PLACES, NO_PLACES
+        flown, agents = _flown(tick, phase), len(team)
+        return (
+            self._surely_taken.taken_by(flown, agents, positions),
+            self._maybe_taken.taken_by(flown, agents, positions),
+        )
 
     def held_places(self, tick: Tick, phase: Phase, team: list[int]) -> frozenset[Place]:
         """Return the places in which agents of a team (rows) stand that claim them."""

@@ -10,6 +10,7 @@ from typing import NamedTuple, assert_never, final
 import numpy as np
 
 from agent.guidance.cone import cone_of
+from agent.guidance.sight import vehicle_margin_m
 from agent.messages import FramePath
 from agent.qstructure.formation import FormationSpec, formation_of
 from worldsim.judge.expectations import RunExpectations, RunMeasured, fault_window_s
@@ -116,7 +117,9 @@ class Judge:
         self.phases = [self._phase(scenario.formation, 0.0, path_of(scenario.frame))]
         self.queues = [QueueConvergence(self.phases[0])]
         self.sub_formations = [SubFormations(self.phases[0])]
-        self._hovering = HoveringVehicles(scenario.control.spacing_m)
+        self._hovering = HoveringVehicles(
+            scenario.control.spacing_m, vehicle_margin_m(scenario.sensor)
+        )
         self._recoveries = Recoveries()
         self._without_room: list[Restarted | Joined] = []
         converges = scenario.expect.converge
@@ -245,7 +248,7 @@ class Judge:
         self._count_turns(tick)
         phase = self.phases[-1]
         team = [row for row, runs in enumerate(tick.alive.tolist()) if runs]
-        error = phase.slot_error(tick, self._hovering.occupied_places(tick, phase, team))
+        error = phase.slot_error(tick, self._hovering.places_left_out(tick, phase, team))
         in_place = phase.see(tick.time_s, [error[row] for row in team])
         slot_error = np.array(error)
         if self._attitudes is not None:
