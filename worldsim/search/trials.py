@@ -30,6 +30,8 @@ DRAFTS = 40
 SETTLES_S = 30.0
 """Time for news to spread and a team to settle, beside the time to fly [s]."""
 HURT_S = (15.0, 30.0)
+BLIND_SHARE = 0.25
+"""Share of its speed at which a vehicle flies among others that it knows by their reports alone."""
 DETOUR = 1.5
 """How much longer than the straight way an agent's way may be."""
 WIDER = 1.7
@@ -143,7 +145,7 @@ def _timed(draw: GeneDraw, made: Tables, terms: Terms, busy_s: float, way_m: flo
     hurt_s = max(draw.part("hurt").number(*HURT_S, 0), ceil(busy_s))
     slowest = _slowest(made)
     expect = made.get("expect") or {}
-    alone_s = float(ceil(SETTLES_S + way_m / slowest))
+    alone_s = float(ceil(SETTLES_S + way_m / _pace(made)))
     alone_s = max(alone_s, expect.get("converge_within_s") or 0.0, LEAST_S - hurt_s)
     made["event"] = [*(made.get("event") or ()), *_faults(draw, made, hurt_s, slowest)]
     made["event"].sort(key=lambda each: float(each["at_s"]))
@@ -163,7 +165,7 @@ def fair_s(made: Tables) -> float:
     """Return a fair time for a team to form its formation, after all faults have ended [s]."""
     agents, spacing = made["fleet"]["agents"], (made.get("control") or {}).get("spacing_m", 1.0)
     way_m = DETOUR * (_team(made).reach_m(agents) + spacing * agents)
-    return float(ceil(SETTLES_S + way_m / _slowest(made)))
+    return float(ceil(SETTLES_S + way_m / _pace(made)))
 
 
 def _faults(draw: GeneDraw, made: Tables, hurt_s: float, slowest: float) -> list[Tables]:
@@ -314,6 +316,14 @@ def _team(made: Tables) -> Formation:
     return formation_of(
         msgspec.convert(tables, FormationSpec), (made.get("control") or {}).get("spacing_m", 1.0)
     )
+
+
+def _pace(made: Tables) -> float:
+    """Return how fast the slowest agent flies to its slot [m/s]."""
+    own = made.get("vehicle") or {}
+    changed = [{**own, **each["vehicle"]} for each in made.get("agent") or ()]
+    sees = all("proximity" in each.get("sensors", ["proximity"]) for each in (own, *changed))
+    return _slowest(made) * (1.0 if sees else BLIND_SHARE)
 
 
 def _slowest(made: Tables) -> float:
