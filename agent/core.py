@@ -37,6 +37,7 @@ from agent.controller import (
     Senses,
     load,
 )
+from agent.guidance.safety_filter import shortened
 from agent.guidance.safety_monitor import SafetyMonitor
 from agent.heard_beacon import HeardBeacon
 from agent.messages import (
@@ -218,11 +219,11 @@ class Agent:
 
     def _safe_velocity(self, observation: Observation, senses: Senses, wanted: Vector) -> Vector:
         """Return the velocity that the safety filter allows [m/s; world frame]."""
-        healthy = self._perception.sensor_health.update(observation)
+        trusted = self._perception.sensor_health.update(observation)
         if self._setup.control.safety_filter == "off":
             return wanted
         safe = self._safety_monitor.safe_velocity(wanted, senses)
-        return safe if healthy else ZERO
+        return safe if trusted else shortened(safe, self._perception.sensor_health.probing_mps)
 
     def _frames(
         self, senses: Senses, velocity: Vector, intent: Intent

@@ -14,6 +14,7 @@ from agent.messages import PROXIMITY_RANGE_M, Observation, Vector
 from agent.sensing.own_pose import JUMP_M
 from agent.sensing.ray_pattern import Pattern
 from agent.sensing.scan_jumps import ScanJumps, VehicleJumps
+from agent.sensing.seclusion import Seclusion
 from agent.vectors import apart
 
 MOVED_M: Final = 0.03
@@ -28,7 +29,7 @@ SLACK_M: Final = 0.3
 LOOKS: Final = 3
 """So many looks in a row that miss a near neighbour make the sensors distrusted; so many that find
 one, however far, make them trusted again: an agent that stands still is not where its team is.
-Neighbours that have flown away prove nothing."""
+Neighbours that have flown away prove nothing; then it follows them slowly (seclusion.py)."""
 NO_READING: tuple[object, ...] = ((), (), ())
 
 
@@ -66,12 +67,18 @@ class SensorHealth:
         self._blind = False
         self._has_jumped = False
         """Whether the proximity sensor has jumped since it was last trusted."""
+        self._seclusion = Seclusion(max_speed)
+
+        self.probing_mps = 0.0
+        """How fast the agent may fly while its sensors may not be trusted [m/s]; 0: it stands."""
 
     def update(self, observation: Observation) -> bool:
         """Take a new observation; return whether the sensors may be trusted."""
         self._update_stuck(observation)
         faulty = bool(self._due_s) and (self._is_late(observation) or self._jumped(observation))
-        return not (self._stuck or faulty or self._vehicles_jumped(observation) or self._blind)
+        faulty = faulty or self._stuck or self._vehicles_jumped(observation)
+        self.probing_mps = 0.0 if faulty else self._seclusion.probing_mps
+        return not (faulty or self._blind)
 
     def compare(self, observation: Observation, neighbours: Sequence[HeardBeacon]) -> None:
         """Check that near neighbours are sensed where they report themselves."""
@@ -84,13 +91,15 @@ class SensorHealth:
         near = [beacon for beacon in neighbours if apart(here, beacon.position) <= NEAR_M]
         looks = [(beacon, self._is_missed(observation, beacon)) for beacon in near]
         missed = {beacon.id: beacon.stamp_s for beacon, missed in looks if missed}
+        met = any(missed is False for _, missed in looks)
+        self._seclusion.update(observation, neighbours, met=met)
         self._accusers |= {beacon.id: beacon for beacon, missed in looks if missed}
         if missed:
             # A departed neighbour is missed too, but counts only once: it sends no new beacon.
             fresh = any(self._missed_s.get(other) != stamp_s for other, stamp_s in missed.items())
             self._missed, self._met = self._missed + fresh, 0
             self._blind = self._blind or self._missed >= LOOKS
-        elif any(missed is False for _, missed in looks) or (
+        elif met or (
             self._blind and any(self._is_missed(observation, b) is False for b in neighbours)
         ):
             self._missed, self._met = 0, self._met + 1
