@@ -26,8 +26,11 @@ class LeaderPlace:
         """Since when the vertex is to stay empty [s]."""
 
     def is_spare(self, view: View, claim: Claim) -> bool:
-        """Whether the own vertex is to stay empty, and has been for long enough."""
-        if not view.is_spare(claim.vertex):
+        """Whether the own vertex is to stay empty, and has been for long enough.
+
+        Who hears nobody keeps its lead: the others may be out of reach, and come back.
+        """
+        if not view.heard or not view.is_spare(claim.vertex):
             self._spare_since_s = inf
         else:
             self._spare_since_s = min(self._spare_since_s, view.now_s)

@@ -317,6 +317,9 @@ class Invariants:
     def _in_component(self, phase: Phase, rows: list[int], blocked: frozenset[Place]) -> Breaches:
         """Return the breaches in the component of these rows."""
         held = Counter(Place(*self._claims[row]) for row in rows)
+        free = {*phase.formation.vertex_places.values()} - blocked
+        if len(rows) == 1 and free.issuperset(held):
+            return Breaches(0, 0)  # who hears nobody may keep the vertex that it leads
         layout = phase.formation.layout(len(rows), blocked)
         vertices = sum(held[place] != 1 for place in layout.heads)
         common = set(phase.formation.common)
