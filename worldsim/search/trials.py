@@ -290,7 +290,9 @@ def _obstacles(draw: GeneDraw, slots: list[list[float]]) -> list[Tables]:
         table = each.among((sphere, cylinder))(each)
         table["radius_m"] = min(table["radius_m"], 0.6)
         centre = each.point(4.0, 0.5)
-        if all(dist(centre, slot) > table["radius_m"] + AROUND_SLOT_M for slot in slots):
+        axes = 2 if table["shape"] == "cylinder" else 3  # a cylinder may be as high as a slot
+        keep_m = table["radius_m"] + AROUND_SLOT_M
+        if all(dist(centre[:axes], slot[:axes]) > keep_m for slot in slots):
             found.append({**table, "centre_m": centre})
     return found
 
