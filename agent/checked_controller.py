@@ -6,13 +6,18 @@ from collections.abc import Iterable, Mapping
 from math import inf, isfinite
 from operator import index
 from re import fullmatch
-from typing import Final
+from typing import Annotated, Final, NamedTuple
 
+import msgspec
+from msgspec import Meta
 from msgspec.structs import replace
 
 from agent.child import ProgramError
 from agent.config import AgentSetup
 from agent.controller import (
+    BUILT_IN,
+    NO_SIGNALS,
+    NO_WORDS,
     Controller,
     Decide,
     FailedProgramError,
@@ -29,11 +34,18 @@ from agent.messages import (
     MAX_DATAGRAM_B,
     MAX_FORCE,
     MAX_M,
+    MAX_PLACES,
     MAX_SIGNAL,
     MAX_SIGNALS,
     MAX_SPEED_MPS,
+    ROLES,
     SIGNAL_NAME,
+    Index,
+    Members,
+    ParentId,
     Place,
+    Standing,
+    Summary,
     Vector,
 )
 from agent.parameters import made
@@ -42,8 +54,12 @@ from netem.wire.channels import CHANNELS
 
 MAX_INDEX: Final = 2**15
 """Queues and ranks are below it, and at least -1, as on the wire."""
-NUMBERS: Final = 13
-"""Numbers in an intent besides its target: three vectors, two tilt angles, yaw and force."""
+_AXES: Final = 3
+_TILTS: Final = 2  # pitch and roll
+_FLOATS: Final = (float,) * 13
+"""Types of an intent's numbers: three vectors, two tilt angles, yaw and force."""
+_FLOATS_WITH_TARGET: Final = (float,) * 16
+_EMPTY: Final = ()
 SMALL = min(MAX_SPEED_MPS, MAX_ANGLE_RAD)
 """Numbers whose absolute values add up to no more than this are within every bound."""
 
@@ -66,6 +82,7 @@ class CheckedController:
     def __init__(self, setup: AgentSetup, decide: Decide | None = None) -> None:
         control = setup.control
         name = control.command[0] if control.command else control.controller
+        self._trusts_words = control.controller in BUILT_IN
         self._label = f"controller {name!r} of agent {setup.id}"
         controller_class = load(setup.control.controller)
         try:
@@ -84,9 +101,10 @@ class CheckedController:
         """Return the controller's intent, in plain floats within the bounds of a command."""
         try:
             if self._decide is not None:
-                intent = plain(self._decide(self._controller, senses))
+                wanted = self._decide(self._controller, senses)
             else:
-                intent = plain(self._controller.decide(senses))
+                wanted = self._controller.decide(senses)
+            intent = plain(wanted, self._trusts_words)
             if intent.signals:
                 self._note_signals(intent.signals)
         except ProgramError as error:
@@ -107,7 +125,10 @@ class CheckedController:
         """Return the lines that the controller has written, no more than may be told now."""
         if self._limiter is None:
             return ()
-        return self._limiter.limited(self._controller.take_log(), now_s)  # type: ignore[attr-defined]
+        try:
+            return self._limiter.limited(self._controller.take_log(), now_s)  # type: ignore[attr-defined]
+        except BaseException as error:
+            raise self._fault(f"at {now_s:g} s, in its log", error) from error
 
     def _program_fault(self, when: str, error: ProgramError) -> FailedProgramError:
         return FailedProgramError(f"{self._label} failed {when}: {error}")
@@ -137,54 +158,83 @@ def described(error: BaseException) -> str:
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
-def plain(intent: Intent) -> Intent:
-    """Return an intent in plain floats; numpy's numbers are converted.
+def plain(intent: Intent, trusts_words: bool = False) -> Intent:
+    """Return an intent of plain floats, ints, strings, bytes and tuples; others are converted.
 
+    A number of a class of its own (numpy's, or one with methods of its own) is converted once, and
+    what is checked is what was converted: so what is checked is what is flown.
+
+    trusts_words: whether the controller is one of this project's, whose words need no check.
     Raises TypeError if it is not an Intent, ValueError for numbers outside a command's bounds.
     """
-    # isinstance() alone is slow for structures of msgspec.
-    if type(intent) is not Intent and not isinstance(intent, Intent):
-        raise TypeError(f"decide returned {type(intent).__name__}, not an Intent")
-    if intent.messages or intent.signals:
+    if type(intent) is not Intent:
+        intent = _exact(intent)
+    if intent.signals is not NO_SIGNALS or intent.messages is not _EMPTY:
         intent = replace(
             intent, messages=_messages(intent.messages), signals=_signals(intent.signals)
         )
+    if intent.blocked is not _EMPTY:
+        intent = replace(intent, blocked=_places(intent.blocked))
+    if intent.words is not NO_WORDS and not (trusts_words and type(intent.words) is Words):
+        intent = replace(intent, words=_words(intent.words))
     if not _claims_soundly(intent):
         intent = _with_sound_claims(intent)
-    numbers = (
-        *intent.wanted,
-        *intent.velocity,
-        *intent.heading_for,
-        *intent.tilt,
-        intent.yaw,
-        intent.force,
-    )
-    target = () if intent.target is None else intent.target
-    total = sum(map(abs, (*numbers, *target)))
-    # The fast path, nearly always taken: one sum shows that all are plain, finite and small.
-    sound = type(total) is float and total <= SMALL and intent.force >= 0.0
-    tuples = type(intent.wanted) is type(intent.velocity) is type(intent.heading_for) is tuple
-    return intent if sound and tuples and len(numbers) == NUMBERS else _converted(intent)
+    return intent if _moves_soundly(intent) else _converted(intent)
+
+
+def _exact(given: object) -> Intent:
+    """Return an Intent of a class derived from it as an Intent, each field read once."""
+    if not isinstance(given, Intent):
+        raise TypeError(f"decide returned {type(given).__name__}, not an Intent")
+    return Intent(*[getattr(given, name) for name in Intent.__struct_fields__])
+
+
+def _moves_soundly(intent: Intent) -> bool:
+    """Return whether an intent's numbers are plain floats, finite and small; most always are.
+
+    Their types come first: abs() of a number of another class is what that class says.
+    """
+    wanted, velocity, heading_for = intent.wanted, intent.velocity, intent.heading_for
+    tilt, target = intent.tilt, intent.target
+    if not (
+        type(wanted) is type(velocity) is type(heading_for) is tuple
+        and type(tilt) is tuple
+        and (target is None or type(target) is tuple)
+        and len(wanted) == len(velocity) == len(heading_for) == _AXES
+    ):
+        return False
+    numbers: tuple[float, ...]
+    if target is None:
+        numbers = (*wanted, *velocity, *heading_for, *tilt, intent.yaw, intent.force)
+    else:
+        numbers = (*target, *wanted, *velocity, *heading_for, *tilt, intent.yaw, intent.force)
+    if tuple(map(type, numbers)) != (_FLOATS if target is None else _FLOATS_WITH_TARGET):
+        return False
+    # One sum shows that all are finite and small.
+    return sum(map(abs, numbers)) <= SMALL and intent.force >= 0.0
 
 
 def _claims_soundly(intent: Intent) -> bool:
     """Return whether an intent's claim is of the right types and bounds."""
-    place = intent.place
-    placed = place is None or (
-        type(place) is Place and -1 <= place.queue < MAX_INDEX and -1 <= place.rank < MAX_INDEX
-    )
-    return placed and 0.0 <= intent.cost_m < inf and type(intent.words) is Words
+    cost_m, place = intent.cost_m, intent.place
+    if not (type(cost_m) is float and 0.0 <= cost_m < inf and type(intent.vertex) is bool):
+        return False
+    if place is None:
+        return True
+    if type(place) is not Place:
+        return False
+    queue, rank = place
+    ints = type(queue) is int and type(rank) is int
+    return ints and -1 <= queue < MAX_INDEX and -1 <= rank < MAX_INDEX
 
 
 def _with_sound_claims(intent: Intent) -> Intent:
     """Return an intent with its claim in the right types. Raises ValueError or TypeError."""
-    if not isinstance(intent.words, Words):
-        raise TypeError(f"the Intent's words are {type(intent.words).__name__}, no Words")
-    cost_m = float(intent.cost_m)
+    cost_m = _number("the Intent's cost_m", intent.cost_m)
     if not 0.0 <= cost_m < inf:
         raise ValueError(f"the Intent's cost_m is {cost_m:g}; it is a distance, at least 0")
     place = None if intent.place is None else _place(intent.place)
-    return replace(intent, cost_m=cost_m, place=place, words=Words(*intent.words))
+    return replace(intent, cost_m=cost_m, place=place, vertex=bool(intent.vertex))
 
 
 def _place(given: Iterable[int]) -> Place:
@@ -197,16 +247,52 @@ def _place(given: Iterable[int]) -> Place:
     return Place(queue, rank)
 
 
+def _places(given: Iterable[Iterable[int]]) -> tuple[Place, ...]:
+    """Return the blocked places of an intent, no more than a beacon takes."""
+    places: list[Place] = []
+    for each in given:
+        if len(places) == MAX_PLACES:
+            raise ValueError(f"the Intent's blocked has more than {MAX_PLACES} places")
+        places.append(_place(each))
+    return tuple(places)
+
+
+class _SoundWords(NamedTuple):
+    """Words, with the bounds of the messages in which they go."""
+
+    standing: Standing | None
+    summary: Summary | None
+    tier: Index
+    parent: ParentId
+    role: Annotated[int, Meta(ge=0, lt=len(ROLES))]
+    agents: Members
+
+
+_encode_words: Final = msgspec.msgpack.Encoder(enc_hook=index).encode
+_decode_words: Final = msgspec.msgpack.Decoder(_SoundWords).decode
+
+
+def _words(given: object) -> Words:
+    """Return an intent's words as they are after a way over the wire: all of them plain."""
+    if not isinstance(given, Words):
+        raise TypeError(f"the Intent's words are {type(given).__name__}, no Words")
+    try:
+        return Words(*_decode_words(_encode_words(tuple(given))))
+    except (msgspec.MsgspecError, TypeError, OverflowError) as error:
+        raise ValueError(f"the Intent's words cannot be sent: {error}") from error
+
+
 def _converted(intent: Intent) -> Intent:
-    if intent.force < 0.0:
-        raise ValueError(f"the Intent's force is {intent.force:g}; it is a magnitude, at least 0")
-    pitch, roll = _numbers("tilt", intent.tilt, 2, MAX_ANGLE_RAD)
+    pitch, roll = _numbers("tilt", intent.tilt, _TILTS, MAX_ANGLE_RAD)
+    force = _numbers("force", (intent.force,), 1, MAX_FORCE)[0]
+    if force < 0.0:
+        raise ValueError(f"the Intent's force is {force:g}; it is a magnitude, at least 0")
     return replace(
         intent,
         wanted=_vector("wanted", intent.wanted, MAX_SPEED_MPS),
         velocity=_vector("velocity", intent.velocity, MAX_SPEED_MPS),
         yaw=_numbers("yaw", (intent.yaw,), 1, MAX_ANGLE_RAD)[0],
-        force=_numbers("force", (intent.force,), 1, MAX_FORCE)[0],
+        force=force,
         heading_for=_vector("heading_for", intent.heading_for, MAX_M),
         target=None if intent.target is None else _vector("target", intent.target, MAX_M),
         tilt=(pitch, roll),
@@ -224,7 +310,9 @@ def _messages(given: Iterable[Outgoing]) -> tuple[Outgoing, ...]:
             raise ValueError(f"the channel {channel!r} of a message is none of {CHANNELS}")
         if not isinstance(data, bytes | bytearray | memoryview):
             raise TypeError(f"a message holds {type(data).__name__}, not bytes")
-        plain_data = bytes(data)  # a memoryview counts items, which may be longer
+        # A memoryview may count items longer than a byte, and bytes() of a class derived from
+        # bytes may be of that class.
+        plain_data = memoryview(data).tobytes()
         if len(plain_data) > MAX_DATAGRAM_B:
             detail = f"{len(plain_data)} B; at most {MAX_DATAGRAM_B} B are allowed"
             raise ValueError(f"a message has {detail}")
@@ -234,31 +322,38 @@ def _messages(given: Iterable[Outgoing]) -> tuple[Outgoing, ...]:
     return tuple(messages)
 
 
-def _signals(given: Mapping[str, float]) -> dict[str, float]:
+def _signals(given: Mapping[str, float]) -> Mapping[str, float]:
     """Return an intent's signals as plain floats by name."""
     if not isinstance(given, Mapping):
         raise TypeError(f"the Intent's signals are {type(given).__name__}, no mapping of names")
-    if len(given) > MAX_SIGNALS:
-        raise ValueError(f"{len(given)} signals; at most {MAX_SIGNALS} are allowed")
-    signals = {}
+    signals: dict[str, float] = {}
     for name, value in given.items():
-        if not isinstance(name, str) or fullmatch(SIGNAL_NAME, name) is None:
+        # Copied, for fullmatch() and str() are told by a class derived from str what it is.
+        plain_name = str.__str__(name) if isinstance(name, str) else ""
+        if fullmatch(SIGNAL_NAME, plain_name) is None:
             detail = "lower-case letters, digits and _, at most 32, a letter first"
             raise ValueError(f"{name!r} is no name of a signal: {detail}")
-        signals[str.__str__(name)] = _signal(name, value)
-    return signals
+        signals[plain_name] = _signal(plain_name, value)
+        if len(signals) > MAX_SIGNALS:
+            raise ValueError(f"more than {MAX_SIGNALS} signals")
+    return signals or NO_SIGNALS
 
 
 def _signal(name: str, value: object) -> float:
-    if isinstance(value, str | bytes):
-        raise TypeError(f"the signal {name!r} is {value!r:.40}, no number")
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"the signal {name!r} is no number: {error}") from error
+    number = _number(f"the signal {name!r}", value)
     if not isfinite(number) or abs(number) > MAX_SIGNAL:
         raise ValueError(f"the signal {name!r} is {number:g}; at most {MAX_SIGNAL:g}")
     return number
+
+
+def _number(what: str, value: object) -> float:
+    """Return a number as a plain float. Raises TypeError or ValueError, which begin with what."""
+    if isinstance(value, str | bytes):
+        raise TypeError(f"{what} is {value!r:.40}, no number")
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{what} is no number: {error}") from error
 
 
 def _vector(name: str, given: Iterable[float], bound: float) -> Vector:
@@ -267,7 +362,7 @@ def _vector(name: str, given: Iterable[float], bound: float) -> Vector:
 
 
 def _numbers(name: str, given: Iterable[float], count: int, bound: float) -> list[float]:
-    numbers = [float(each) for each in given]
+    numbers = [_number(f"the Intent's {name}", each) for each in given]
     if len(numbers) != count:
         raise ValueError(f"the Intent's {name} has {len(numbers)} numbers instead of {count}")
     for number in numbers:

@@ -12,9 +12,21 @@ from msgspec.structs import replace
 from agent.checked_controller import CheckedController, plain
 from agent.comms.mission import Missions
 from agent.config import AgentSetup
-from agent.controller import ControllerError, FaultyControllerError, Heard, Intent, Senses, load
+from agent.controller import (
+    NO_SIGNALS,
+    ControllerError,
+    FaultyControllerError,
+    Heard,
+    Intent,
+    Outgoing,
+    Senses,
+    Words,
+    load,
+)
+from agent.controller_log import Logging
 from agent.guidance.flocking import Flocking
 from agent.guidance.q_structure import QStructure
+from agent.messages import Branch, Message, Place, RootKey, Standing
 from netem.compiled import UnloadableError
 from worldsim.scenario.file import load as load_scenario
 
@@ -225,3 +237,192 @@ def test_a_flock_keeps_the_limits_of_its_vehicles() -> None:
 def test_a_controller_that_exits_has_failed(controller_with: Any, exits: BaseException) -> None:
     with pytest.raises(FaultyControllerError, match=type(exits).__name__):
         controller_with(exits).decide(SENSES)
+
+
+class LyingFloat(float):
+    """Says that it is 0 and smaller than everything; it is what float's own methods say."""
+
+    def __abs__(self) -> float:
+        return 0.0
+
+    def __lt__(self, other: object) -> bool:
+        return True
+
+    __le__ = __ge__ = __gt__ = __lt__
+
+    def __bool__(self) -> bool:
+        return False
+
+
+class LyingInt(int):
+    """Says that it is within any bounds."""
+
+    def __lt__(self, other: object) -> bool:
+        return True
+
+    __le__ = __ge__ = __gt__ = __lt__
+
+
+class LyingTuple(tuple[Any, ...]):
+    """Shows others than it holds, from the second look on; says that it is empty."""
+
+    looks = 0
+
+    def __iter__(self) -> Any:
+        self.looks += 1
+        return super().__iter__() if self.looks == 1 else iter((nan, nan, nan))
+
+    def __eq__(self, other: object) -> bool:
+        return True
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __bool__(self) -> bool:
+        return False
+
+
+class LyingBytes(bytes):
+    """Hands out itself where a copy is asked for."""
+
+    def __bytes__(self) -> bytes:
+        return self
+
+    def __len__(self) -> int:
+        return 1
+
+
+class LyingText(str):
+    """Hands out itself where a copy is asked for."""
+
+    __slots__ = ()
+
+    def __str__(self) -> str:
+        return self
+
+
+class LyingIntent(Intent, frozen=True):
+    """Names another velocity each time."""
+
+    def __getattribute__(self, name: str) -> Any:
+        if name == "velocity":
+            return (LyingFloat(1.0), 0.0, 0.0)
+        return super().__getattribute__(name)
+
+
+def classes_in(value: Any) -> set[type]:
+    """Return the classes of a value and of all that it holds."""
+    held: list[Any] = []
+    if isinstance(value, dict):
+        held = [*dict.keys(value), *dict.values(value)]
+    elif isinstance(value, tuple):
+        held = list(tuple.__iter__(value))
+    elif isinstance(value, Message | Intent):
+        held = [object.__getattribute__(value, name) for name in type(value).__struct_fields__]
+    return {type(value)}.union(*map(classes_in, held))
+
+
+PLAIN = {float, int, bool, str, bytes, tuple, dict, type(None), type(NO_SIGNALS)}
+PLAIN |= {Intent, Place, Outgoing, Words, Standing, Branch, RootKey}
+LYING_STANDING = Standing(
+    branches=(Branch(RootKey(LyingInt(5), LyingInt(3)), LyingInt(1), 0, LyingInt(-1)),),
+    leads=LyingInt(-1),
+    queue=0,
+    heard=1,
+    pushes=False,
+    proposal=None,
+    reservation=None,
+    code=1,
+)
+
+
+@pytest.mark.parametrize(
+    ("fields", "what_it_is"),
+    [
+        ({"velocity": (LyingFloat(1.5), 0.0, 0.0)}, {"velocity": (1.5, 0.0, 0.0)}),
+        ({"velocity": LyingTuple((1.5, 0.0, 0.0))}, {"velocity": (1.5, 0.0, 0.0)}),
+        ({"target": LyingTuple(HERE)}, {"target": HERE}),
+        ({"tilt": LyingTuple((0.1, 0.2))}, {"tilt": (0.1, 0.2)}),
+        ({"yaw": LyingFloat(1.5)}, {"yaw": 1.5}),
+        ({"force": LyingFloat(1.5)}, {"force": 1.5}),
+        ({"force": True}, {"force": 1.0}),
+        ({"cost_m": LyingFloat(1.5)}, {"cost_m": 1.5}),
+        ({"place": Place(LyingInt(1), LyingInt(2))}, {"place": Place(1, 2)}),
+        ({"blocked": LyingTuple((Place(LyingInt(1), 2),))}, {"blocked": (Place(1, 2),)}),
+        ({"vertex": 1}, {"vertex": True}),
+        ({"words": Words(tier=LyingInt(1))}, {"words": Words(tier=1)}),
+        ({"words": Words(standing=LYING_STANDING)}, {"words": Words(standing=LYING_STANDING)}),
+        ({"signals": {LyingText("a"): LyingFloat(1.5)}}, {"signals": {"a": 1.5}}),
+        (
+            {"messages": LyingTuple(((LyingText("local"), LyingBytes(b"ab")),))},
+            {"messages": (Outgoing("local", b"ab"),)},
+        ),
+    ],
+)
+def test_what_is_checked_of_a_number_with_methods_of_its_own_is_what_is_flown(
+    fields: dict[str, Any], what_it_is: dict[str, Any]
+) -> None:
+    taken = plain(replace(HOVER, **fields))
+    assert taken == replace(HOVER, **what_it_is)
+    assert classes_in(taken) <= PLAIN
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"wanted": (LyingFloat(1e5), 0.0, 0.0)},
+        {"velocity": (LyingFloat(nan), 0.0, 0.0)},
+        {"velocity": (0.0, 0.0), "wanted": (0.0, 0.0, 0.0, 0.0)},
+        {"velocity": ("1", "0", "0")},
+        {"heading_for": (LyingFloat(1e9), 0.0, 0.0)},
+        {"target": (1.0,)},
+        {"target": LyingTuple((nan, 0.0, 0.0))},
+        {"yaw": LyingFloat(inf)},
+        {"force": LyingFloat(-1.0)},
+        {"cost_m": LyingFloat(-1.0)},
+        {"cost_m": LyingFloat(nan)},
+        {"place": Place(LyingInt(2**20), 0)},
+        {"blocked": ((LyingInt(2**20), 0),)},
+        {"blocked": (Place(0, 0),) * 13},
+        {"blocked": 7},
+        {"words": Words(tier=LyingInt(2**20))},
+        {"words": Words(role=9)},
+        {"words": Words(agents=-3)},
+        {"words": Words(standing=replace(LYING_STANDING, code=LyingInt(900)))},
+        {"words": Words(standing="leader")},  # type: ignore[arg-type]
+        {"signals": {"a": LyingFloat(inf)}},
+        {"messages": (Outgoing("local", LyingBytes(b"x" * 2000)),)},
+    ],
+)
+def test_a_number_outside_the_bounds_is_rejected_whatever_its_methods_say(
+    fields: dict[str, Any],
+) -> None:
+    with pytest.raises((ValueError, TypeError)):
+        plain(replace(HOVER, **fields))
+
+
+def test_an_intent_of_a_class_of_its_own_is_read_once() -> None:
+    given = LyingIntent(wanted=REST, velocity=REST, yaw=0.5, force=0.0, heading_for=HERE)
+    taken = plain(given)
+    assert taken == replace(HOVER, velocity=(1.0, 0.0, 0.0))
+    assert classes_in(taken) <= PLAIN
+
+
+class SulkingLogger(Logging):
+    """Fails where its log is asked for."""
+
+    def __init__(self, setup: AgentSetup) -> None:
+        del setup
+
+    def decide(self, senses: Senses) -> Intent:
+        del senses
+        return HOVER
+
+    def take_log(self) -> list[str]:
+        raise LookupError("no paper")
+
+
+def test_a_log_that_fails_is_the_failure_of_its_controller() -> None:
+    controller = CheckedController(setup_of(f"{__name__}:SulkingLogger"))
+    controller.decide(SENSES)
+    with pytest.raises(FaultyControllerError, match=r"agent 3 failed at 2\.5 s, in its log: Look"):
+        controller.log(2.5)

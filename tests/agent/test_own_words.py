@@ -152,7 +152,7 @@ def test_a_datagram_of_the_future_contradicts_the_clock_as_a_beacon_does() -> No
         ({"place": Place(10**30, 0)}, "at most 32767"),
         ({"cost_m": nan}, "cost_m is nan"),
         ({"words": None}, "no Words"),
-        ({"signals": {f"s{k}": 0.0 for k in range(MAX_SIGNALS + 1)}}, "signals; at most"),
+        ({"signals": {f"s{k}": 0.0 for k in range(MAX_SIGNALS + 1)}}, "more than 16 signals"),
     ],
 )
 def test_words_and_signals_out_of_bounds_are_refused_by_name(intent: Any, why: str) -> None:
