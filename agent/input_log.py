@@ -1,8 +1,8 @@
 """A file of all that one agent is given, step by step: with it, its controller can be asked again.
 
 The file holds msgpack values one after the other: the setup as JSON, and for each step a list of
-the frames heard since the step before and the encoded observation. The last step of a process that
-was killed may be cut off.
+the frames heard since the step before and the encoded observation, followed by the command that
+the agent answered. The last step of a process that was killed may be cut off or lack its command.
 """
 
 import sys
@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import msgpack
 import msgspec
 
-from agent.codec import decode_observation, encode
+from agent.codec import decode_command, decode_observation, encode
 from agent.config import AgentSetup
-from agent.messages import Observation
+from agent.messages import Command, Observation
 from agent.rejection import RejectedError
 from netem.wire.frame import Frame
 
@@ -28,10 +28,11 @@ class InputLogError(Exception):
 
 
 class StepInputs(NamedTuple):
-    """What an agent was given before and at one step."""
+    """What an agent was given before and at one step, and what it answered."""
 
     frames: tuple[Frame, ...]  # heard since the step before
     observation: Observation
+    command: Command | None = None  # None where it is not known
 
 
 class Life(NamedTuple):
@@ -63,6 +64,10 @@ class InputLog:
         """Note a step."""
         self._write((self._frames, encode(observation)))
         self._frames.clear()
+
+    def answer(self, command: bytes) -> None:
+        """Note the encoded command that the agent answers at a step."""
+        self._write(command)
 
     def close(self) -> None:
         """End the file."""
@@ -110,6 +115,15 @@ def _values(unpacker: Any) -> Iterator[object]:
 
 
 def _steps(values: Iterator[object]) -> Iterator[StepInputs]:
+    step: StepInputs | None = None
     for value in values:
+        if isinstance(value, bytes) and step is not None:
+            yield step._replace(command=decode_command(value))
+            step = None
+            continue
+        if step is not None:
+            yield step
         heard, observation = msgspec.convert(value, tuple[list[Frame], bytes])
-        yield StepInputs(tuple(heard), decode_observation(observation))
+        step = StepInputs(tuple(heard), decode_observation(observation))
+    if step is not None:
+        yield step

@@ -68,6 +68,9 @@ class AgentStepper:
             slot += observation.late_slots  # a radio sends what it gets, however old
         frames = tuple([Outgoing(channel, payload) for channel, payload in said])
         transmission = pack(Transmission(slot, self._incarnation, frames))
+        command = encode(outbox.command)
         # One directly after the other: the two then often leave in one packet.
-        self._put_command(encode(outbox.command))
+        self._put_command(command)
         self._put_transmission(transmission)
+        if self._inputs is not None:
+            self._inputs.answer(command)

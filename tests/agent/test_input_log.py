@@ -5,7 +5,10 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from agent.codec import encode
+from agent.core import Agent
 from agent.input_log import InputLog, InputLogError, StepInputs, log_path, logged_lives
+from agent.messages import Command
 from netem.wire.frame import Frame
 from tests.agent.test_core import AGENT_SETUP, observation
 
@@ -32,6 +35,20 @@ def test_it_comes_back_as_it_was_written(tmp_path: Path) -> None:
     assert (first.steps, first.cut) == (kept, False)
     assert (second.setup.incarnation, second.steps) == (1, [])
     assert logged_lives(tmp_path, 5) == []
+
+
+def test_a_step_comes_back_with_what_the_agent_answered(tmp_path: Path) -> None:
+    log, agent = InputLog(tmp_path, AGENT_SETUP), Agent(AGENT_SETUP)
+    answers: list[Command | None] = []
+    for tick in range(3):
+        log.step(observation(tick))
+        answers.append(agent.step(observation(tick)).command if tick != 1 else None)
+        if answers[-1] is not None:
+            log.answer(encode(answers[-1]))
+    log.close()
+    (life,) = logged_lives(tmp_path, 0)
+    assert [step.command for step in life.steps] == answers
+    assert [step.observation.slot for step in life.steps] == [observation(k).slot for k in range(3)]
 
 
 def test_what_a_killed_process_left_is_read_to_its_last_whole_step(tmp_path: Path) -> None:

@@ -88,6 +88,8 @@ def test_controllers_agree_in_their_own_words_under_each_clock(
     asked = start(*QSWARM, "replay", str(free), "--agent", "4", "--from", "4")
     assert asked.status(20.0) == 0, asked.text
     assert "known = 9\n" in asked.text
+    assert "agent 4 decides as in the run, at " in asked.text
+    assert "since" not in asked.text
 
 
 SLOW = """

@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from agent.codec import encode
 from agent.controller import Intent, Senses
+from agent.core import Agent
+from agent.input_log import InputLog
 from agent.messages import Command
 from agent.setup import AgentSetup
 from tests.small_scenario import SMALL
@@ -17,7 +20,8 @@ from worldsim.engine.virtual import VirtualFleet
 from worldsim.replay.flown_again import flown_again
 from worldsim.replay.inputs import LifeRecorder
 from worldsim.replay.steps import Span, steps
-from worldsim.scenario.file import parse
+from worldsim.results.flown_code import keep_code
+from worldsim.scenario.file import load, parse
 
 LOSSY = {"netem.loss_percent": "30", "duration_s": "2"}
 KILLED = f"{SMALL}\n[[event]]\nat_s = 0.6\nkill = [1]\n[[event]]\nat_s = 1.0\nrestart = [1]\n"
@@ -131,6 +135,69 @@ def test_a_run_that_flies_otherwise_today_is_doubted(
     capsys.readouterr()
     assert command(["replay", str(run), "--agent", "0", "--to", "0"]) == 0
     assert "flown again, the run has another trace" in capsys.readouterr().err
+
+
+def recorded(folder: Path, run: Path, agent: int) -> None:
+    """Let a run look as one of `qswarm run --record-inputs` does."""
+    scenario = load(run / "scenario.toml")
+    (run / "inputs").mkdir()
+    keep_code(run / "inputs", scenario.control)
+    (life,) = flown_again(scenario, agent).lives
+    log, core = InputLog(run / "inputs", life.setup), Agent(life.setup)
+    for frames, observation, _ in life.steps:
+        log.hear(frames)
+        log.step(observation)
+        for frame in frames:
+            core.receive(frame.source, frame.channel, frame.payload, observation.time_s)
+        log.answer(encode(core.step(observation).command))
+    log.close()
+
+
+DRIFTS = """
+from agent.controller import Intent
+class Drifts:
+    services = ()
+    def __init__(self, setup): pass
+    def decide(self, senses):
+        v = ({}, 0.0, 0.0)
+        return Intent(v, v, 0.0, 0.1, senses.position)
+"""
+
+
+def test_a_replay_of_recorded_inputs_says_what_has_changed_since(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    package = tmp_path / "drifting.py"
+    package.write_text(DRIFTS.format("0.1"))
+    run = flown(tmp_path, "control.controller=drifting:Drifts", "duration_s=1")
+    recorded(tmp_path, run, 1)
+    asked = ["replay", str(run), "--agent", "1", "--from", "0.5", "--to", "0.6"]
+
+    capsys.readouterr()
+    assert command(asked) == 0
+    assert capsys.readouterr().err == "agent 1 decides as in the run, at 12 steps up to here\n"
+
+    package.write_text(DRIFTS.format("0.1 + 0.2 * (senses.now_s > 0.3)"))
+    for name in [name for name in sys.modules if name == "drifting"]:
+        del sys.modules[name]
+    assert command(asked) == 0
+    told = capsys.readouterr().err.splitlines()
+    assert told[0] == (
+        f"{run}: the code of the controller 'drifting:Drifts' has changed since the run;"
+        " today's is asked about what the agent was given then"
+    )
+    assert told[1].startswith("agent 1 decides otherwise than in the run from 0.312 s on: it wants")
+    assert told[1].endswith("wants (0.3, 0, 0), not (0.1, 0, 0)")
+
+    kept = run / "inputs" / "code.json"
+    kept.write_text(json.dumps({**json.loads(kept.read_text()), "agent_sha256": "0" * 64}))
+    package.write_text(DRIFTS.format("0.1"))
+    assert command(asked) == 0
+    assert "the code of qswarm's agents has changed since the run" in capsys.readouterr().err
+    kept.unlink()
+    assert command(asked) == 0
+    assert "which code it flew is not recorded" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,9 @@ from types import ModuleType
 from typing import Any
 
 from netem.wire.shutdown import StopRequest
-from worldsim.campaign.controller_code import UserController, code_sha256
 from worldsim.campaign.flight_server import FlightServer, ServerEndedError
 from worldsim.campaign.flight_site import Flown, Order, SiteError
+from worldsim.results.controller_code import UserController, code_sha256
 from worldsim.results.provenance import provenance
 
 CONNECT_WITHIN_S = 10.0

@@ -10,6 +10,7 @@ from worldsim.commands.options import complain, examples
 from worldsim.results.exit_status import BAD_INPUT, FAIL, PASS
 
 if TYPE_CHECKING:
+    from worldsim.replay.decisions import DecisionComparison
     from worldsim.replay.replay import Replay
     from worldsim.replay.steps import Span
 
@@ -42,9 +43,11 @@ def replay(
     """Ask one agent's controller again, with all that it sensed in a run.
 
     A run in virtual time or in lockstep is flown again for that, and its trace compared; one of
-    `qswarm run --record-inputs` has it all in its folder, also free-running. Each step
-    shows where the agent was, whom it heard, what it wanted, and what the safety filter made of it.
+    `qswarm run --record-inputs` has it all in its folder, also free-running: there `replay` says if
+    the controller has changed since, and where it first decides otherwise. Each step shows where
+    the agent was, whom it heard, what it wanted, and what the safety filter made of it.
     """
+    from worldsim.replay.decisions import DecisionComparison
     from worldsim.replay.replay import ReplayError, replay_of
     from worldsim.replay.steps import Span
     from worldsim.results.progress_line import ProgressLine
@@ -68,10 +71,16 @@ def replay(
         return BAD_INPUT
     if found.doubt is not None:
         complain(f"{run}: {found.doubt}")
-    return _show(found, span, pdb, json)
+    compared = DecisionComparison()
+    status = _show(found, span, compared, pdb, json)
+    if compared.text is not None:
+        complain(f"agent {agent} {compared.text}")
+    return status
 
 
-def _show(found: "Replay", span: "Span", pdb: bool, json: bool) -> int:
+def _show(
+    found: "Replay", span: "Span", compared: "DecisionComparison", pdb: bool, json: bool
+) -> int:
     """Print the steps of a span; return the exit status."""
     from agent.controller import FaultyControllerError
     from agent.lines import SensesLines
@@ -82,7 +91,7 @@ def _show(found: "Replay", span: "Span", pdb: bool, json: bool) -> int:
     ask = debugger.ask if debugger is not None else None
     lines, shown = SensesLines(found.scenario.fleet.agents), 0
     try:
-        for step in found.steps(span, ask):
+        for step in found.steps(span, ask, compared):
             print(step_json(step, lines) if json else step_text(step), flush=pdb)
             shown += 1
     except FaultyControllerError as error:

@@ -47,7 +47,7 @@ def flight_site(
     if jobs is not None:
         raise typer.BadParameter("its workers decide that (--jobs)", param_hint="--cluster")
     from worldsim.campaign.cluster_site import ClusterSite
-    from worldsim.campaign.controller_code import user_controllers
+    from worldsim.results.controller_code import user_controllers
 
     site = ClusterSite(cluster, user_controllers(scenarios))
     try:

@@ -36,6 +36,7 @@ from worldsim.fleet.terminal import Terminal, console_on
 from worldsim.fleet.zygote import AgentProcessConfig, Zygote
 from worldsim.results.closing import Output
 from worldsim.results.environment import descriptors_problem
+from worldsim.results.flown_code import keep_code
 from worldsim.results.overall import FailedRun, Result
 from worldsim.results.run_folder import RunDirectory, RunDirectoryError, unwritable
 from worldsim.results.summary import Summary
@@ -245,6 +246,7 @@ class Launcher:
         if not self._options.inputs:
             return None
         self._directory.inputs.mkdir()
+        keep_code(self._directory.inputs, self._scenario.control)
         return self._directory.inputs
 
     def _run_netem(self, shard: int) -> int:

@@ -8,8 +8,10 @@ from typing import Any, NamedTuple
 from agent.input_log import InputLogError, Life, logged_lives
 from worldsim.engine.preflight import VIRTUAL_COMMAND_TICKS, admit
 from worldsim.recording.layout import SUMMARY_FILE
+from worldsim.replay.decisions import DecisionComparison
 from worldsim.replay.flown_again import flown_again
 from worldsim.replay.steps import Ask, Span, Step, steps
+from worldsim.results.flown_code import code_of, kept_code
 from worldsim.results.run_folder import INPUTS
 from worldsim.scenario.file import load
 from worldsim.scenario.tables import Scenario
@@ -35,9 +37,11 @@ class Replay(NamedTuple):
         times_s = (each.observation.time_s for life in self.lives for each in life.steps)
         return next((time_s for time_s in times_s if time_s >= from_s), None)
 
-    def steps(self, span: Span, ask: Ask | None = None) -> Iterator[Step]:
+    def steps(
+        self, span: Span, ask: Ask | None = None, compared: DecisionComparison | None = None
+    ) -> Iterator[Step]:
         """Yield the steps of a span; see worldsim.replay.steps."""
-        return steps(self.lives, span, ask)
+        return steps(self.lives, span, ask, compared)
 
 
 def replay_of(
@@ -57,7 +61,8 @@ def replay_of(
     summary = _summary(run / SUMMARY_FILE)
     recorded = _recorded(run, agent)
     if recorded:
-        return Replay(scenario, recorded, _cut(recorded))
+        doubts = (_other_code(run, scenario), _cut(recorded))
+        return Replay(scenario, recorded, "; ".join(filter(None, doubts)) or None)
     mode = summary.get("mode", "virtual")
     if mode not in REPEATABLE:
         raise ReplayError(
@@ -76,6 +81,17 @@ def _recorded(run: Path, agent: int) -> list[Life]:
         return logged_lives(run / INPUTS, agent)
     except InputLogError as error:
         raise ReplayError(str(error)) from error
+
+
+def _other_code(run: Path, scenario: Scenario) -> str | None:
+    """Return what code has changed since a run that kept its agents' inputs; None: none has."""
+    kept = kept_code(run / INPUTS)
+    if kept is None:
+        return "which code it flew is not recorded: the controller may have changed since"
+    changes = kept.changes_to(code_of(scenario.control))
+    if changes is None:
+        return None
+    return f"{changes} since the run; today's is asked about what the agent was given then"
 
 
 def _cut(lives: list[Life]) -> str | None:

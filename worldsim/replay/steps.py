@@ -11,6 +11,7 @@ from agent.controller import Controller, Intent, Senses
 from agent.core import Agent
 from agent.input_log import Life
 from agent.messages import Vector
+from worldsim.replay.decisions import DecisionComparison
 
 Ask = Callable[[Controller, Senses], Intent]
 
@@ -36,17 +37,26 @@ class Step(NamedTuple):
     log: tuple[str, ...]
 
 
-def steps(lives: Sequence[Life], span: Span, ask: Ask | None = None) -> Iterator[Step]:
+def steps(
+    lives: Sequence[Life],
+    span: Span,
+    ask: Ask | None = None,
+    compared: DecisionComparison | None = None,
+) -> Iterator[Step]:
     """Yield the steps of a span. ask: how the controller is asked in it; None: directly.
 
-    Raises FaultyControllerError where the controller fails.
+    compared: gets all steps up to the span's end. Raises FaultyControllerError where the controller
+    fails.
     """
+    compared = DecisionComparison() if compared is None else compared
     for life in lives:
         if life.steps and life.steps[0].observation.time_s <= span.to_s:
-            yield from _steps_of(life, span, ask)
+            yield from _steps_of(life, span, ask, compared)
 
 
-def _steps_of(life: Life, span: Span, ask: Ask | None) -> Iterator[Step]:
+def _steps_of(
+    life: Life, span: Span, ask: Ask | None, compared: DecisionComparison
+) -> Iterator[Step]:
     asked: list[tuple[Senses, Intent]] = []
 
     def decide(controller: Controller, senses: Senses) -> Intent:
@@ -57,12 +67,13 @@ def _steps_of(life: Life, span: Span, ask: Ask | None) -> Iterator[Step]:
         return intent
 
     agent = Agent(life.setup, decide=decide)
-    for frames, observation in life.steps:
+    for frames, observation, answered in life.steps:
         if observation.time_s > span.to_s + 1e-9:
             return
         for frame in frames:
             agent.receive(frame.source, frame.channel, frame.payload, observation.time_s)
         command = agent.step(observation).command
+        compared.note(observation.time_s, answered, command)
         while asked:
             senses, intent = asked.pop()
             report = command.telemetry.report

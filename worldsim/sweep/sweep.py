@@ -7,9 +7,9 @@ from time import monotonic
 from typing import NamedTuple
 
 from netem.wire.shutdown import StopRequest, stop_requests
-from worldsim.campaign.controller_code import code_sha256, user_controllers
 from worldsim.campaign.flight_site import FlightSite, Order, SiteError
 from worldsim.export.table_files import write_csv, write_parquet
+from worldsim.results.controller_code import code_sha256, user_controllers
 from worldsim.results.exit_status import EXIT_STATUS, INTERRUPTED
 from worldsim.results.progress_line import ProgressLine
 from worldsim.results.provenance import provenance
