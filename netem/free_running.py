@@ -13,6 +13,7 @@ import msgspec
 from netem.fault_queue import FaultQueue
 from netem.medium import Medium
 from netem.messages import MAX_TRUTH_B, MediumCounters, MediumSetup, Truth
+from netem.sender_counts import CheckedFrames, FrameCheck, SenderCounts
 from netem.wire.bus import Bus
 from netem.wire.frame import (
     MAX_EARLY_US,
@@ -63,6 +64,7 @@ class Intake:
         before = setup.resumes.counters if setup.resumes is not None else None
         self.rejected = Counter(before.rejected if before is not None else {})
         """Number of rejected messages by cause."""
+        self.senders = SenderCounts(before.transmissions if before is not None else ())
         self.incarnations: tuple[int, ...] = (0,) * setup.agents
         """Row i = agent i's current incarnation, from the newest truth."""
         self._slots_per_tick = setup.slots_per_tick
@@ -84,17 +86,22 @@ class Intake:
         try:
             transmission = unpack_transmission(data)
         except WireError as error:
-            self.rejected[str(error).split(" ", 1)[0].rstrip(":")] += 1
+            self._refuse(sender, str(error).split(" ", 1)[0].rstrip(":"))
             return None
         cause = self._rejection(sender, transmission, slot)
         if cause is not None:
-            self.rejected[cause] += 1
+            self._refuse(sender, cause)
             return None
+        self.senders.count(sender, None)
         self._last[sender] = (transmission.incarnation, transmission.slot)
         if transmission.slot > slot:
             self._early[sender] = transmission
             return None
         return transmission
+
+    def _refuse(self, sender: int, cause: str) -> None:
+        self.rejected[cause] += 1
+        self.senders.count(sender, cause)
 
     def _rejection(self, sender: int, transmission: Transmission, slot: int) -> str | None:
         """Return the cause for which a transmission is rejected, or None."""
@@ -110,11 +117,13 @@ class Intake:
 
 
 class FreeRunningMedium:
-    """Plays the slots of one run on the wall clock."""
+    """Plays the slots of one run on the wall clock. check: of foreign agents' frames."""
 
-    def __init__(self, bus: Bus, setup: MediumSetup) -> None:
+    def __init__(self, bus: Bus, setup: MediumSetup, check: FrameCheck | None = None) -> None:
         self._setup = setup
         self._medium = Medium(setup)
+        before = setup.resumes.counters if setup.resumes is not None else None
+        self._checked = CheckedFrames(check, before.frames if before is not None else ())
         self._intake = Intake(setup)
         self._lateness = Lateness(setup.speed)
         agents = range(setup.agents)
@@ -139,6 +148,8 @@ class FreeRunningMedium:
             self._medium.counters(self._slot),
             rejected=dict(self._intake.rejected),
             late_s=self._lateness.summary(),
+            transmissions=self._intake.senders.rows(),
+            frames=self._checked.rows(),
         )
         self._report(pack(counters))
 
@@ -185,6 +196,7 @@ class FreeRunningMedium:
     def _transmit(self, sender: int, transmission: Transmission | None) -> None:
         if transmission is not None:
             sent_s = transmission.slot / self._setup.slot_hz
+            self._checked.note(sender, transmission.frames, sent_s)
             self._medium.transmit(sender, sent_s, transmission)
 
     def _send_batches(self, slot: int, newest_s: float, read_at: float) -> None:

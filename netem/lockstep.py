@@ -4,8 +4,11 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
+from msgspec.structs import replace
+
 from netem.medium import Medium
 from netem.messages import MediumSetup, SlotInput, SlotResult, unpack_slot_input
+from netem.sender_counts import CheckedFrames, FrameCheck
 from netem.wire.barrier import LOCKSTEP_RING, LockstepError, await_message, check_slot
 from netem.wire.bus import Bus
 from netem.wire.frame import (
@@ -32,17 +35,24 @@ class LockstepMedium:
     """Plays the slots of one run in lockstep, as one shard of the medium.
 
     Batches leave when their slot is opened, since only then its participants are known. A paused
-    agent is sent nothing, so that no stale batch waits for it when it resumes.
+    agent is sent nothing, so that no stale batch waits for it when it resumes. check: of foreign
+    agents' frames.
     """
 
     def __init__(
-        self, bus: Bus, setup: MediumSetup, shard: int, should_stop: Callable[[], bool]
+        self,
+        bus: Bus,
+        setup: MediumSetup,
+        shard: int,
+        should_stop: Callable[[], bool],
+        check: FrameCheck | None = None,
     ) -> None:
         agents = range(setup.agents)
         self._setup = setup
         self._should_stop = should_stop
         self._slot = 0
         self._medium = Medium(setup, setup.receivers)
+        self._checked = CheckedFrames(check)
         self._own = frozenset(agents if setup.receivers is None else setup.receivers)
         self._pending = {agent: PendingBatches(0, deque(maxlen=BATCH_RING)) for agent in agents}
         self._senders = [bus.subscriber("tx", agent, LOCKSTEP_RING) for agent in agents]
@@ -72,7 +82,7 @@ class LockstepMedium:
         self._queue_batches(slot_input)
         pages = tuple(self._medium.pages().items())
         self._slot += 1
-        counters = self._medium.counters(self._slot)
+        counters = replace(self._medium.counters(self._slot), frames=self._checked.rows())
         self._report(pack(SlotResult(slot=slot_input.truth.slot, pages=pages, counters=counters)))
 
     def _slot_input(self, data: bytes) -> SlotInput:
@@ -117,6 +127,7 @@ class LockstepMedium:
         check_slot(what, transmission.slot, slot)
         if transmission.incarnation != slot_input.incarnations[sender]:
             raise LockstepError(f"{what} is of its incarnation {transmission.incarnation}")
+        self._checked.note(sender, transmission.frames, slot_input.truth.time_s)
         self._medium.transmit(sender, slot_input.truth.time_s, transmission)
 
     def _queue_batches(self, slot_input: SlotInput) -> None:

@@ -13,6 +13,7 @@ from msgspec import Meta
 
 from netem.faults import FaultOrder, Position
 from netem.link_parameters import Conditions
+from netem.sender_counts import SenderRow
 from netem.wire.frame import (
     MAX_OBSERVATION_B,
     AgentId,
@@ -67,6 +68,10 @@ class MediumCounters(
     """Payload bytes that each agent sent on each channel, channels of one agent side by side."""
     struck: tuple[tuple[Count, Count], ...] = ()
     """Numbers of radio faults, each with frames, times the links that it cut or altered."""
+    transmissions: tuple[SenderRow, ...] = ()
+    """Of each agent, free-running: those that the medium accepted and refused."""
+    frames: tuple[SenderRow, ...] = ()
+    """Of each foreign agent: those that whoever hears them accepts or rejects."""
 
     def packets(self) -> dict[str, int]:
         """Return the packet counters under their keys of summary.json."""

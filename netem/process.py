@@ -15,6 +15,7 @@ from zenoh.handlers import RingChannel
 from netem.free_running import FreeRunningMedium
 from netem.lockstep import LockstepMedium
 from netem.messages import MAX_CONDITIONS_B, MediumSetup
+from netem.sender_counts import FrameCheck
 from netem.wire.access import AccessControl, AccessError
 from netem.wire.barrier import LockstepError, RunOverError
 from netem.wire.bus import Bus, Handler, Subscriber, drain, receive
@@ -39,10 +40,12 @@ class SilenceError(RuntimeError):
 
 
 class ServingOptions(NamedTuple):
-    """How a medium treats other processes that are silent."""
+    """How a medium treats other processes: those that are silent, and those of another make."""
 
     patient: bool = False
     """Whether it waits for the world without end: a launcher ends it."""
+    check: FrameCheck | None = None
+    """Of foreign agents' frames."""
 
 
 BY_HAND = ServingOptions()
@@ -144,8 +147,7 @@ def serve(
             limiter.enforce()
             server.wait(WAIT_S)
         if server.run is not None and server.setup is not None:
-            silence_s = inf if options.patient else SILENCE_S
-            _serve_run(Bus(session, Keys(server.run)), server, limiter, stop, silence_s)
+            _serve_run(Bus(session, Keys(server.run)), server, limiter, stop, options)
     return 0
 
 
@@ -161,7 +163,7 @@ def _serve_run(
     server: SetupServer,
     limiter: ConnectionLimiter,
     stop: StopRequest,
-    silence_s: float,
+    options: ServingOptions,
 ) -> None:
     name, setup = medium_name(server.shard), server.setup
     assert setup is not None  # as the server serves a run
@@ -170,11 +172,12 @@ def _serve_run(
     )
     truths, ending = bus.subscriber("truth", size=TRUTH_RING), RunEnd(bus.subscriber("over"), stop)
     medium = (
-        LockstepMedium(bus, setup, server.shard, ending)
+        LockstepMedium(bus, setup, server.shard, ending, options.check)
         if setup.lockstep
-        else FreeRunningMedium(bus, setup)
+        else FreeRunningMedium(bus, setup, options.check)
     )
     bus.declare_alive(name)
+    silence_s = inf if options.patient else SILENCE_S
     try:
         _play(medium, truths, server, limiter, ending, silence_s)
     except RunOverError:

@@ -40,6 +40,31 @@ def test_it_flies_the_same_twice_in_lockstep(start: Start, tmp_path: Path) -> No
     assert first["trace_sha256"] == second["trace_sha256"] is not None
 
 
+OF_AN_OLDER_WIRE = """import sys
+sys.path.insert(0, {examples!r})
+import foreign_agent
+payload_of = foreign_agent.payload_of
+foreign_agent.payload_of = lambda fields: payload_of(fields[:-4])
+foreign_agent.main()
+"""
+
+
+def test_one_that_nobody_understands_fails_the_run(start: Start, tmp_path: Path) -> None:
+    program, run = tmp_path / "older.py", tmp_path / "run"
+    program.write_text(OF_AN_OLDER_WIRE.format(examples=str(EXAMPLES)))
+    keys = ("--agents", "3", "--duration", "1.5", "--set", "expect.converge=false")
+    agent = f"agent=[{{ ids = [2], command = {[sys.executable, str(program)]} }}]"
+    scenario = (str(EXAMPLES / "foreign-9.toml"), "--set", agent)
+    spoofed = "event=[{ at_s = 0, for_s = 1, sabotage = { kind = 'spoof', agents = [0, 1] } }]"
+    said = (*keys, "--set", spoofed, "--lockstep", "--no-recording", "--out", str(run))
+    fleet = start(*QSWARM, "run", *scenario, *said)
+    assert fleet.status(60.0) == 1, fleet.text
+    why = "agent 2 takes no part: whoever hears it rejects all of its frames (30 invalid"
+    assert f"fail ({why}" in fleet.text
+    (row,) = json.loads((run / "summary.json").read_text())["refused"]
+    assert (row["agent"], row["accepted"], row["rejected"]) == (2, 0, {"invalid": 30})
+
+
 @pytest.mark.real_time
 def test_it_flies_on_the_wall_clock(start: Start, tmp_path: Path) -> None:
     run = tmp_path / "run"

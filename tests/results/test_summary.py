@@ -9,6 +9,7 @@ import pytest
 
 from netem.link import Cause
 from netem.messages import MediumCounters
+from netem.sender_counts import SenderRow
 from tests.small_scenario import SMALL
 from worldsim.campaign.pool import finished
 from worldsim.engine.step import SlotLoop, world_of
@@ -246,6 +247,18 @@ def test_rejected_messages_are_counted_by_component_and_cause(run: FinishedRun) 
     made = summary(run, medium_counters=by_medium, rejected_by_world={"stale": 3})
     assert made["rejected_by_cause"] == {"agents": {}, "netem": {"stale": 2}, "world": {"stale": 3}}
     assert made["packets"]["rejected"] == 5
+
+
+def test_a_run_in_which_an_agent_is_never_understood_fails_and_names_it(run: FinishedRun) -> None:
+    frames = (SenderRow(1, 0, {"invalid": 50}),)
+    made = summary(run, medium_counters=msgspec.structs.replace(counters(run), frames=frames))
+    assert made["refused"] == [
+        {"agent": 1, "messages": "frames", "accepted": 0, "rejected": {"invalid": 50}}
+    ]
+    reason = "agent 1 takes no part: whoever hears it rejects all of its frames"
+    assert made["outcome"] == "fail"
+    assert made["reason"] == f"{reason} (50 invalid: not the fields of the wire)"
+    assert summary(run)["refused"] == []
 
 
 def flown_to(duration_s: float, **keys: str) -> Summary:

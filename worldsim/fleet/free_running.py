@@ -16,6 +16,7 @@ from agent.codec import decode_command, encode
 from agent.messages import Observation
 from agent.rejection import RejectedError
 from netem.messages import MediumCounters, Truth
+from netem.sender_counts import SenderCounts
 from netem.wire.bus import Bus
 from netem.wire.frame import WireError, pack, unpack
 from netem.wire.keys import agent_name
@@ -104,7 +105,7 @@ class FreeRunningFleet:
             bus, Control(scenario, self.loop, launcher.controls_processes)
         )
         self.begun = self._landed = False
-        self._rejected: Counter[str] = Counter()
+        self._rejected, self.commands = Counter[str](), SenderCounts()
         self._pacer = Pacer(1.0 / (scenario.slot_hz * speed))
         self._progress_reporter = ProgressReporter(scenario.duration_s, self.loop, launcher)
         self._truth, self._over = bus.publisher("truth"), bus.publisher("over")
@@ -380,17 +381,23 @@ class FreeRunningFleet:
         """Take a command; one of an agent that is not running any more has no effect."""
         if not self.loop.members.running[agent]:
             return
+        self._foreign_steps.end([agent])
         try:
             command = decode_command(data)
         except RejectedError as error:
-            self._rejected[error.cause] += 1
+            self._refuse_command(agent, error.cause)
             return
-        if command.incarnation == self.loop.members.incarnations[agent]:
-            self._reconnection.hear(agent, self.loop.world.clock.time_s(command.slot))
-            self._foreign_steps.end([agent])
-            self.loop.apply_command(agent, command, data)
-        else:
-            self._rejected["incarnation"] += 1
+        if command.incarnation != self.loop.members.incarnations[agent]:
+            self._refuse_command(agent, "incarnation")
+            return
+        self._reconnection.hear(agent, self.loop.world.clock.time_s(command.slot))
+        discarded = self.loop.world.discarded
+        self.loop.apply_command(agent, command, data)
+        self.commands.count(agent, "stale" if self.loop.world.discarded > discarded else None)
+
+    def _refuse_command(self, agent: int, cause: str) -> None:
+        self._rejected[cause] += 1
+        self.commands.count(agent, cause)
 
     def _read_report(self, data: bytes) -> None:
         try:

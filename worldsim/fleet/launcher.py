@@ -19,6 +19,7 @@ from worldsim.fleet import process as world_process
 from worldsim.fleet.culprits import SharedSteps
 from worldsim.fleet.fleet_monitor import FleetMonitor, ProcessSockets, StartError
 from worldsim.fleet.fork import adopt_orphans, children, end_orphans
+from worldsim.fleet.frame_witness import FrameWitness
 from worldsim.fleet.intruder import IntruderCounts
 from worldsim.fleet.ipc import (
     ActionRequest,
@@ -252,7 +253,8 @@ class Launcher:
     def _run_netem(self, shard: int) -> int:
         for end in (self._zygote, self._world, self._world_end):
             end.close()
-        options = netem_process.ServingOptions(patient=True)
+        check = FrameWitness(self._scenario) if self._scenario.commands else None
+        options = netem_process.ServingOptions(patient=True, check=check)
         return netem_process.run(self._endpoint, shard, options, self._access)
 
     def _run_world(self) -> int:

@@ -22,6 +22,7 @@ from netem.messages import (
     merged,
     unpack_slot_result,
 )
+from netem.sender_counts import SenderCounts
 from netem.wire.barrier import (
     ANSWER_TIMEOUT_S,
     LOCKSTEP_RING,
@@ -79,6 +80,8 @@ class LockstepFleet:
     delivery: None = None
     rejected: Mapping[str, int] = {}
     """Always empty: a message that the world rejects ends the run."""
+    commands = SenderCounts()
+    """Always empty, like ``rejected``."""
     messages: Mapping[int, int] = {}
     """Always empty: no intruder is started, for a message out of turn would end the run."""
 

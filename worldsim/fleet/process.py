@@ -191,6 +191,7 @@ def _finished(
         cut_off_by=cut_off_by,
         failure=fleet.failure,
         rejected_by_world=fleet.rejected,
+        commands=fleet.commands.rows(),
         delivery=msgspec.to_builtins(fleet.delivery),
         messages=fleet.messages,
     )

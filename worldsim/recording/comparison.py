@@ -31,10 +31,11 @@ ADDED_LATER = (
     "datagrams",
     "safety_filter",
     "coverage",
+    "refused",
 )
 """Keys that the summary of an older recording lacks."""
 UNRECORDED = (
-    *("reason", "rejected_by_cause", "direct_links", "needed_links", "bytes_per_s"),
+    *("reason", "rejected_by_cause", "refused", "direct_links", "needed_links", "bytes_per_s"),
     *("datagrams", "safety_filter"),
     *("delivery", "delivery_late_ms", "late_tick_fraction", "real_time_factor", "overload"),
     *("resources", "trace_sha256", "version", "commit", "commit_dirty", "python", "packages"),

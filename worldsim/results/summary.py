@@ -3,7 +3,7 @@
 To add a key: declare it in Summary, fill it in summarise.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any, Literal, TypedDict
@@ -11,6 +11,7 @@ from typing import Any, Literal, TypedDict
 import msgspec
 
 from netem.messages import MediumCounters
+from netem.sender_counts import SenderRow
 from worldsim.engine.counters import Links
 from worldsim.engine.step import SlotLoop
 from worldsim.judge.finding import ExpectationRow
@@ -27,6 +28,7 @@ from worldsim.results.expectation_text import (
 )
 from worldsim.results.fault_rows import FaultRow, fault_rows, idle_text
 from worldsim.results.provenance import Provenance, provenance
+from worldsim.results.refused_agents import RefusedRow, refused_rows, refused_text
 from worldsim.scenario.tables import Scenario
 
 SCHEMA = 1
@@ -83,6 +85,7 @@ class FinishedRun:
     overload: "OverloadRow | None" = None  # None under a clock where no tick can be late
     resources: "ResourcesRow | None" = None  # of the processes of a launched fleet
     rejected_by_world: Mapping[str, int] = field(default_factory=dict)  # messages by cause
+    commands: Sequence[SenderRow] = ()  # of each agent, accepted and rejected; free-running
     delivery: "DeliveryRow | None" = None  # of frames that agents used
     messages: Mapping[int, int] = field(default_factory=dict)  # of intruders, by a fault's number
 
@@ -183,6 +186,7 @@ class Summary(Provenance):
     faults: list[FaultRow]  # in the order in which they began
     packets: dict[str, int | None]  # by fate
     rejected_by_cause: dict[str, dict[str, int]]  # messages, by component and cause
+    refused: list[RefusedRow]  # agents of which messages were rejected where they arrive
     direct_links: LinksRow  # agents heard
     needed_links: LinksRow  # those of them that are of the own queue: N_c,i
     bytes_per_s: dict[str, list[float | None]] | None  # by channel, of each agent
@@ -207,7 +211,10 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
     use = run.loop.radio_use
     faults = _fault_rows(run)
     idle = None if scenario.expect.idle_faults else idle_text(faults)
-    outcome, reason = _outcome(run, expectations, idle)
+    refused = _refused_rows(run)
+    outcome, reason = _outcome(
+        run, expectations, idle, refused_text(refused, faults, scenario.fleet.agents)
+    )
     summary: Summary = {
         "schema": SCHEMA,
         "scenario": scenario.name,
@@ -233,6 +240,7 @@ def summarise(scenario: Scenario, run: FinishedRun) -> Summary:
         "faults": faults,
         "packets": _packets(counters, rejected),
         "rejected_by_cause": rejected,
+        "refused": refused,
         "direct_links": _links_row(use.heard()),
         "needed_links": _links_row(use.needed()),
         "bytes_per_s": use.bytes_per_s(counters),
@@ -272,15 +280,22 @@ def _fault_rows(run: FinishedRun) -> list[FaultRow]:
     )
 
 
+def _refused_rows(run: FinishedRun) -> list[RefusedRow]:
+    counters = run.medium_counters
+    if counters is None:
+        return refused_rows((), (), run.commands)
+    return refused_rows(counters.frames, counters.transmissions, run.commands)
+
+
 def _outcome(
-    run: FinishedRun, expectations: list[ExpectationRow], idle: str | None
+    run: FinishedRun, expectations: list[ExpectationRow], idle: str | None, refused: str | None
 ) -> tuple[Outcome, str | None]:
     """Return the outcome and its reason.
 
     A violated invariant is a failure also in a run that was cut off. On a host that was too slow,
     only those are that do not rest on news arriving in time: the others are named. Safety rests on
     it where an agent was late that broke it. idle: which faults struck nothing; what would pass is
-    inconclusive then.
+    inconclusive then. refused: which agents take no part, since all that they say is rejected.
     """
     if run.failure is not None:
         return "fail", run.failure
@@ -290,6 +305,8 @@ def _outcome(
     violated = [name for name in found.violated if name not in excused]
     if violated:
         return "fail", f"violated: {_with_words(violated)}"
+    if refused is not None:
+        return "fail", refused
     doubt = _cut(run) or late or (run.late_spell if excused else None)
     if doubt is not None:
         meanwhile = f"; violated meanwhile: {_with_words(excused)}" if excused else ""

@@ -20,6 +20,7 @@ from worldsim.results.expectation_text import (
 )
 from worldsim.results.fault_rows import fault_texts
 from worldsim.results.overall import Overall, Row, ScenarioRow
+from worldsim.results.refused_agents import refused_texts
 from worldsim.results.summary import INVARIANT_WORDS, DeliveryRow, InvariantRow, Summary
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ def remarks(summary: Summary) -> list[str]:
         *_sub_formations(summary["sub_formations"]),
         *_delivery(summary["delivery"]),
         *_rejected(summary["rejected_by_cause"]),
+        *_taking_no_part(summary),
     ]
 
 
@@ -245,6 +247,12 @@ def _rejected(rejected: dict[str, dict[str, int]]) -> list[str]:
         if causes
     ]
     return [f"  messages rejected {'; '.join(parts)}"] if parts else []
+
+
+def _taking_no_part(summary: Summary) -> list[str]:
+    """Return a line for each agent of which all is rejected."""
+    rows, faults, agents = summary["refused"], summary["faults"], summary["agents"]
+    return [f"  {text}" for text in refused_texts(rows, faults, agents)]
 
 
 def _causes(causes: dict[str, int]) -> str:
