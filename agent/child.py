@@ -60,6 +60,7 @@ class Child:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 bufsize=0,
+                process_group=0,  # Ctrl-C is not meant for it, and some programs heed it anyway
             )
         except (OSError, subprocess.SubprocessError) as error:
             raise ChildError(f"{self._name!r} cannot be started: {_reason(error)}") from error

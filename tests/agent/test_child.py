@@ -1,5 +1,6 @@
 """A child that answers lines: it cannot hold its caller, and never outlives it."""
 
+import os
 import signal
 import sys
 from collections.abc import Callable
@@ -129,3 +130,11 @@ def wait_for(condition: Callable[[], object]) -> object:
         assert monotonic() < until, "it never came"
         sleep(0.01)
     return found
+
+
+def test_ctrl_c_of_the_terminal_does_not_reach_it() -> None:
+    """It ends with its caller; a program that heeds Ctrl-C would fail its agent before."""
+    child = python("import os\ninput()\nprint(os.getpgrp(), flush=True)\ninput()")
+    answer = child.ask(b"whose group?\n", WITHIN_S)
+    assert answer is not None
+    assert int(answer) != os.getpgrp()

@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import threading
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -14,8 +15,10 @@ from netem.wire.shutdown import stop_requests
 from tests.commands.conftest import Command, qswarm, small  # noqa: F401 - fixtures
 from tests.processes.harness import QSWARM, Started, eventually
 from worldsim.campaign import flight, printed, watched_flight
-from worldsim.campaign.pool import Job, simulate
+from worldsim.campaign.flight_site import LocalSite, Order
+from worldsim.campaign.pool import FailedFlightError, Job, simulate
 from worldsim.fleet import import_probe
+from worldsim.results.overall import Cut, is_cut_off, over_all
 from worldsim.scenario.file import load
 
 MODULE = "tests.campaign.failing_controllers"
@@ -147,6 +150,44 @@ def test_a_run_whose_controller_ignores_signals_ends(number: signal.Signals) -> 
     started.process.send_signal(number)
     assert started.status(within_s=20.0) == 130
     assert json.loads(Path("out/summary.json").read_text())["outcome"] == "inconclusive"
+
+
+class Asked:
+    """A stop request that comes once a flight stands still."""
+
+    def __init__(self) -> None:
+        self.requested = False
+        self._before_s = 0.0
+
+    def look(self, time_s: float) -> None:
+        """Take how far the flight is [s; simulated time]."""
+        self.requested = self.requested or time_s == self._before_s > 0.0
+        self._before_s = time_s
+
+
+@pytest.mark.usefixtures("small")
+def test_a_step_that_a_stop_request_cuts_off_is_no_failure(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(watched_flight, "STOPPED_STEP_WITHIN_S", 0.1)
+    keys = {"control.controller": f"{MODULE}:Blocks", "expect.converge": "false"}
+    scenario, stop = load(Path("small.toml"), keys), Asked()
+    with pytest.raises(FailedFlightError) as failed:
+        simulate(Job(scenario, Path("out"), False), stop, stop.look)  # type: ignore[arg-type]
+    run = failed.value.run
+    assert (run.outcome, is_cut_off(run, scenario)) == ("inconclusive", True)
+    assert run.error.endswith(": did not return within 0.1 s")
+    assert "Thread" not in capsys.readouterr().err, "the stack of what was cut off"
+    cut = over_all([run], Cut("interrupted", 3, 1))
+    assert (cut["outcome"], cut["reason"]) == (
+        "inconclusive",
+        "interrupted: 0 of 3 runs done, 1 cut off",
+    )
+
+    later, polls = Asked(), count()
+    site = LocalSite(1, Path("scratch"), lambda: later.look(float(next(polls) // 4)))
+    orders = [Order("one", scenario), Order("two", scenario)]
+    assert list(site.fly(orders, later)) == []  # type: ignore[arg-type]
 
 
 @pytest.mark.usefixtures("small")

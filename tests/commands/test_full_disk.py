@@ -115,7 +115,7 @@ def test_a_disk_that_fills_up_between_seeds_keeps_the_rows(small: Path, jobs: st
     made = json.loads((small / "many/summary.json").read_text())
     assert [row["run"] for row in made["rows"]] == ["small-seed0", "small-seed1"]
     assert [row["outcome"] for row in made["rows"]] == ["pass", "pass"]
-    reason = "many/small-seed2: no space left on device: 2 of 4 runs made"
+    reason = "many/small-seed2: no space left on device: 2 of 4 runs done"
     assert (made["outcome"], made["reason"]) == ("inconclusive", reason)
     assert f"inconclusive ({reason})" in ended.stdout
     assert not list((small / "many").rglob(".reserve"))

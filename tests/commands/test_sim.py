@@ -191,10 +191,10 @@ def test_ctrl_c_ends_a_sweep_with_its_workers_and_summaries(small: Path, jobs: s
     started.process.send_signal(signal.SIGINT)
     assert started.status(within_s=20.0) == 130, small
     overall = summary("cut")
-    reason = f"interrupted: {overall['runs']} of 4 runs made"
+    reason = f"interrupted: 0 of 4 runs done, {overall['runs']} cut off"
     assert (overall["outcome"], overall["reason"]) == ("inconclusive", reason)
     assert started_runs <= overall["runs"] == len(list(Path("cut").glob("*/summary.json"))) < 4
-    assert started.text.endswith(f"inconclusive ({reason})  cut/summary.json\n")
+    assert started.text.endswith(f"\n{reason}; 0 passed, 0 failed  cut/summary.json\n")
     eventually(lambda: not any(map(is_running, workers)), 10.0)
 
 

@@ -127,12 +127,12 @@ def test_a_run_without_a_summary_and_runs_not_made_are_errors(
     summary: Summary, tmp_path: Path
 ) -> None:
     lost = FailedRun(Path("many/arc-seed4"), "arc", 4, "lost \x1b\ufffe", "Traceback\n<&>")
-    root = written(tmp_path, lost, run(summary), cut_off_by="interrupted: 2 of 6 runs made")
+    root = written(tmp_path, lost, run(summary), cut_off_by="interrupted: 2 of 6 runs done")
     assert [suite.get("name") for suite in root] == ["arc", "small", "all runs"]
     errors = [(each.get("message"), each.text) for each in root.iter("error")]
     assert errors == [
         ("lost \\x1b\\ufffe", "Traceback\n<&>"),
-        ("interrupted: 2 of 6 runs made", None),
+        ("interrupted: 2 of 6 runs done", None),
     ]
     assert counts(root)[2] == "2"
 

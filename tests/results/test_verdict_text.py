@@ -8,9 +8,9 @@ import pytest
 from tests.small_scenario import SMALL
 from worldsim.campaign.pool import finished
 from worldsim.engine.virtual import fly
-from worldsim.results.overall import FailedRun, Result, over_all
+from worldsim.results.overall import Cut, FailedRun, Result, over_all
 from worldsim.results.summary import Summary, summarise
-from worldsim.results.verdict_text import table, verdict
+from worldsim.results.verdict_text import closing_lines, table, verdict
 from worldsim.scenario.file import parse
 
 FOLDER = Path("runs/small")
@@ -333,8 +333,16 @@ def test_scenarios_stand_in_the_order_given_and_a_controller_error_is_a_row(
 
 
 def test_interrupted_runs_say_how_many_were_made(summary: Summary) -> None:
+    late: Any = {**summary, "outcome": "fail", "reason": "line did not converge"}
     cut: Any = {**summary, "outcome": "inconclusive", "reason": "interrupted after 2.0 s"}
     results = [Result(Path("many/small-seed1"), summary), Result(Path("many/small-seed2"), cut)]
-    lines = table(over_all(results, "interrupted", 6), Path("many")).splitlines()
-    assert "small: 1 of 2 runs passed, 1 inconclusive" in lines
-    assert lines[-1] == "inconclusive (interrupted: 2 of 6 runs made)  many/summary.json"
+    results.append(Result(Path("many/small-seed3"), late))
+    overall = over_all(results, Cut("interrupted", 6, 1))
+    lines = table(overall, Path("many")).splitlines()
+    assert "small: 1 of 3 runs passed, 1 inconclusive" in lines
+    told = "interrupted: 2 of 6 runs done, 1 cut off; 1 passed, 1 failed  many/summary.json"
+    assert lines[-1] == closing_lines(overall, Path("many")).splitlines()[-1] == told
+    full = over_all(results[:1], Cut("no space left", 6))
+    assert closing_lines(full, Path("many")) == (
+        "inconclusive (no space left: 1 of 6 runs done)  many/summary.json"
+    )

@@ -1,5 +1,7 @@
 """What a sweep shows: shares by cell, a break for each number, tables and figures."""
 
+from pathlib import Path
+
 import pytest
 
 from worldsim.sweep.figures import sweep_figures
@@ -8,7 +10,7 @@ from worldsim.sweep.logistic import Point, break_of
 from worldsim.sweep.plan import Axis, FlightKey, Plan
 from worldsim.sweep.result import Rows, break_text, breaks_of, cells_of, summary_of
 from worldsim.sweep.sweep_tables import cells_table, flights_table
-from worldsim.sweep.sweep_text import repeat_text
+from worldsim.sweep.sweep_text import closing_line, repeat_text
 
 PLAN = Plan(
     (
@@ -72,8 +74,13 @@ def test_a_flight_that_is_not_there_counts_nowhere() -> None:
     cell = cells_of(PLAN, rows)[0]
     assert (cell["flights"], cell["pass"], cell["pass_share"]) == (9, 9, 1.0)
     summary = summary_of(PLAN, "small", rows, "interrupted")
-    assert summary["reason"] == "interrupted: 119 of 120 flights flown"
+    assert summary["reason"] == "interrupted: 119 of 120 flights done"
     assert summary["outcome"] == "fail"
+    so_far = "interrupted: 119 of 120 flights done, 97 pass, 22 fail"
+    goes_on = "the same command with --out 'my runs' goes on"
+    assert closing_line(summary, Path("my runs")) == f"{so_far}; {goes_on}  my runs/summary.json"
+    lost = summary_of(PLAN, "small", rows, "tcp://h:1: the scheduler is gone")
+    assert closing_line(lost, Path("r")).startswith("fail: tcp://h:1: the scheduler is gone: 119")
 
 
 @pytest.mark.parametrize(("cut", "outcome"), [(None, "pass"), ("interrupted", "inconclusive")])

@@ -22,6 +22,7 @@ from worldsim.engine.step import SlotLoop
 from worldsim.engine.trace import TraceLog
 from worldsim.engine.virtual import Flight, Probe, fly
 from worldsim.fleet.fork import adopt_orphans, end_orphans
+from worldsim.results.exit_status import INTERRUPTION
 from worldsim.results.run_folder import RunDirectory, RunWriteError
 from worldsim.results.sinks import Sinks, open_sinks
 from worldsim.results.summary import FinishedRun, summarise
@@ -84,7 +85,7 @@ def finished(flight: Flight, scenario: Scenario) -> FinishedRun:
         medium_counters=flight.medium_counters,
         late_tick_fraction=0.0,
         real_time_factor=world.time_s / flight.wall_s,
-        cut_off_by=(flight.ended_by or "interrupted") if world.slot < scenario.slots else None,
+        cut_off_by=(flight.ended_by or INTERRUPTION) if world.slot < scenario.slots else None,
     )
 
 

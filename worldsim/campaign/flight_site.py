@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 from netem.wire.shutdown import StopRequest
 from worldsim.campaign.flight import FlightProbe
 from worldsim.campaign.pool import Job, sweep
-from worldsim.results.overall import FailedRun, Made, Result
+from worldsim.results.overall import FailedRun, Made, is_cut_off
 from worldsim.results.run_folder import RunWriteError
 from worldsim.results.summary import Outcome, Summary
 from worldsim.scenario.tables import Scenario
@@ -98,19 +98,15 @@ class LocalSite:
         try:
             for made in sweep(jobs(), self._workers, stop, self._on_poll):
                 order = active.pop(made.folder)
-                if isinstance(made, FailedRun) and made.outcome == "inconclusive":
+                cut_off = stop.requested and is_cut_off(made, order.scenario)
+                if isinstance(made, FailedRun) and made.outcome == "inconclusive" and not cut_off:
                     raise RunWriteError(made.folder, made.error)  # no flight: it is flown again
                 flown = flown_of(order, made)
                 rmtree(made.folder, ignore_errors=True)
-                if not (stop.requested and is_cut_off(made, order.scenario)):
+                if not cut_off:
                     yield flown
         finally:
             rmtree(self._scratch, ignore_errors=True)
-
-
-def is_cut_off(made: Made, scenario: Scenario) -> bool:
-    """Return whether a flight ended before its time without an error."""
-    return isinstance(made, Result) and made.summary["duration_s"] < scenario.duration_s - 1e-6
 
 
 def flown_of(order: Order, made: Made) -> Flown:

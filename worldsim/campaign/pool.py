@@ -39,11 +39,11 @@ def simulate(
 
     on_progress: called now and then with the simulated time [s]. Raises RunDirectoryError when the
     folder exists or cannot be written, RunWriteError when the summary cannot, FailedFlightError
-    when the run fails before its end.
+    when the run fails before its end, or does not end on the request.
     """
     (made,) = _Pool([job], 1, stop, on_progress).results()
     if isinstance(made, FailedRun):
-        if made.outcome == "inconclusive":
+        if made.outcome == "inconclusive" and not made.cut_off:
             raise RunWriteError(made.folder, made.error)
         raise FailedFlightError(made)
     return made

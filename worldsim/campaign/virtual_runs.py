@@ -1,5 +1,6 @@
 """Runs in virtual time from the command line: progress, verdict or table, exit status."""
 
+import sys
 from collections import Counter
 from pathlib import Path
 from time import monotonic
@@ -7,8 +8,8 @@ from time import monotonic
 from netem.wire.shutdown import StopRequest, stop_requests
 from worldsim.campaign.pool import FailedFlightError, Job, simulate, sweep
 from worldsim.results.closing import Output
-from worldsim.results.exit_status import INTERRUPTED
-from worldsim.results.overall import FailedRun, Made, over_all
+from worldsim.results.exit_status import INTERRUPTED, INTERRUPTION
+from worldsim.results.overall import Cut, FailedRun, Made, is_cut_off, over_all
 from worldsim.results.progress_line import ProgressLine, pace_text
 from worldsim.results.run_folder import (
     RunDirectoryError,
@@ -44,8 +45,13 @@ def simulate_one(
                 lambda time_s: line.update(again + _pace(time_s, scenario.duration_s, began_s)),
             )
         except (FailedFlightError, RunWriteError) as error:
-            output.fail(_failed(scenario, error))
-            raise
+            run = _failed(scenario, error)
+            output.fail(run)
+            if not run.cut_off:
+                raise
+            line.clear()
+            print(f"{INTERRUPTION}: {run.error}", file=sys.stderr)
+            return INTERRUPTED
     line.clear()
     status = output.conclude(result, recording)
     return INTERRUPTED if stop.requested else status
@@ -94,8 +100,11 @@ def simulate_many(
     ]
     with stop_requests() as stop, room_reserved(folder, HEAD_B + ROW_B * len(jobs)):
         results, lost = _results(jobs, workers, stop, ProgressLine(hidden=output.quiet))
-    cut_off_by = "interrupted" if stop.requested else lost
-    overall = over_all(results, cut_off_by, len(jobs))
+    scenario_of = {job.folder: job.scenario for job in jobs}
+    ended = sum(is_cut_off(each, scenario_of[each.folder]) for each in results)
+    cut_off_by = INTERRUPTION if stop.requested else lost
+    cut = None if cut_off_by is None else Cut(cut_off_by, len(jobs), ended)
+    overall = over_all(results, cut)
     write_json(folder / "summary.json", overall)
     status = output.conclude_many(results, overall, folder)
     return INTERRUPTED if stop.requested else status

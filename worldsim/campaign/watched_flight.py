@@ -60,6 +60,7 @@ class WatchedFlight:
         self.exit_descriptor = os.pidfd_open(self.pid)
         self._exit: ProcessExit | None = None
         self._hung = ""
+        self._cut_off = False
         self._before: tuple[Place, bool] | None = None
         self._checked_s = time.monotonic()
         self._still_s = 0.0
@@ -98,8 +99,9 @@ class WatchedFlight:
             return Result(self._directory.path, summary)
         name, seed = self._scenario.name, self._scenario.seed
         unwritten = self._exit == ProcessExit(None, NOT_WRITTEN) and self._pulse.ended
-        outcome: Outcome = "inconclusive" if unwritten else "fail"
-        return FailedRun(self._directory.path, name, seed, error or self._cause(), details, outcome)
+        outcome: Outcome = "inconclusive" if unwritten or self._cut_off else "fail"
+        told = error or self._cause()
+        return FailedRun(self._directory.path, name, seed, told, details, outcome, self._cut_off)
 
     def kill(self) -> None:
         """End the flight at once, whatever it does."""
@@ -122,13 +124,18 @@ class WatchedFlight:
         return STOPPED_STEP_WITHIN_S if self._pulse.stop_requested else STEP_WITHIN_S
 
     def _end_hung(self) -> None:
-        """Let the flight print where it is, and kill it."""
+        """Let the flight print where it is, and kill it.
+
+        A step that it might have finished, had no stop been requested, is no failure.
+        """
         self._hung = f"did not return within {self._allowed_s():g} s"
-        os.kill(self.pid, signal.SIGUSR1)
-        deadline = time.monotonic() + STACK_WITHIN_S
-        while time.monotonic() < deadline:
-            self.output.pass_on()
-            time.sleep(0.05)
+        self._cut_off = self._pulse.stop_requested and self._still_s <= STEP_WITHIN_S
+        if not self._cut_off:
+            os.kill(self.pid, signal.SIGUSR1)
+            deadline = time.monotonic() + STACK_WITHIN_S
+            while time.monotonic() < deadline:
+                self.output.pass_on()
+                time.sleep(0.05)
         with suppress(ProcessLookupError):
             os.kill(self.pid, signal.SIGKILL)
 

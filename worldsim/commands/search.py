@@ -211,6 +211,7 @@ def cause(
         found = find_cause(finding, hangar, draws, line.update)
     line.clear()
     if found is None:
+        complain("qswarm: interrupted; the same command begins anew")
         return INTERRUPTED
     print(f"{finding}: {found.text}")
     return PASS if found.replays else FAIL

@@ -16,7 +16,7 @@ from worldsim.fuzz.findings import BUDGET, begin, refly, shrink, take_in
 from worldsim.fuzz.flights import Flown, Hangar, Task
 from worldsim.fuzz.folder import TABLE, Row, SearchFolder, findings_in, read_finding
 from worldsim.fuzz.pages import closing, table
-from worldsim.results.exit_status import FAIL, INCONCLUSIVE, INTERRUPTED, PASS
+from worldsim.results.exit_status import FAIL, INCONCLUSIVE, INTERRUPTED, INTERRUPTION, PASS
 from worldsim.results.progress_line import ProgressLine
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
@@ -90,8 +90,9 @@ def fuzz(search: Search) -> int:
         states |= _compared(found, folder, search.corpus)
     text = table(rows.values())
     (search.folder / TABLE).write_text(text + "\n", encoding="utf-8")
-    for told in (*_told(search, rows, found, states, text), *([lost] if lost else [])):
-        print(told)
+    told = _told(search, rows, found, states, text, stop.requested)
+    for each in (*told, *([lost] if lost else [])):
+        print(each)
     if stop.requested:
         return INTERRUPTED
     if lost:
@@ -230,7 +231,12 @@ def _compared(found: list[Row], folder: SearchFolder, corpus: Path) -> dict[str,
 
 
 def _told(
-    search: Search, rows: Mapping[int, Row], found: list[Row], states: Mapping[str, str], text: str
+    search: Search,
+    rows: Mapping[int, Row],
+    found: list[Row],
+    states: Mapping[str, str],
+    text: str,
+    stopped: bool,
 ) -> Iterator[str]:
     """Yield what is printed at the end."""
     yield text
@@ -245,4 +251,7 @@ def _told(
         yield f"cause:  qswarm cause {one}"
     missing = len(search.seeds) - len(rows)
     if missing:
-        yield f"{missing} of {len(search.seeds)} seeds not flown; the same command goes on"
+        done = f"{len(rows)} of {len(search.seeds)} seeds done; the same command goes on"
+        yield f"{INTERRUPTION}: {done}" if stopped else done
+    elif stopped:
+        yield f"{INTERRUPTION}: all seeds are done; the same command makes their findings small"

@@ -10,6 +10,8 @@ INCONCLUSIVE = 3
 """The host was too slow, the run ended early, or results were lost: no pass, and no failure."""
 INTERRUPTED = 130
 """Ctrl-C or SIGTERM."""
+INTERRUPTION = "interrupted"
+"""How the reason begins of what they have cut off."""
 OUTPUT_CLOSED = 141
 """Nothing reads the output any more, as in `qswarm ... | head`."""
 

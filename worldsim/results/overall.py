@@ -8,6 +8,7 @@ from typing import NamedTuple, TypedDict, assert_never
 
 from worldsim.results.provenance import Provenance, provenance
 from worldsim.results.summary import Outcome, Summary
+from worldsim.scenario.tables import Scenario
 
 
 class Result(NamedTuple):
@@ -25,7 +26,7 @@ class Result(NamedTuple):
 class FailedRun(NamedTuple):
     """One run that an error ended, a controller's as a rule; it has no summary.
 
-    It is inconclusive where only its summary could not be written.
+    It is inconclusive where only its summary could not be written, or where it was cut off.
     """
 
     folder: Path
@@ -34,10 +35,18 @@ class FailedRun(NamedTuple):
     error: str
     details: str = ""  # the traceback, where there is one
     outcome: Outcome = "fail"
+    cut_off: bool = False  # whether it was ended because a stop was requested: it shows nothing
 
 
 Made = Result | FailedRun
 """A run of many."""
+
+
+def is_cut_off(made: Made, scenario: Scenario) -> bool:
+    """Return whether a run ended before its time without an error of its own."""
+    if isinstance(made, FailedRun):
+        return made.cut_off
+    return made.summary["duration_s"] < scenario.duration_s - 1e-6
 
 
 class Spread(TypedDict):
@@ -92,21 +101,33 @@ class Overall(Provenance):
     rows: list[Row]
 
 
-def over_all(results: Iterable[Made], cut_off_by: str | None = None, asked: int = 0) -> Overall:
+class Cut(NamedTuple):
+    """Why not all runs were made that were asked for."""
+
+    by: str
+    asked: int
+    ended: int = 0  # runs that it ended amid their flight; they have results too
+
+    def text(self, results: int) -> str:
+        """Return how many of the runs are done, in words. results: also of those that it ended."""
+        ended = f", {self.ended} cut off" if self.ended else ""
+        return f"{self.by}: {results - self.ended} of {self.asked} runs done{ended}"
+
+
+def over_all(results: Iterable[Made], cut: Cut | None = None) -> Overall:
     """Return the summary over many runs: figures by scenario, and a row for each run, as given.
 
-    cut_off_by: why not all of the runs that were asked for were made; None: they were.
+    cut: why not all of the runs that were asked for were made; None: they were.
     """
     rows = [_row(result) for result in results]
     names = list(dict.fromkeys(row["scenario"] for row in rows))
-    cut = cut_off_by is not None
-    outcomes = [row["outcome"] for row in rows] + ["inconclusive"] * cut
+    outcomes = [row["outcome"] for row in rows] + ["inconclusive"] * (cut is not None)
     return {
         "schema": 1,
         "mode": "virtual",
         "runs": len(rows),
         "outcome": next((bad for bad in ("fail", "inconclusive") if bad in outcomes), "pass"),
-        "reason": f"{cut_off_by}: {len(rows)} of {asked} runs made" if cut else None,
+        "reason": None if cut is None else cut.text(len(rows)),
         "scenarios": [_of_scenario(name, rows) for name in names],
         "rows": rows,
         **provenance(),

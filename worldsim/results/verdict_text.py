@@ -8,6 +8,7 @@ from worldsim.judge.properties import CoverageRow
 from worldsim.judge.sub_formations import SubFormationsRow
 from worldsim.recording.layout import SUMMARY_FILE
 from worldsim.results.controller_rows import filter_texts
+from worldsim.results.exit_status import INTERRUPTION
 from worldsim.results.expectation_text import (
     Circumstances,
     EncounterRow,
@@ -87,7 +88,7 @@ def closing_lines(overall: Overall, folder: Path) -> str:
     """Return a line for each of many runs that did not pass, and the outcome over all."""
     rows = [row for row in overall["rows"] if row["outcome"] != "pass"]
     lines = [_outcome(row, folder / row["run"]) for row in rows]
-    return "\n".join([*lines, _outcome(overall, folder / "summary.json")])
+    return "\n".join([*lines, _over_all(overall, folder)])
 
 
 def violation_text(name: str, tally: InvariantRow) -> str:
@@ -102,7 +103,7 @@ def table(overall: Overall, folder: Path) -> str:
     lines = [head, *(_run(row, width) for row in overall["rows"]), ""]
     for scenario in overall["scenarios"]:
         lines += _scenario(scenario)
-    return "\n".join([*lines, _outcome(overall, folder / "summary.json")])
+    return "\n".join([*lines, _over_all(overall, folder)])
 
 
 def verified(verification: "Verification") -> str:
@@ -161,6 +162,16 @@ def head(summary: Summary) -> str:
 def _outcome(summary: Any, file: Path) -> str:
     reason = f" ({summary['reason']})" if summary["reason"] else ""
     return f"{summary['outcome']}{reason}  {file}"
+
+
+def _over_all(overall: Overall, folder: Path) -> str:
+    """Return the outcome of many runs; those that were interrupted have none, but are counted."""
+    file, reason = folder / "summary.json", overall["reason"] or ""
+    if not reason.startswith(INTERRUPTION):
+        return _outcome(overall, file)
+    passed = sum(each["pass"] for each in overall["scenarios"])
+    failed = sum(each["fail"] for each in overall["scenarios"])
+    return f"{reason}; {passed} passed, {failed} failed  {file}"
 
 
 def circumstances(summary: Summary) -> Circumstances:

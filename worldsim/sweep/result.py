@@ -85,7 +85,7 @@ def summary_of(plan: Plan, scenario: str, rows: Rows, cut_off_by: str | None) ->
         "seeds": (plan.seeds.start, plan.seeds.stop),
         "runs": len(rows),
         "outcome": worst,
-        "reason": f"{cut_off_by}: {len(rows)} of {len(plan)} flights flown" if cut_off_by else None,
+        "reason": f"{cut_off_by}: {len(rows)} of {len(plan)} flights done" if cut_off_by else None,
         "cells": cells,
         "breaks": breaks_of(plan, cells),
         **provenance(),

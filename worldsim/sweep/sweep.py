@@ -10,7 +10,7 @@ from netem.wire.shutdown import StopRequest, stop_requests
 from worldsim.campaign.flight_site import FlightSite, Order, SiteError
 from worldsim.export.table_files import write_csv, write_parquet
 from worldsim.results.controller_code import code_sha256, user_controllers
-from worldsim.results.exit_status import EXIT_STATUS, INTERRUPTED
+from worldsim.results.exit_status import EXIT_STATUS, INTERRUPTED, INTERRUPTION
 from worldsim.results.progress_line import ProgressLine
 from worldsim.results.provenance import provenance
 from worldsim.results.run_folder import RunWriteError, write_json
@@ -74,7 +74,7 @@ def fly(sweep: Sweep, journal: Journal, site: FlightSite, line: ProgressLine) ->
     """
     with stop_requests() as stop:
         lost = _fly_missing(sweep, journal, site, stop, line)
-        cut_off_by = "interrupted" if stop.requested else lost
+        cut_off_by = INTERRUPTION if stop.requested else lost
         summary = summary_of(sweep.plan, sweep.name, journal.rows, cut_off_by)
         write_results(journal.folder, sweep.plan, journal, summary, line.update)
     line.clear()

@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Iterable
 from pathlib import Path
 
+from worldsim.results.exit_status import INTERRUPTION
 from worldsim.sweep.plan import Plan
 from worldsim.sweep.result import CellRow, Rows, Summary
 
@@ -25,10 +26,19 @@ def sweep_text(summary: Summary, folder: Path) -> str:
 
 
 def closing_line(summary: Summary, folder: Path) -> str:
-    """Return a sweep's outcome with its reason, and where its files are, in one line."""
+    """Return a sweep's outcome with its reason, and where its files are, in one line.
+
+    One that was interrupted has no outcome yet: the line tells how far it is.
+    """
     passed = sum(cell["pass"] for cell in summary["cells"])
-    reason = summary["reason"] or f"{passed} of {summary['runs']} flights pass"
-    return f"{summary['outcome']}: {reason}  {folder / 'summary.json'}"
+    file, reason = folder / "summary.json", summary["reason"]
+    if reason is None:
+        return f"{summary['outcome']}: {passed} of {summary['runs']} flights pass  {file}"
+    failed = sum(cell["fail"] for cell in summary["cells"])
+    so_far = f"{reason}, {passed} pass, {failed} fail"
+    goes_on = f"the same command with --out {shlex.quote(str(folder))} goes on"
+    outcome = "" if reason.startswith(INTERRUPTION) else f"{summary['outcome']}: "
+    return f"{outcome}{so_far}; {goes_on}  {file}"
 
 
 def repeat_text(plan: Plan, rows: Rows, command: str) -> str | None:
