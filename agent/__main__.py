@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from agent.process import run
+from netem.compiled import tell_if_unfit
 
 DESCRIPTION = """\
 One agent of a fleet: it flies its vehicle and communicates with the other agents.
@@ -40,6 +41,7 @@ def main(arguments: list[str] | None = None) -> int:
         help="file of passwords, if the router wants one",
     )
     options = parser.parse_args(arguments)
+    tell_if_unfit()
     return run(options.id, options.run, options.connect, users=options.credentials)
 
 

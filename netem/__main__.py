@@ -3,6 +3,7 @@
 import argparse
 import sys
 
+from netem.compiled import tell_if_unfit
 from netem.process import run
 
 DESCRIPTION = """\
@@ -37,7 +38,9 @@ def main(arguments: list[str] | None = None) -> int:
         metavar="ENDPOINT",
         help="endpoint on loopback: tcp/127.0.0.1:7447, unixsock-stream//run/qswarm.sock",
     )
-    return run(parser.parse_args(arguments).listen)
+    endpoint = parser.parse_args(arguments).listen
+    tell_if_unfit()
+    return run(endpoint)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 ``deploy/compile.sh`` compiles what is hot, into ``build/compiled`` beside the packages, and writes
 a manifest last; a compiled wheel holds the same in a folder of its own. The compiled modules run
 only if the manifest fits this Python and every source file: after an edit, or half a build, pure
-Python runs, and a line says why. It is never a mixture.
+Python runs, and before the first flight a line says why. It is never a mixture.
 QSWARM_PURE=1 asks for pure Python.
 
 This module comes before all others, so it imports none of them.
@@ -30,6 +30,9 @@ MANIFEST = "manifest.json"
 PURE = "QSWARM_PURE"
 """The environment variable that asks for pure Python, here and in processes begun from here."""
 REMEDY = "deploy/compile.sh compiles anew"
+UNTOLD: dict[int, str] = {}
+"""Why pure Python runs though there is compiled code, by the id of the process that has not yet
+told it. What is forked from there does not tell it."""
 
 
 class UnfitError(ValueError):
@@ -130,9 +133,17 @@ def prefer() -> None:
         files = fitting(ROOT, FOLDER)
     except UnfitError as error:
         os.environ[PURE] = "1"  # the processes begun from here need not say it again
-        print(
-            f"qswarm: pure Python runs, not the compiled code: {error}. {REMEDY}.", file=sys.stderr
-        )
+        UNTOLD[os.getpid()] = f"pure Python runs, not the compiled code: {error}. {REMEDY}."
         return
     if files:
         sys.meta_path.insert(0, Finder(files))
+
+
+def tell_if_unfit() -> None:
+    """Say once on stderr why pure Python runs though there is compiled code.
+
+    Whatever flies calls it before: there it costs time, which nothing else does.
+    """
+    text = UNTOLD.pop(os.getpid(), None)
+    if text is not None:
+        print(f"qswarm: {text}", file=sys.stderr, flush=True)

@@ -5,6 +5,7 @@ import os
 import sys
 from pathlib import Path
 
+from netem.compiled import tell_if_unfit
 from netem.wire.keys import Keys
 from worldsim.engine.preflight import PROCESS_COMMAND_TICKS, admit
 from worldsim.fleet.launcher_link import ManualLink
@@ -70,6 +71,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the world by the command line; return the exit status."""
     options = _parser().parse_args(arguments)
     prepare_environment()
+    tell_if_unfit()
     try:
         file = find_scenario(options.scenario)
         scenario = admit(load(file), file, PROCESS_COMMAND_TICKS, "by hand")

@@ -110,7 +110,7 @@ def test_only_compiled_modules_are_found(tmp_path):
 
 
 def test_a_person_is_told_once_why_pure_python_runs(root):
-    """Processes that are begun from there run pure Python, too, and do not say it again."""
+    """Before a flight, not before; nor do processes that are begun from there, in whatever way."""
     (root / SOURCE).write_text("x = 2\n")
     code = f"""
 import os, sys
@@ -122,6 +122,13 @@ compiled.FOLDER = compiled.ROOT / "build" / "compiled"
 compiled.prefer()
 compiled.prefer()
 print(any(isinstance(each, compiled.Finder) for each in sys.meta_path), os.environ[{PURE!r}])
+print("before", file=sys.stderr, flush=True)
+if os.fork() == 0:
+    compiled.tell_if_unfit()
+    os._exit(0)
+os.wait()
+compiled.tell_if_unfit()
+compiled.tell_if_unfit()
 """
     imported_pure = {**os.environ, PURE: "1"}  # whatever this checkout has compiled
     done = subprocess.run(
@@ -133,6 +140,8 @@ print(any(isinstance(each, compiled.Finder) for each in sys.meta_path), os.envir
         env=imported_pure,
     )
     assert done.stdout.split() == ["False", "1"]
-    (line,) = done.stderr.splitlines()
+    before, line = done.stderr.splitlines()
+    assert before == "before"
+    assert line.startswith("qswarm: pure Python runs")
     assert SOURCE in line
     assert REMEDY in line

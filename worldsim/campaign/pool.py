@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import NamedTuple
 
 from agent.controller import FaultyControllerError
+from netem.compiled import tell_if_unfit
 from netem.wire.shutdown import StopRequest
 from worldsim.campaign.flight import finished
 from worldsim.campaign.watched_flight import Job, WatchedFlight
@@ -101,6 +102,7 @@ class _Pool:
         stop: StopRequest,
         on_progress: Callable[[float], None],
     ) -> None:
+        tell_if_unfit()
         self._waiting = _Waiting(jobs)
         self._workers = workers
         self._stop = stop

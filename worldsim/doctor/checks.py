@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from netem.compiled import FOLDER, PURE, REMEDY, ROOT, UnfitError, fitting
+from netem.compiled import FOLDER, PURE, REMEDY, ROOT, UNTOLD, UnfitError, fitting
 from worldsim.bench.circumstances import code_form, cpu_model, modules
 from worldsim.recording.viewer import ViewerError, viewer_program
 from worldsim.report.film import MP4, film_suffix
@@ -69,6 +69,7 @@ def clock_check(late_s: list[float]) -> Check:
 
 def compiled_check() -> Check:
     """Return whether compiled code runs, and why not."""
+    UNTOLD.clear()  # it is told here
     form = code_form(modules())
     compiler = shutil.which(os.environ.get("CC") or "cc")
     says = f"{form}; {'a C compiler is there' if compiler else 'no C compiler'}"

@@ -18,6 +18,7 @@ from agent.config import AgentSetup
 from agent.core import Agent, Decoders
 from agent.late_frames import LateFrames
 from agent.messages import Observation
+from netem.compiled import tell_if_unfit
 from netem.faults import FaultOrder
 from netem.medium import Medium
 from netem.messages import MediumCounters
@@ -106,6 +107,7 @@ class VirtualFleet:
         watch: StepWatch | None = None,
         tap: InputTap | None = None,
     ) -> None:
+        tell_if_unfit()
         self._tap = tap
         self.ended_by: str | None = None
         """What in the scenario ends the run before its time; None: nothing so far."""

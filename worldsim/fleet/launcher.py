@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 
 from netem import process as netem_process
+from netem.compiled import tell_if_unfit
 from netem.wire.access import OPERATOR, AccessControl, write_users
 from netem.wire.keys import agent_name, medium_name
 from netem.wire.shutdown import ignore_signals, interrupt_on_signals
@@ -59,6 +60,7 @@ def run(scenario: Scenario, directory: RunDirectory, options: RunOptions, output
     No process is left behind, also after Ctrl-C, SIGTERM and SIGHUP. Raises RunDirectoryError where
     the host allows too few files.
     """
+    tell_if_unfit()
     launched_s = time.monotonic()
     problem = descriptors_problem(scenario.rows + OTHER_DESCRIPTORS)
     if problem is not None:
