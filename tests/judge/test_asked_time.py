@@ -121,6 +121,47 @@ def test_convergence_is_timed_from_the_end_of_a_fault_that_forbade_it(
     assert judge.phases[0].converge_s == pytest.approx(until_s, abs=0.06)
 
 
+def slow(from_s: float, to_s: float, delay_s: float) -> list[RunEvent]:
+    fault = SlowChanged(t_s=from_s, agent=0, planned=True, number=7, delay_s=delay_s)
+    return [fault, msgspec.structs.replace(fault, t_s=to_s, ends=True)]
+
+
+@pytest.mark.parametrize(
+    ("delay_s", "until_s", "expected"),
+    [
+        (3.0, 14.5, (1.5, True)),
+        (3.0, 16.5, (3.5, True)),  # 6.5 s after the end of the fault
+        (3.0, 17.5, (4.5, False)),
+        (0.5, 14.0, (3.5, True)),
+        (0.5, 15.0, (4.5, False)),
+        (0.04, 15.0, (15.0, False)),  # a step of less than a tick forbids nothing
+    ],
+)
+def test_convergence_is_timed_from_the_end_of_the_step_that_outlasts_a_slow_fault(
+    delay_s: float, until_s: float, expected: Row
+) -> None:
+    judge = judged(away(0.0, until_s), slow(1.0, 10.0, delay_s), 4.0)
+    assert found(rows(judge)[CONVERGE]) == expected
+
+
+@pytest.mark.parametrize(("until_s", "held"), [(15.5, True), (17.5, False)])
+def test_re_forming_is_timed_from_the_end_of_that_step_too(until_s: float, held: bool) -> None:
+    judge = judged(away(8.0, until_s), [*slow(8.0, 11.0, 3.0), kill(12.0)])
+    (ended, lost) = judge.recoveries
+    assert (ended.kind, ended.t_s, lost.kind) == ("slow", 11.0, "kill")
+    assert ended.overtaken_s == 0.0
+    assert lost.timed_from_s == 14.0
+    assert lost.reformed_s == pytest.approx(until_s - 14.0, abs=0.06)
+    assert rows(judge)["reform_within_s"].held is held
+
+
+def test_a_step_that_outlasts_its_fault_and_the_run_leaves_the_deadline_open() -> None:
+    judge = judged(away(8.0, 99.0), slow(8.0, 16.5, 9.0))
+    assert rows(judge)["reform_within_s"].held is None
+    again = [*slow(8.0, 10.0, 4.0), slow(12.0, 13.0, 4.0)[0]]  # it begins again before it is over
+    assert judged(away(8.0, 99.0), again).recoveries[0].timed_from_s is None
+
+
 @pytest.mark.parametrize("at_s", [8.0, 10.0])
 @pytest.mark.parametrize(("until_s", "held"), [(16.0, True), (18.5, False)])
 def test_a_loss_inside_a_fault_that_forbids_re_forming_is_timed_from_its_end(

@@ -155,12 +155,8 @@ class Invariants:
         """Take a change of an agent's fault, which may outlast its end by a step."""
         self._connectivity.handle_agent_fault(event)
         self._shared.forget()
-        over_s = event.t_s
-        if isinstance(event, SlowChanged) and event.ends:
-            # A step that was begun before takes its time: the agent says nothing new meanwhile.
-            over_s += event.delay_s
-        self._busy_until_s = max(self._busy_until_s, over_s)
-        self._fault(event.t_s, over_s)
+        self._busy_until_s = max(self._busy_until_s, event.over_s)
+        self._fault(event.t_s, event.over_s)
 
     def _handle_radio(self, event: RadioRunEvent) -> None:
         if isinstance(event, Sabotaged):

@@ -30,17 +30,29 @@ class PartingFaults:
         """Clocks that differ by no more part nobody, nor do steps of one tick [s]."""
         self._cutting = CuttingFaults(scenario)
         self._others: set[int] = set()
+        self._over_s: dict[int, float] = {}
+        """When those of them are over that have ended, by number [s; simulated time]."""
         self.unobserved = False
         """Whether netem is down or the world was stopped, and not all are observed again yet."""
 
     def __bool__(self) -> bool:
+        return bool(self.in_force or self._over_s)
+
+    @property
+    def in_force(self) -> bool:
+        """Whether there are any that have not ended; others may not be over yet."""
         return bool(self._cutting or self._others or self.unobserved)
 
     def see(self, tick: Tick) -> bool:
-        """Take a tick before it is judged; return whether the radio begins to part, or ceases."""
-        before = bool(self._cutting)
+        """Take a tick before it is judged.
+
+        Return whether the radio begins to part, or ceases, or a fault that has ended is over.
+        """
+        before = bool(self._cutting), len(self._over_s)
         self._cutting.see(tick)
-        return before != bool(self._cutting)
+        for number in [each for each, at_s in self._over_s.items() if at_s <= tick.time_s]:
+            del self._over_s[number]
+        return before != (bool(self._cutting), len(self._over_s))
 
     def handle_stop(self, event: WorldStopped | Reconnected) -> None:
         """Take the stop of the world, or the end of such a time."""
@@ -69,11 +81,12 @@ class PartingFaults:
                 parts = event.stops_s > LONGEST_STOP_S
             case _:
                 assert_never(event)
-        if parts:
-            self._mark(event.number, begins=not event.ends)
-
-    def _mark(self, number: int, *, begins: bool) -> None:
-        if begins:
-            self._others.add(number)
-        else:
-            self._others.discard(number)
+        if not parts:
+            return
+        if not event.ends:
+            self._others.add(event.number)
+            self._over_s.pop(event.number, None)
+        elif event.number in self._others:
+            self._others.remove(event.number)
+            if event.over_s > event.t_s:
+                self._over_s[event.number] = event.over_s

@@ -87,6 +87,15 @@ class AgentFaultEvent(PlannedEvent, frozen=True, kw_only=True):
     """The fault's number."""
     ends: bool = False
 
+    @property
+    def over_s(self) -> float:
+        """When what an end ends is over; its own time as a rule [s; simulated time].
+
+        It is the one answer to that question: whatever is asked of a team after a fault, is asked
+        from then on.
+        """
+        return self.t_s
+
 
 class ClockChanged(AgentFaultEvent, frozen=True, tag="clock"):
     """An agent's clock goes wrong by the values of a fault, or no more."""
@@ -118,6 +127,11 @@ class SlowChanged(AgentFaultEvent, frozen=True, tag="slow"):
 
     delay_s: float = 0.0
     """[s]"""
+
+    @property
+    def over_s(self) -> float:
+        """When it is over: a step that was begun before its end takes its time after it."""
+        return self.t_s + self.delay_s if self.ends else self.t_s
 
 
 class Starved(AgentFaultEvent, frozen=True, tag="starve"):

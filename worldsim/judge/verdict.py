@@ -192,7 +192,7 @@ class Judge:
         if not disturbs:
             return  # what has cut no link excuses nobody
         self._held.open_window(event.t_s)
-        if not self._parting:
+        if not self._parting.in_force:
             self._recoveries.handle_radio(event)
 
     def _handle_agent_fault(self, event: AgentFaultRunEvent) -> None:
@@ -203,14 +203,14 @@ class Judge:
         self._parting.handle_agent_fault(event)
         self._note_parting(event.t_s)
         self._held.open_window(event.t_s)
-        if not self._parting:
+        if not self._parting.in_force:
             self._recoveries.handle_agent_fault(event)
 
     def _handle_stop(self, event: WorldStopped | Reconnected) -> None:
         self._parting.handle_stop(event)
         self._note_parting(event.t_s)
         self._held.open_window(event.t_s)
-        if isinstance(event, Reconnected) and not self._parting:
+        if isinstance(event, Reconnected) and not self._parting.in_force:
             self._recoveries.handle_radio(event)
 
     def _note_parting(self, t_s: float) -> None:

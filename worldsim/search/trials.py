@@ -6,6 +6,7 @@ form its formation, and must then stay in it. The radio itself stays mild, so th
 """
 
 from collections import Counter
+from collections.abc import Iterable
 from itertools import product
 from math import ceil, cos, dist, radians, sin
 from typing import Any, NamedTuple
@@ -157,8 +158,15 @@ def _timed(draw: GeneDraw, made: Tables, terms: Terms, busy_s: float, way_m: flo
         for key in ("converge_within_s", "reform_within_s", "in_formation_fraction"):
             made["expect"].pop(key, None)
     # Three seconds more: to be in place is to be there for two of them.
-    made["duration_s"] = hurt_s + alone_s + 3.0
+    made["duration_s"] = max(hurt_s, _over_s(made["event"])) + alone_s + 3.0
     return made
+
+
+def _over_s(events: Iterable[Tables]) -> float:
+    """Return when the last step is over that a slow agent has begun in its fault [s]."""
+    slow = (each for each in events if "slow" in each)
+    over_s = (each["at_s"] + (each.get("for_s") or 0.0) + each["slow"]["delay_s"] for each in slow)
+    return float(ceil(max(over_s, default=0.0)))
 
 
 def fair_s(made: Tables) -> float:
