@@ -21,7 +21,7 @@ from tests.recording.flights import straight_flight, wedge
 from worldsim.judge.run_events import Killed, RoleChanged, RunEvent
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge
-from worldsim.results.summary import INVARIANT_WORDS
+from worldsim.results.outcome import INVARIANT_WORDS
 from worldsim.scenario.obstacle_tables import Sphere
 from worldsim.scenario.tables import Expectations, Scenario
 

@@ -18,8 +18,10 @@ from worldsim.judge.finding import InvariantTally
 from worldsim.judge.hovering_vehicles import HoveringVehicles
 from worldsim.judge.invariants import Invariants
 from worldsim.results.exit_status import EXIT_STATUS
+from worldsim.results.finished_run import FinishedRun
+from worldsim.results.outcome import INVARIANT_WORDS
 from worldsim.results.provenance import provenance
-from worldsim.results.summary import FATES, INVARIANT_WORDS, FinishedRun, Summary, summarise
+from worldsim.results.summary import FATES, Summary, summarise
 from worldsim.scenario.file import load, parse
 from worldsim.scenario.library import SCENARIOS
 

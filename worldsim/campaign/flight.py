@@ -23,9 +23,10 @@ from worldsim.engine.trace import TraceLog
 from worldsim.engine.virtual import Flight, Probe, fly
 from worldsim.fleet.fork import adopt_orphans, end_orphans
 from worldsim.results.exit_status import INTERRUPTION
+from worldsim.results.finished_run import FinishedRun
 from worldsim.results.run_folder import RunDirectory, RunWriteError
 from worldsim.results.sinks import Sinks, open_sinks
-from worldsim.results.summary import FinishedRun, summarise
+from worldsim.results.summary import summarise
 from worldsim.results.trace_file import write_trace
 from worldsim.scenario.tables import Scenario
 

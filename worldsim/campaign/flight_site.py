@@ -13,9 +13,10 @@ from typing import NamedTuple, Protocol
 from netem.wire.shutdown import StopRequest
 from worldsim.campaign.flight import FlightProbe
 from worldsim.campaign.pool import Job, sweep
+from worldsim.results.outcome import Outcome
 from worldsim.results.overall import FailedRun, Made, is_cut_off
 from worldsim.results.run_folder import RunWriteError
-from worldsim.results.summary import Outcome, Summary
+from worldsim.results.summary import Summary
 from worldsim.scenario.tables import Scenario
 
 

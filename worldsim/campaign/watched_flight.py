@@ -17,9 +17,10 @@ from worldsim.campaign.flight import FLOWN, NOT_WRITTEN, FlightProbe, Kept, fly_
 from worldsim.campaign.printed import PrintedOutput
 from worldsim.campaign.pulse import Place, Pulse, blame
 from worldsim.fleet.fork import ProcessExit, fork, reap
+from worldsim.results.outcome import Outcome
 from worldsim.results.overall import FailedRun, Made, Result
 from worldsim.results.run_folder import RunDirectory
-from worldsim.results.summary import Outcome, Summary
+from worldsim.results.summary import Summary
 from worldsim.scenario.tables import Scenario
 
 STEP_WITHIN_S = 10.0

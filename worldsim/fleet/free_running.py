@@ -50,7 +50,7 @@ from worldsim.fleet.world_stop import stop_world
 from worldsim.judge.event import By
 from worldsim.judge.run_events import LateStart
 from worldsim.judge.tick import Packets
-from worldsim.results.summary import OverloadRow
+from worldsim.results.finished_run import OverloadRow
 from worldsim.scenario.tables import Scenario
 
 REPORTS_RING = 4

@@ -23,9 +23,10 @@ from worldsim.fleet.lockstep import LockstepFleet
 from worldsim.fleet.overload import OnOverload, Overload
 from worldsim.fleet.startup import Startup, StartupError, assemble
 from worldsim.results.exit_status import BAD_INPUT, EXIT_STATUS, INCONCLUSIVE
+from worldsim.results.finished_run import FinishedRun, Mode
 from worldsim.results.run_folder import RunDirectory, RunDirectoryError, RunWriteError
 from worldsim.results.sinks import Sinks, open_sinks
-from worldsim.results.summary import FinishedRun, Mode, Summary, summarise
+from worldsim.results.summary import Summary, summarise
 from worldsim.results.trace_file import write_trace
 from worldsim.scenario.tables import Scenario
 

@@ -5,7 +5,7 @@ from statistics import median
 
 from worldsim.fleet.culprits import SharedSteps
 from worldsim.fleet.process_state import private_mb, process_state
-from worldsim.results.summary import ResourcesRow
+from worldsim.results.finished_run import ResourcesRow
 
 MEASURED_AGENTS = 10
 """So many agents' memory is read, after the run: the kernel takes about a millisecond for each."""

@@ -16,8 +16,8 @@ from worldsim.results.expectation_text import (
     was_tested,
 )
 from worldsim.results.fault_rows import fault_texts
+from worldsim.results.outcome import INVARIANT_WORDS
 from worldsim.results.run import Run
-from worldsim.results.summary import INVARIANT_WORDS
 
 UNKNOWN = "-"
 AT_LEAST = (

@@ -14,10 +14,11 @@ from xml.etree import ElementTree as ET
 
 from worldsim.judge.finding import ExpectationRow
 from worldsim.results.expectation_text import expectation_texts, was_tested
+from worldsim.results.judge_rows import InvariantRow
 from worldsim.results.output_streams import escaped
 from worldsim.results.overall import FailedRun, Made, Result
 from worldsim.results.run_folder import RunDirectoryError, unwritable
-from worldsim.results.summary import InvariantRow, Summary
+from worldsim.results.summary import Summary
 from worldsim.results.verdict_text import circumstances, violation_text
 
 HEAD_B = 512

@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple, TypedDict, assert_never
 
+from worldsim.results.outcome import Outcome
 from worldsim.results.provenance import Provenance, provenance
-from worldsim.results.summary import Outcome, Summary
+from worldsim.results.summary import Summary
 from worldsim.scenario.tables import Scenario
 
 

@@ -20,9 +20,12 @@ from worldsim.results.expectation_text import (
     was_tested,
 )
 from worldsim.results.fault_rows import fault_texts
+from worldsim.results.finished_run import DeliveryRow
+from worldsim.results.judge_rows import InvariantRow
+from worldsim.results.outcome import INVARIANT_WORDS
 from worldsim.results.overall import Overall, Row, ScenarioRow
 from worldsim.results.refused_agents import refused_texts
-from worldsim.results.summary import INVARIANT_WORDS, DeliveryRow, InvariantRow, Summary
+from worldsim.results.summary import Summary
 
 if TYPE_CHECKING:
     from worldsim.recording.comparison import Difference

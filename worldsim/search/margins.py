@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from worldsim.judge.metrics import ROUNDING_M
-from worldsim.results.summary import INVARIANT_WORDS
+from worldsim.results.outcome import INVARIANT_WORDS
 
 SAFETY: Final = ("separation", "clearance", "error")
 CONSERVATION: Final = ("I5", "I8", "repeat")

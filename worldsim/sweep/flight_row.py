@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, TypedDict
 
 from worldsim.campaign.flight_site import Flown
-from worldsim.results.summary import Outcome
+from worldsim.results.outcome import Outcome
 from worldsim.results.table import Column
 from worldsim.sweep.plan import FlightKey
 
