@@ -1,11 +1,10 @@
 """The commands that look at a run: ``verify`` and ``view`` its recording, ``ps`` its processes."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from worldsim.commands.options import RunFolder, complain, examples
+from worldsim.commands.options import Recordings, RunFolder, complain, examples
 from worldsim.results.exit_status import FAIL, PASS
 
 commands = typer.Typer()
@@ -38,12 +37,7 @@ def verify(run: RunFolder) -> int:
     )
 )
 def view(
-    runs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RUN", help="Run directories, directories of many runs, or recordings."
-        ),
-    ],
+    runs: Recordings,
     web: Annotated[
         bool,
         typer.Option("--web", help="Use a browser instead of a window; served on this host only."),

@@ -4,7 +4,7 @@ import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -94,6 +94,10 @@ LineSchema = Annotated[
         help="Print the JSON Schema of the lines of [control] command and exit.",
     ),
 ]
+Recordings = Annotated[
+    list[Path],
+    typer.Argument(metavar="RUN", help="Run directories, directories of many runs, or recordings."),
+]
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="The output directory of a run.")]
 Agents = Annotated[
     int | None, typer.Option(metavar="N", help="Number of agents (instead of the scenario's).")
@@ -102,6 +106,9 @@ Seed = Annotated[
     int | None,
     typer.Option(metavar="S", help="Seed of starts and radio (instead of the scenario's)."),
 ]
+_SEEDS: Any = typer.Option(metavar="A:B", help="Fly each seed from A up to, but not including, B.")
+Seeds = Annotated[str, _SEEDS]
+SeedsIfAny = Annotated[str | None, _SEEDS]
 Duration = Annotated[
     float | None,
     typer.Option(metavar="T", help="Simulated seconds (instead of the scenario's)."),

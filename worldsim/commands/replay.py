@@ -1,12 +1,11 @@
 """The command that asks one agent's controller again: ``replay``."""
 
 from math import inf
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from worldsim.commands.options import complain, examples
+from worldsim.commands.options import RunFolder, complain, examples
 from worldsim.results.exit_status import BAD_INPUT, FAIL, PASS
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ commands = typer.Typer()
     )
 )
 def replay(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="The output directory of a run.")],
+    run: RunFolder,
     agent: Annotated[int, typer.Option("--agent", metavar="I", help="The agent's id.", min=0)],
     from_s: Annotated[
         float, typer.Option("--from", metavar="T", help="First simulated time [s].", min=0.0)

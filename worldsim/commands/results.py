@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from worldsim.commands.options import complain, examples
+from worldsim.commands.options import Recordings, complain, examples
 from worldsim.results.exit_status import BAD_INPUT, PASS
 
 if TYPE_CHECKING:
@@ -75,12 +75,7 @@ def export(
     )
 )
 def report(
-    runs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RUN", help="Run directories, directories of many runs, or recordings."
-        ),
-    ],
+    runs: Recordings,
     out: Annotated[
         Path | None,
         typer.Option(

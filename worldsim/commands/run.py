@@ -1,6 +1,5 @@
 """The commands that run scenarios: ``run`` with processes, ``sim`` in virtual time."""
 
-import os
 from math import isfinite
 from typing import Annotated
 
@@ -23,6 +22,7 @@ from worldsim.commands.options import (
     ScenarioFile,
     ScenarioFiles,
     Seed,
+    SeedsIfAny,
     Settings,
     Shards,
     Verify,
@@ -34,6 +34,7 @@ from worldsim.commands.options import (
     seeds_of,
     warn,
 )
+from worldsim.commands.sites import FlightsAtOnce, workers_of
 
 commands = typer.Typer()
 
@@ -128,14 +129,8 @@ def sim(
     scenarios: ScenarioFiles,
     agents: Agents = None,
     seed: Seed = None,
-    seeds: Annotated[
-        str | None,
-        typer.Option(metavar="A:B", help="Run each seed from A up to, but not including, B."),
-    ] = None,
-    jobs: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=1, help="Number of parallel jobs.", show_default="all cores"),
-    ] = None,
+    seeds: SeedsIfAny = None,
+    jobs: FlightsAtOnce = None,
     duration: Duration = None,
     settings: Settings = None,
     out: Out = None,
@@ -178,5 +173,4 @@ def sim(
             folder / RECORDING_FILE,
             lambda: fly(loaded[0], folder, not no_recording, output),
         )
-    workers = jobs or len(os.sched_getaffinity(0))
-    return simulate_many(loaded, out, not no_recording, workers, output)
+    return simulate_many(loaded, out, not no_recording, workers_of(jobs), output)

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from worldsim.commands.options import (
+    Quiet,
+    Seeds,
     Settings,
     complain,
     examples,
@@ -22,8 +24,6 @@ if TYPE_CHECKING:
     from worldsim.search.trials import Terms
 
 commands = typer.Typer()
-
-Quiet = Annotated[bool, typer.Option("--quiet", help="Print the result only, no progress.")]
 
 
 @commands.command(
@@ -45,10 +45,7 @@ def fuzz(
             help="Folder of the search: new, or one to go on with (same options, more seeds).",
         ),
     ],
-    seeds: Annotated[
-        str,
-        typer.Option(metavar="A:B", help="Fly each seed from A up to, but not including, B."),
-    ] = "0:100",
+    seeds: Seeds = "0:100",
     controller: Annotated[
         str | None,
         typer.Option(

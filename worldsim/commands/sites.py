@@ -25,11 +25,16 @@ Cluster = Annotated[
 ]
 
 
+def workers_of(jobs: int | None) -> int:
+    """Return how many flights are flown at once: as --jobs says, or one on each usable core."""
+    return jobs or len(os.sched_getaffinity(0))
+
+
 def local_site(jobs: int | None, scratch: Path) -> "FlightSite":
     """Return this host. scratch: a folder for what flights write; it is removed after them."""
     from worldsim.campaign.flight_site import LocalSite
 
-    return LocalSite(jobs or len(os.sched_getaffinity(0)), scratch)
+    return LocalSite(workers_of(jobs), scratch)
 
 
 @contextmanager
