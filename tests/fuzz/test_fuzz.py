@@ -14,8 +14,9 @@ from tests.planted_bugs import filter_sign, searched
 from tests.small_scenario import SMALL
 from worldsim.campaign.flight_site import FlightSite, Flown, LocalSite, Order, SiteError
 from worldsim.commands.app import command
+from worldsim.fuzz import flights
 from worldsim.fuzz.cause import Cause, find_cause
-from worldsim.fuzz.findings import refly, trouble_of
+from worldsim.fuzz.findings import begin, refly, trouble_of
 from worldsim.fuzz.flights import Hangar
 from worldsim.fuzz.folder import SearchFolder, read_finding
 from worldsim.fuzz.fuzz import Search, fuzz
@@ -90,7 +91,7 @@ def test_a_finding_is_known_where_it_fails_and_fixed_where_it_does_not(
     assert cause is not None
     assert cause.certain_s == 0.0
     assert cause.needed is None
-    assert "No draw matters" in (corpus / "separation-2" / "finding.md").read_text()
+    assert "Certain from the start" in (corpus / "separation-2" / "finding.md").read_text()
     (corpus / "separation-2").rename(found / "findings" / "separation-2")
 
 
@@ -190,6 +191,19 @@ def test_a_line_that_was_cut_off_is_flown_again(tmp_path: Path) -> None:
 def test_a_curve_shows_its_least_values() -> None:
     assert curve([0.0, 0.5, 1.0]) == "▁▅█"
     assert curve([None, 1.0]) == " ▁"
+
+
+def test_a_finding_is_explained_before_it_is_made_small(tmp_path: Path) -> None:
+    measured = {"first_s": {"I3": 4.5}, "t_s": [0.0, 0.1], "slot_error_m": [2.0, 1.0]}
+    events = ({"t_s": 2.0, "kind": "kill", "agent": 1}, {"t_s": 9.0, "kind": "heal"})
+    flown = flights.Flown("3", {"I3": -1.0}, "I3 is violated", "ab", measured, events)
+    row = {"seed": 3, "how": "random", "violated": ["I3"], "reason": "", "duration_s": 60.0}
+    assert not begin(tmp_path, SMALL, row, flown)["shrunk"]
+    page = (tmp_path / "finding.md").read_text()
+    assert "First tick of trouble: 4.5 s.\nLast event before it: 2 s: kill (agent 1)." in page
+    assert "slot_error_m" in page
+    begin(tmp_path, SMALL, {**row, "violated": ["error"]}, flown._replace(measured=None))
+    assert "First tick of trouble: not known." in (tmp_path / "finding.md").read_text()
 
 
 def test_the_trouble_of_a_time_that_runs_out_is_where_progress_ends() -> None:

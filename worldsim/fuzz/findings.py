@@ -29,6 +29,7 @@ from worldsim.search.shrink import Shrinker, Size, tidy
 
 TIMED: Final = ("converge", "reform")
 """Properties that are violated where a time runs out."""
+ERROR: Final = "error"
 REPEAT: Final = "repeat"
 """The property for which a scenario is flown twice."""
 BUDGET: Final = 150
@@ -42,8 +43,11 @@ OF_TIMELINE: Final = ("slot", "queue", "role")
 Say = Callable[[str], None]
 
 
-def begin(folder: Path, text: str, row: Row) -> Row:
-    """Keep a failing seed as a finding that replays it; return what is known of it."""
+def begin(folder: Path, text: str, row: Row, flown: Flown) -> Row:
+    """Keep a failing seed as a finding that replays it; return what is known of it.
+
+    row: the seed's line; flown: what its flight showed to a MarginProbe.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     for name in (ORIGINAL, SCENARIO):
         (folder / name).write_text(text, encoding="utf-8")
@@ -58,8 +62,7 @@ def begin(folder: Path, text: str, row: Row) -> Row:
         "size": size,
         "shrunk": False,
         "shrink_flights": 0,
-        "trouble_s": row["violated_s"],
-        "last_event": None,
+        **explanation(flown, row["violated"][0], row["duration_s"]),
         "signature": signature(row["violated"][0], tomllib.loads(text)),
         "version": provenance()["version"],
         "commit": provenance()["commit"],
@@ -137,10 +140,10 @@ def explanation(flown: Flown, name: str, duration_s: float) -> Row:
     """Return what a finding's flight tells: its trouble, the events before it, the margins."""
     measured = flown.measured or {}
     trouble_s = trouble_of(measured, name, duration_s)
-    if name in TIMED:
+    if name in TIMED and trouble_s is not None:
         disturbed = [each["t_s"] for each in flown.events if each["kind"] not in OF_TIMELINE]
         trouble_s = max([trouble_s, *disturbed])
-    before = [each for each in flown.events if each["t_s"] <= trouble_s]
+    before = [each for each in flown.events if trouble_s is None or each["t_s"] <= trouble_s]
     faults = [each for each in before if each["kind"] not in OF_TIMELINE]
     return {
         "reason": flown.reason,
@@ -162,15 +165,18 @@ def thinned(values: list[float | None]) -> list[float | None]:
     return found
 
 
-def trouble_of(measured: Any, name: str, duration_s: float) -> float:
+def trouble_of(measured: Any, name: str, duration_s: float) -> float | None:
     """Return the first tick of trouble [s]: of the violation, or of the way to it.
 
+    None where a flight does not tell: it ended by an error, or went another way the second time.
     Of a time that runs out it is the last tick in which all agents were in their slots; if they
     never were, the last in which the farthest agent still came nearer.
     """
     first_s = (measured.get("first_s") or {}).get(name)
     if first_s is not None:
         return float(first_s)
+    if not measured or name in (ERROR, REPEAT):
+        return None
     if name not in TIMED:
         return duration_s
     times, errors = measured.get("t_s") or [], measured.get("slot_error_m") or []

@@ -13,9 +13,10 @@ from typing import Any, Final, NamedTuple
 from netem.wire.shutdown import stop_requests
 from worldsim.campaign.flight_site import FlightSite, SiteError
 from worldsim.fuzz.findings import BUDGET, begin, refly, shrink, take_in
-from worldsim.fuzz.flights import Flown, Hangar, Task
+from worldsim.fuzz.flights import Flown, Hangar, Task, violated_s
 from worldsim.fuzz.folder import TABLE, Row, SearchFolder, findings_in, read_finding
 from worldsim.fuzz.pages import closing, table
+from worldsim.fuzz.probe import MarginProbe
 from worldsim.results.exit_status import FAIL, INCONCLUSIVE, INTERRUPTED, INTERRUPTION, PASS
 from worldsim.results.progress_line import ProgressLine
 from worldsim.scenario.tables import Scenario
@@ -105,28 +106,24 @@ def _fly(search: Search, folder: SearchFolder, hangar: Hangar, line: ProgressLin
     """Fly the seeds that have no row yet."""
     rows, progress = folder.rows(), _Progress(search, line)
     guide = Guide(search.seeds.start) if search.guided else None
-    for generation in _generations(search.seeds):
+    for generation in generations(search.seeds):
         if hangar.stopped() or (search.first_only and _any_violated(rows, search.seeds)):
             break
         if guide is None and all(seed in rows for seed in generation):
             continue
-        drawn = [_drawn(search, seed, guide) for seed in generation]
-        tasks = [
-            Task(str(each.seed), each.scenario, twice=each.seed % TWICE_EVERY == 0)
-            for each in drawn
-            if each.seed not in rows
-        ]
-        of_seed = {each.seed: each for each in drawn}
+        proposed = [drawn(search.terms, search.beside, seed, guide) for seed in generation]
+        tasks = [task_of(each) for each in proposed if each.seed not in rows]
+        of_seed = {each.seed: each for each in proposed}
         for flown in hangar.fly(tasks):
-            row = _row(of_seed[int(flown.name)], flown)
+            row = row_of(of_seed[int(flown.name)], flown)
             rows[row["seed"]] = row
             folder.add(row)
             if row["violated"]:
                 name = f"{row['violated'][0]}-{row['seed']}"
-                begin(folder.finding(name), of_seed[row["seed"]].trial.text, row)
+                begin(folder.finding(name), of_seed[row["seed"]].trial.text, row, flown)
             progress.show(rows)
         if guide is not None:
-            for each in drawn:
+            for each in proposed:
                 if each.seed in rows:
                     guide.learn(each.trial.genes, rows[each.seed]["score"])
 
@@ -135,41 +132,52 @@ def _any_violated(rows: Mapping[int, Row], seeds: range) -> bool:
     return any(rows[seed]["violated"] for seed in seeds if seed in rows)
 
 
-def _generations(seeds: range) -> Iterator[range]:
+def generations(seeds: range) -> Iterator[range]:
+    """Yield the seeds that are drawn before any of them has flown."""
     for first in range(seeds.start, seeds.stop, GENERATION):
         yield range(first, min(first + GENERATION, seeds.stop))
 
 
-def _drawn(search: Search, seed: int, guide: Guide | None) -> Drawn:
-    """Return the trial of a seed."""
+def drawn(terms: Terms, beside: Path, seed: int, guide: Guide | None) -> Drawn:
+    """Return the trial of a seed; guided where the seed is odd and there is a guide.
+
+    beside: the file whose folder paths are relative to. Raises ScenarioError for terms of which
+    nothing can be drawn.
+    """
     guided = guide is not None and seed % 2 == 1
 
     def check(text: str) -> str:
-        return objection(text, search.beside, search.terms.allowed)
+        return objection(text, beside, terms.allowed)
 
     given: Any = guide.propose() if guide is not None and guided else {}
     name = f"{WORD}-{seed}"
     try:
-        made = trial(name, (WORD, seed), search.terms, check, given)
+        made = trial(name, (WORD, seed), terms, check, given)
     except LookupError as error:
         raise ScenarioError(name, "", str(error)) from error
     if guide is not None:
         guide.withdraw(given)
     how = "guided" if guided else "random"
-    return Drawn(seed, how, made, loaded(made.text, search.beside))
+    return Drawn(seed, how, made, loaded(made.text, beside))
 
 
-def _row(drawn: Drawn, flown: Flown) -> Row:
+def task_of(drawn: Drawn) -> Task:
+    """Return the flight of a seed."""
+    probe = MarginProbe(drawn.scenario)
+    return Task(str(drawn.seed), drawn.scenario, probe, twice=drawn.seed % TWICE_EVERY == 0)
+
+
+def row_of(drawn: Drawn, flown: Flown) -> Row:
     """Return the line of a seed."""
-    scenario = drawn.scenario
+    scenario, bad = drawn.scenario, violated(flown.margins)
     return {
         "seed": drawn.seed,
         "how": drawn.how,
-        "violated": violated(flown.margins),
+        "violated": bad,
         "score": score(flown.margins),
         "margins": {name: round(value, 6) for name, value in flown.margins.items()},
         "reason": flown.reason,
-        "violated_s": scenario.duration_s,
+        "violated_s": violated_s(flown, scenario, bad[0]) if bad else None,
         "agents": scenario.fleet.agents,
         "duration_s": scenario.duration_s,
         "events": len(scenario.event),

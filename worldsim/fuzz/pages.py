@@ -73,7 +73,7 @@ def page(finding: Row) -> str:
         _size_row("as drawn", finding["original_size"]),
         _size_row(f"after {finding['shrink_flights']} flights", found),
         "",
-        f"First tick of trouble: {finding['trouble_s']:g} s.",
+        f"First tick of trouble: {_seconds(finding['trouble_s'])}.",
         f"Last event before it: {_event_text(finding['last_event'])}.",
         "",
         *_curves(finding.get("margins") or {}),
@@ -82,6 +82,10 @@ def page(finding: Row) -> str:
     if "cause" in finding:
         lines += ["## Cause", "", finding["cause"]["text"], ""]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _seconds(time_s: float | None) -> str:
+    return "not known" if time_s is None else f"{time_s:g} s"
 
 
 def _size_row(name: str, size: Mapping[str, Any]) -> str:
@@ -138,8 +142,9 @@ def closing(findings: list[Row], states: Mapping[str, str]) -> list[str]:
     lines = []
     for each in findings:
         size, state = each["size"], states.get(each["name"], "new")
+        after = "" if each["trouble_s"] is None else f" after {each['trouble_s']:g} s"
         lines.append(
-            f"{state}: {each['name']}: {each['property']} after {each['trouble_s']:g} s;"
+            f"{state}: {each['name']}: {each['property']}{after};"
             f" {size['faults']} faults, {size['agents']} agents, {size['duration_s']:g} s"
         )
     counted = Counter(states.values())
