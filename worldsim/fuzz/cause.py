@@ -1,17 +1,17 @@
-"""`qswarm cause`: from when on a failure was certain, whatever is drawn from there on.
+"""`qswarm cause`: from when on a failure was certain, whatever comes after.
 
 A flight is repeated up to a tick as it was; from there on the radio and the sensors draw other
-numbers. The first tick from which on 95 % of such flights fail is found by bisection. Beside it,
-the timeline is cut: the last event without which there is no failure. Draws that do not matter
-leave only that.
+numbers, and no further event happens. The first tick from which on 95 % of such flights fail is
+found by bisection. Beside it, the timeline is cut: the last event without which nothing fails.
 """
 
 import tomllib
 from collections.abc import Callable, Sequence
+from math import ceil
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
-from worldsim.fuzz.findings import TIMED, keep
+from worldsim.fuzz.findings import REPEAT, TIMED, keep
 from worldsim.fuzz.flights import Hangar, Task
 from worldsim.fuzz.folder import SCENARIO, Row, read_finding
 from worldsim.fuzz.probe import Redraw
@@ -19,6 +19,7 @@ from worldsim.scenario.file import as_toml
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 from worldsim.search.drafts import cautions, loaded, objection
 from worldsim.search.draws import Tables
+from worldsim.search.shrink import tidy
 
 CERTAIN: Final = 0.95
 STRIDE: Final = 7919
@@ -32,7 +33,8 @@ class Cause(NamedTuple):
     replays: bool
     """Whether the finding still fails."""
     certain_s: float | None = None
-    """The first tick from which on it fails in 95 % of draws [s]; None: not before it shows."""
+    """The first tick from which on it fails in 95 % of draws without a further event [s]; None: not
+    before it shows."""
     from_the_start: float | None = None
     """The share of other draws from the start on that fail too."""
     needed: Tables | None = None
@@ -48,13 +50,14 @@ class Cause(NamedTuple):
         if self.certain_s is None:
             told.append("Other draws avoid the failure up to the tick in which it shows.")
         elif self.certain_s == 0.0:
-            told.append("No draw matters: it fails whatever radio and sensors draw.")
+            told.append("Certain from the start, whatever radio and sensors draw.")
         else:
+            told.append(f"Certain from {self.certain_s:g} s on, whatever comes after.")
+        if (self.from_the_start or 0.0) < CERTAIN:
             share = f"{100.0 * (self.from_the_start or 0.0):.0f} %"
-            told.append(
-                f"Certain from {self.certain_s:g} s on; with other draws from the start, {share}"
-                " fail."
-            )
+            told.append(f"With other draws from the start, {share} fail.")
+        elif self.certain_s != 0.0:
+            told.append("No draw matters.")
         if self.needed is None:
             told.append("It fails without any event.")
         else:
@@ -75,36 +78,65 @@ class _Prober:
 
     def fails(self, tables: Tables) -> bool:
         """Return whether tables violate the finding's property."""
-        text = as_toml(tables)
-        if objection(text, self._file, cautions(self.scenario)):
-            return False
-        return self._failed([Task("0", loaded(text, self._file))]) == 1
+        scenario = self._of(tables)
+        return scenario is not None and self._failed([self._task("0", scenario)]) == 1
 
-    def share(self, tick: int, least: float = 0.0) -> float:
-        """Return the share of draws that fail, drawn anew from a tick on.
+    def share(self, tick: int) -> float:
+        """Return the share of draws that fail, drawn anew from a tick on."""
+        return self._share(
+            tick, self.scenario, f"other draws from {self.seconds(tick):g} s on", None
+        )
 
-        Once it is certain that the share is below ``least``, the rest is not flown.
-        """
-        spare = self._draws - int(least * self._draws + 0.999)
+    def is_certain(self, tick: int) -> bool:
+        """Return whether it fails whatever is drawn from a tick on, without a further event."""
+        kept = [each for each in self.events if self.tick_of(each) <= tick]
+        scenario = self._of({**self.tables, "event": kept})
+        told = f"nothing but other draws from {self.seconds(tick):g} s on"
+        spare = self._draws - ceil(CERTAIN * self._draws)
+        return scenario is not None and self._share(tick, scenario, told, spare) >= CERTAIN
+
+    @property
+    def events(self) -> list[Tables]:
+        """The events of the finding's scenario, in the order of their times."""
+        return sorted(self.tables.get("event") or (), key=lambda each: float(each["at_s"]))
+
+    def tick_of(self, event: Tables) -> int:
+        """Return the first tick that an event can change."""
+        return ceil(float(event["at_s"]) * self.scenario.fleet.tick_hz - 1e-9)
+
+    def seconds(self, tick: int) -> float:
+        """Return the time of a tick [s]."""
+        return tick / self.scenario.fleet.tick_hz
+
+    def _share(self, tick: int, scenario: Scenario, told: str, spare: int | None) -> float:
+        """Return the share of flights that fail. Once more than ``spare`` passed, it is enough."""
         failed = flown = 0
-        while flown < self._draws:
+        while flown < self._draws and not self._hangar.stopped():
             count = min(max(self._hangar.at_once, 4), self._draws - flown)
-            failed += self._failed([self._task(tick, flown + k) for k in range(count)])
+            tasks = []
+            for number in range(flown, flown + count):
+                seed = (scenario.seed + STRIDE * (number + 1)) % 2**53
+                redraw = Redraw(tick * SLOTS_PER_TICK, seed)
+                tasks.append(self._task(str(number), scenario, redraw))
+            failed += self._failed(tasks)
             flown += count
-            self._say(
-                f"other draws from {tick / self.scenario.fleet.tick_hz:g} s on:"
-                f" {failed} of {flown} fail; {self.flights} flights so far"
-            )
-            if self._hangar.stopped() or (least and flown - failed > spare):
+            self._say(f"{told}: {failed} of {flown} fail; {self.flights} flights so far")
+            if spare is not None and flown - failed > spare:
                 break
-        return failed / flown
+        return failed / max(flown, 1)
 
-    def _task(self, tick: int, number: int) -> Task:
-        seed = (self.scenario.seed + STRIDE * (number + 1)) % 2**53
-        return Task(str(number), self.scenario, Redraw(tick * SLOTS_PER_TICK, seed))
+    def _of(self, tables: Tables) -> Scenario | None:
+        """Return the scenario of tables; None where `qswarm check` objects to it."""
+        text = as_toml(tidy(tables))
+        if objection(text, self._file, cautions(self.scenario)):
+            return None
+        return loaded(text, self._file)
 
-    def _failed(self, tasks: Sequence[Task]) -> int:
-        name, found = self.finding["property"], list(self._hangar.fly(list(tasks)))
+    def _task(self, name: str, scenario: Scenario, probe: Redraw | None = None) -> Task:
+        return Task(name, scenario, probe, twice=self.finding["property"] == REPEAT)
+
+    def _failed(self, tasks: list[Task]) -> int:
+        name, found = self.finding["property"], list(self._hangar.fly(tasks))
         self.flights += len(found)
         return sum(flown.margins.get(name, 1.0) < 0.0 for flown in found)
 
@@ -118,7 +150,7 @@ def find_cause(folder: Path, hangar: Hangar, draws: int, say: Say) -> Cause | No
     if not prober.fails(prober.tables):
         return None if hangar.stopped() else Cause(False)
     from_start = prober.share(0)
-    certain_s = 0.0 if from_start >= CERTAIN else _certain_s(prober, hangar)
+    certain_s = _certain_s(prober, hangar, from_start >= CERTAIN)
     needed = _needed(prober)
     if hangar.stopped():
         return None
@@ -128,35 +160,36 @@ def find_cause(folder: Path, hangar: Hangar, draws: int, say: Say) -> Cause | No
     return cause
 
 
-def _certain_s(prober: _Prober, hangar: Hangar) -> float | None:
+def _certain_s(prober: _Prober, hangar: Hangar, no_draw_matters: bool) -> float | None:
     """Return the first tick [s] from which on the failure is certain, by bisection."""
-    tick_hz = prober.scenario.fleet.tick_hz
-    low, high = 0, _last_tick(prober.finding, prober.scenario)
-    if prober.share(high, CERTAIN) < CERTAIN:
+    last = _last_tick(prober.finding, prober.scenario)
+    ticks: Sequence[int] = range(last + 1)
+    if no_draw_matters:  # only an event can have made it certain
+        ticks = sorted({0, *map(prober.tick_of, prober.events)})
+    low, high = -1, len(ticks) - 1
+    if not prober.is_certain(ticks[high]):
         return None
     while high - low > 1 and not hangar.stopped():
         middle = (low + high) // 2
-        if prober.share(middle, CERTAIN) >= CERTAIN:
+        if prober.is_certain(ticks[middle]):
             high = middle
         else:
             low = middle
-    return high / tick_hz
+    return prober.seconds(ticks[high])
 
 
 def _last_tick(finding: Row, scenario: Scenario) -> int:
     """Return the tick in which a failure shows: the violation, or the end of the time allowed."""
-    timed = finding["property"] in TIMED
-    shown_s = scenario.duration_s if timed else finding["trouble_s"]
+    known = finding["property"] not in TIMED and finding["trouble_s"] is not None
+    shown_s = finding["trouble_s"] if known else scenario.duration_s
     return max(1, int(shown_s * scenario.fleet.tick_hz))
 
 
 def _needed(prober: _Prober) -> Tables | None:
     """Return the last event that the failure needs: what comes after it can be left out."""
-    events: list[Any] = sorted(prober.tables.get("event") or (), key=lambda each: each["at_s"])
-    kept = len(events)
-    while kept:
-        fewer = {**prober.tables, "event": events[: kept - 1]}
-        if not prober.fails({key: value for key, value in fewer.items() if value != []}):
-            return dict(events[kept - 1])
-        kept -= 1
+    events = prober.events
+    while events:
+        last = events.pop()
+        if not prober.fails({**prober.tables, "event": events}):
+            return last
     return None
