@@ -2,6 +2,8 @@
 
 import tomllib
 
+import pytest
+
 from tests.random_flights.generate import objection, scenario
 from tests.random_flights.shrink import flies
 from worldsim.scenario.file import as_toml
@@ -47,6 +49,31 @@ def test_only_what_makes_it_fail_is_left() -> None:
     assert Size.of(small) == (1, 2, 4.0)
     assert len(small["fleet"]["start"]["positions_m"]) == 2
     assert small.keys() & {"obstacle", "control", "netem"} == set()
+
+
+@pytest.mark.parametrize("forms", [True, False])
+def test_a_flight_ends_after_the_violation_though_a_time_limit_is_longer(forms: bool) -> None:
+    def breaks(tables: Tables) -> float | None:
+        """Break an invariant, which is judged only in a team that forms something."""
+        return 3.5 if tables["expect"]["converge"] >= forms and not objection(tables) else None
+
+    def objection(tables: Tables) -> bool:
+        return bool(tables["expect"].get("converge_within_s", 0.0) > tables["duration_s"])
+
+    expect = {"converge_within_s": 20.0, "reform_within_s": 20.0, "converge": True}
+    small = shrunk(tomllib.loads(TOO_NEAR) | {"expect": expect}, breaks)
+    assert small is not None
+    assert small["duration_s"] == 4.0
+    assert small["expect"] == {"converge": forms}
+
+
+def test_a_violation_that_shows_at_the_end_is_looked_for_earlier() -> None:
+    def parts(tables: Tables) -> float | None:
+        return tables["duration_s"] if tables["duration_s"] > 2.0 else None
+
+    small = shrunk(tomllib.loads(TOO_NEAR), parts)
+    assert small is not None
+    assert 2.0 < small["duration_s"] <= 4.0
 
 
 def test_the_batch_size_changes_no_result() -> None:

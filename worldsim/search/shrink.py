@@ -120,13 +120,18 @@ def tidy(tables: Tables) -> Tables:
 
 
 def _shorter(tables: Tables, violated_s: float | None) -> Iterator[Tables]:
-    """Yield tables that end soon after the violation, or after the time that is fair."""
+    """Yield tables that end soon after the violation, or after the time that is fair.
+
+    A violation at the very end may have shown earlier: two flights may part at any time.
+    """
     if violated_s is not None:
-        end_s = ceil(10.0 * (violated_s + AFTER_S)) / 10.0
-        if end_s < tables["duration_s"]:
-            found = copy.deepcopy(tables) | {"duration_s": end_s}
-            found["event"] = [each for each in found.get("event") or () if each["at_s"] < end_s]
-            yield _ending(found, end_s)
+        at_end = violated_s >= tables["duration_s"]
+        shares = (0.05, 0.1, 0.25, 0.5, 0.9) if at_end else ()
+        soon_s = [] if at_end else [violated_s + AFTER_S]
+        for after_s in (*soon_s, *(share * violated_s for share in shares)):
+            end_s = ceil(10.0 * after_s) / 10.0
+            if end_s < tables["duration_s"]:
+                yield from _ending(tables, end_s)
         return
     limit_s = (tables.get("expect") or {}).get("converge_within_s")
     if limit_s is None:
@@ -145,12 +150,23 @@ def quiet_from_s(tables: Tables) -> float:
     return float(ceil(max(ends, default=0.0)))
 
 
-def _ending(tables: Tables, end_s: float) -> Tables:
-    """Return tables without faults' ends that come after the run's."""
-    for event in tables["event"]:
+def _ending(tables: Tables, end_s: float) -> Iterator[Tables]:
+    """Yield tables that end at a time, without the time limits, which are not what is violated.
+
+    One that is longer than the flight would be objected to. Nor need it form anything, except for
+    the invariants of the allocation, which are judged only where it does.
+    """
+    found = copy.deepcopy(tables) | {"duration_s": end_s}
+    found["event"] = [each for each in found.get("event") or () if each["at_s"] < end_s]
+    for event in found["event"]:
         if event.get("for_s") and event["at_s"] + event["for_s"] > end_s:
             event["for_s"] = round(max(0.1, end_s - event["at_s"]), 1)
-    return tables
+    expect = found.get("expect") or {}
+    if any(key in expect for key in LIMITS):
+        untimed = {key: value for key, value in expect.items() if key not in LIMITS}
+        yield {**found, "expect": {**untimed, "converge": False}}
+        found["expect"] = untimed
+    yield found
 
 
 def _fewer_events(tables: Tables, _: float | None) -> Iterator[Tables]:
