@@ -6,6 +6,7 @@ odd ones so that margins fall (worldsim.search.guide).
 """
 
 from collections.abc import Iterator, Mapping
+from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import Any, Final, NamedTuple
@@ -23,7 +24,7 @@ from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
 from worldsim.search.drafts import loaded, objection
 from worldsim.search.guide import GENERATION, Guide
-from worldsim.search.margins import score, violated
+from worldsim.search.margins import CONSERVATION, LIVENESS, SAFETY, score, violated
 from worldsim.search.trials import Terms, Trial, trial
 
 WORD: Final = "fuzz"
@@ -167,9 +168,24 @@ def task_of(drawn: Drawn) -> Task:
     return Task(str(drawn.seed), drawn.scenario, probe, twice=drawn.seed % TWICE_EVERY == 0)
 
 
+def _in_order(scenario: Scenario, flown: Flown) -> list[str]:
+    """Return what was violated: the gravest kind first, of a kind what was violated first.
+
+    A finding is about the first of them: an invariant is violated before a time runs out.
+    """
+    kinds = (SAFETY, CONSERVATION, LIVENESS)
+
+    def order(name: str) -> tuple[int, float]:
+        kind = next(number for number, names in enumerate(kinds) if name in names)
+        at_s = violated_s(flown, scenario, name)
+        return kind, inf if at_s is None else at_s
+
+    return sorted(violated(flown.margins), key=order)
+
+
 def row_of(drawn: Drawn, flown: Flown) -> Row:
     """Return the line of a seed."""
-    scenario, bad = drawn.scenario, violated(flown.margins)
+    scenario, bad = drawn.scenario, _in_order(drawn.scenario, flown)
     return {
         "seed": drawn.seed,
         "how": drawn.how,
