@@ -1,68 +1,83 @@
-"""Ten bugs planted in the product, one at a time, and what ``qswarm fuzz`` makes of each.
+"""Ten bugs to plant in the product, one at a time, for ``qswarm fuzz`` to find.
 
-    QSWARM_PURE=1 python -m tests.planted_bugs --seeds 0:64 --out runs/planted
-    QSWARM_PURE=1 python -m tests.planted_bugs --only held_command --random
-
-For each bug it prints the seed that finds it, the runs up to there, and the size of the scenario as
-drawn and shrunk. The product has no switch for any of them: they replace parts of pure Python code
-in this process, and the flights that it forks inherit them.
+The product has no switch for any of them: they replace parts of pure Python code in this process
+(QSWARM_PURE=1), and the flights that it forks inherit them. Each notes when it first makes a
+difference: when the planted code does something else than the code that it replaces would have.
+``python -m tests.planted_figures`` measures what becomes of them.
 """
 
-import argparse
-import sys
+import json
+import os
 from collections.abc import Callable
 from math import atan2
 from pathlib import Path
-from random import Random
-from time import monotonic
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 import pytest
 
 from agent.comms.gossip import RecordTable
-from agent.guidance import movement
+from agent.guidance import q_structure
+from agent.guidance.cone import Cone
+from agent.guidance.movement import DEAD_BAND_MPS
 from agent.guidance.promise_filter import PromiseFilter
 from agent.guidance.safety_filter import Bound, RangingFilter
 from agent.heard_beacon import Version
+from agent.messages import Vector
 from agent.structure.queue_map import QueueMap
+from agent.vectors import across
 from netem import link
 from netem.faults import Partition
 from netem.medium import Medium
+from tests.small_scenario import SMALL
 from worldsim.campaign.flight_site import LocalSite
+from worldsim.engine.virtual import VirtualFleet
 from worldsim.fuzz.flights import WORK
-from worldsim.fuzz.folder import SearchFolder, findings_in, read_finding
 from worldsim.fuzz.fuzz import Search, fuzz
-from worldsim.results.exit_status import INTERRUPTED, PASS
-from worldsim.search.drafts import loaded
+from worldsim.scenario.file import as_toml
+from worldsim.search.drafts import cautions, loaded
 from worldsim.search.trials import Terms
 from worldsim.truth.world import World
 
 Plant = Callable[[pytest.MonkeyPatch], None]
 SHRINK_FLIGHTS = 60
-SMALL = """
-name = "small"
-duration_s = 60.0
-[fleet]
-agents = 5
-tick_hz = 10.0
-start = {{ kind = "box", centre_m = [0, 0, 0], size_m = [4, 4, 1], spacing_m = 0.7 }}
-[formation]
-name = "line"
-[formation.vertices]
-V1 = [0, 0, 0]
-[[formation.queue]]
-name = "Q1"
-vertices = ["V1"]
-shape = {{ kind = "ray", direction = [-1, 0, 0] }}
-[comms]
-local_hz = 10.0
-[vehicle]
-sensors = {sensors}
-"""
-"""A small team, whose flights are short, with the vehicle's sensors to fill in."""
+BESIDE = Path("planted.toml")
 BLIND = ("broken_promise",)
 """Bugs of code that runs without a ranging sensor only."""
+LONGEST_TURN_RAD = 1.0
+"""So far ahead of a heading a turn aims that goes the wrong way."""
+
+
+class Difference:
+    """Whether the planted code has made a difference yet, in this process."""
+
+    made = False
+
+    @classmethod
+    def note(cls, differs: bool = True) -> None:
+        """Note that it has, if it did."""
+        cls.made = cls.made or differs
+
+
+class DifferenceProbe:
+    """Notes in a flight when the planted code first makes a difference [s; simulated time]."""
+
+    FILE: Final = "difference.json"
+
+    def __init__(self) -> None:
+        self._at_s: float | None = None
+
+    def before_slot(self, fleet: VirtualFleet) -> None:
+        """Look at what the slot before did; what was noted before the flight does not count."""
+        world = fleet.loop.world
+        if world.slot == 0:
+            Difference.made = False
+        elif Difference.made and self._at_s is None:
+            self._at_s = (world.slot - 1) / world.clock.slot_hz
+
+    def write(self, folder: Path) -> None:
+        """Write the time, or null."""
+        (folder / self.FILE).write_text(json.dumps(self._at_s), encoding="utf-8")
 
 
 def filter_sign(patch: pytest.MonkeyPatch) -> None:
@@ -70,58 +85,86 @@ def filter_sign(patch: pytest.MonkeyPatch) -> None:
     right = RangingFilter.bounds
 
     def bounds(self: Any, points: Any) -> list[Bound]:
-        turned = [tuple(-each for each in bound.away) for bound in right(self, points)]
-        return [
-            bound._replace(away=away)
-            for bound, away in zip(right(self, points), turned, strict=True)
-        ]
+        found = right(self, points)
+        Difference.note(bool(found))
+        x, y, z = range(3)
+        return [each._replace(away=(-each.away[x], -each.away[y], -each.away[z])) for each in found]
 
     patch.setattr(RangingFilter, "bounds", bounds)
 
 
 def version_alone(patch: pytest.MonkeyPatch) -> None:
     """Merge by version alone: a process that was restarted counts from zero, and is not heard."""
+    right = Version.supersedes
 
     def supersedes(self: Any, other: Any) -> bool:
-        return bool(self.sequence > other.sequence)
+        newer = bool(self.sequence > other.sequence)
+        Difference.note(newer != right(self, other))
+        return newer
 
     patch.setattr(Version, "supersedes", supersedes)
 
 
 def unkeyed_draw(patch: pytest.MonkeyPatch) -> None:
     """An unkeyed draw: fates of frames come from a generator that nobody seeds."""
-    right, random = link.draw, Random()
+    right, right_group = link.draw, link.draw_group
 
     def draw(seed: bytes, *key: Any) -> Any:
-        return right(random.randbytes(32), *key)
-
-    patch.setattr(link, "draw", draw)
-    right_group = link.draw_group
+        Difference.note()
+        return right(os.urandom(32), *key)
 
     def draw_group(seed: bytes, *key: Any) -> bytes:
-        return right_group(random.randbytes(32), *key)
+        Difference.note()
+        return right_group(os.urandom(32), *key)
 
+    patch.setattr(link, "draw", draw)
     patch.setattr(link, "draw_group", draw_group)
 
 
 def forgotten_tombstone(patch: pytest.MonkeyPatch) -> None:
     """A forgotten tombstone: nobody is ever dropped from the table."""
-    patch.setattr(RecordTable, "forget_silent", lambda self, *_: [])
+    right = RecordTable.forget_silent
+
+    def forget_silent(self: Any, *given: Any) -> list[Any]:
+        newest, lag_s = dict(self._newest), dict(self._lag_s)
+        Difference.note(bool(right(self, *given)))
+        self._newest.update(newest)
+        self._lag_s.update(lag_s)
+        return []
+
+    patch.setattr(RecordTable, "forget_silent", forget_silent)
 
 
 def held_command(patch: pytest.MonkeyPatch) -> None:
     """A held command: a vehicle flies on when its command has expired."""
-    patch.setattr(World, "_hover_expired", lambda self: None)
+
+    def hover_expired(self: Any) -> None:
+        held = zip(self._expires, self._velocity, strict=True)
+        Difference.note(any(expires <= self.slot and any(v) for expires, v in held))
+
+    patch.setattr(World, "_hover_expired", hover_expired)
 
 
 def broken_promise(patch: pytest.MonkeyPatch) -> None:
     """A promise broken: without a sensor, a vehicle flies faster than it said it would."""
-    patch.setattr(PromiseFilter, "speed_limit", property(lambda self: self._max_speed))
+    right: Any = PromiseFilter.speed_limit
+
+    def speed_limit(self: Any) -> float:
+        Difference.note(right.fget(self) < self._max_speed)
+        return float(self._max_speed)
+
+    patch.setattr(PromiseFilter, "speed_limit", property(speed_limit))
 
 
 def stale_frame(patch: pytest.MonkeyPatch) -> None:
     """A stale frame: whatever comes last is the newest."""
-    patch.setattr(Version, "supersedes", lambda self, other: True)
+    right = Version.supersedes
+
+    def supersedes(self: Any, other: Any) -> bool:
+        Difference.note(not right(self, other))
+        return True
+
+    patch.setattr(Version, "supersedes", supersedes)
 
 
 def lasting_partition(patch: pytest.MonkeyPatch) -> None:
@@ -130,7 +173,9 @@ def lasting_partition(patch: pytest.MonkeyPatch) -> None:
 
     def apply(self: Any, order: Any) -> None:
         held = self._conditions.in_force.get(order.number)
-        if order.fault is not None or held is None or not isinstance(held.fault, Partition):
+        if order.fault is None and held is not None and isinstance(held.fault, Partition):
+            Difference.note()
+        else:
             right(self, order)
 
     patch.setattr(Medium, "apply", apply)
@@ -141,6 +186,7 @@ def rank_off_by_one(patch: pytest.MonkeyPatch) -> None:
     right = QueueMap.slot
 
     def slot(self: Any, queue: int, number: int, members: int) -> Any:
+        Difference.note(number == 4)
         return right(self, queue, number + (number == 4), members)
 
     patch.setattr(QueueMap, "slot", slot)
@@ -148,11 +194,18 @@ def rank_off_by_one(patch: pytest.MonkeyPatch) -> None:
 
 def turn_at_180(patch: pytest.MonkeyPatch) -> None:
     """A turn the wrong way at 180 degrees: the difference of two angles is not wrapped."""
+    right = q_structure.steer
 
-    def error(x: float, y: float, yaw: float) -> float:
-        return atan2(y, x) - yaw
+    def steer(wanted: Vector, yaw: float, cone: Cone) -> tuple[Vector, float]:
+        if across(wanted) <= DEAD_BAND_MPS:
+            return wanted, yaw
+        turn = atan2(wanted[1], wanted[0]) - yaw
+        heading = yaw + max(-LONGEST_TURN_RAD, min(LONGEST_TURN_RAD, turn))
+        flown = wanted if cone.holds(turn) else (0.0, 0.0, wanted[2])
+        Difference.note(flown != right(wanted, yaw, cone)[0])
+        return flown, heading
 
-    patch.setattr(movement, "azimuth_error", error)
+    patch.setattr(q_structure, "steer", steer)
 
 
 PLANTS: dict[str, Plant] = {
@@ -173,9 +226,17 @@ PLANTS: dict[str, Plant] = {
 
 
 def small_terms(name: str) -> Terms:
-    """Return what to search in a small team."""
-    text = SMALL.format(sensors=[] if name in BLIND else ["proximity"])
-    return Terms(base=msgspec.to_builtins(loaded(text, Path("planted.toml"))))
+    """Return what to search for a bug: faults in a team of five, whose flights are short."""
+    tables: Any = msgspec.toml.decode(SMALL)
+    box = {"kind": "box", "centre_m": [0, 0, 0], "size_m": [4, 4, 1], "spacing_m": 0.7}
+    tables |= {
+        "duration_s": 60.0,
+        "fleet": {"agents": 5, "tick_hz": 5.0, "start": box},
+        "comms": {"local_hz": 5.0},
+        "vehicle": {"sensors": [] if name in BLIND else ["proximity"]},
+    }
+    scenario = loaded(as_toml(tables), BESIDE)
+    return Terms(base=msgspec.to_builtins(scenario), allowed=cautions(scenario))
 
 
 def searched(
@@ -199,7 +260,7 @@ def searched(
         shrinks=1,
         corpus=None,
         described={"plant": plant.__name__, "guided": guided, "first seed": seeds.start},
-        beside=Path("planted.toml"),
+        beside=BESIDE,
         quiet=True,
         first_only=True,
         budget=budget,
@@ -207,55 +268,3 @@ def searched(
     with pytest.MonkeyPatch.context() as patch:
         plant(patch)
         return fuzz(search)
-
-
-def row(name: str, folder: Path, began_s: float) -> str:
-    """Return the line of one bug in the table."""
-    rows = SearchFolder(folder).rows()
-    order = sorted(rows.values(), key=lambda each: each["seed"])
-    bad = [each for each in order if each["violated"]]
-    if not bad:
-        return f"| {name} | not found in {len(order)} | - | - | - | {monotonic() - began_s:.0f} s |"
-    runs = order.index(bad[0]) + 1
-    found = [read_finding(each) for each in findings_in(folder / "findings")]
-    small = min((each for each in found if each["shrunk"]), key=lambda each: int(each["seed"]))
-    sizes = [
-        f"{size['faults']} faults, {size['agents']} agents, {size['duration_s']:g} s"
-        for size in (small["original_size"], small["size"])
-    ]
-    first = f"{bad[0]['seed']} ({bad[0]['how']}): {', '.join(bad[0]['violated'])}"
-    return f"| {name} | {first} | {runs} | {' | '.join(sizes)} | {monotonic() - began_s:.0f} s |"
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", default="0:64")
-    parser.add_argument("--out", type=Path, default=Path("runs/planted"))
-    parser.add_argument("--only", action="append", choices=sorted(PLANTS))
-    parser.add_argument("--random", action="store_true", help="draw all seeds at random")
-    parser.add_argument("--budget", type=int, default=SHRINK_FLIGHTS, help="flights that shrink")
-    parser.add_argument("--small", action="store_true", help="vary one small team, not all teams")
-    given = parser.parse_args()
-    first, last = map(int, given.seeds.split(":"))
-    missed = 0
-    print("| bug | found by seed | runs | as drawn | shrunk | time |\n|---|---|---|---|---|---|")
-    for name in given.only or PLANTS:
-        folder = given.out / f"{name}-{'random' if given.random else 'half'}-{first}"
-        terms = small_terms(name) if given.small else Terms()
-        began_s, out = monotonic(), sys.stdout
-        sys.stdout = (given.out.parent / "planted.log").open("a", encoding="utf-8")
-        try:
-            seeds, guided = range(first, last), not given.random
-            status = searched(PLANTS[name], terms, seeds, folder, guided, given.budget)
-        finally:
-            sys.stdout.close()
-            sys.stdout = out
-        if status == INTERRUPTED:
-            return status
-        missed += status == PASS
-        print(row(name, folder, began_s), flush=True)
-    return 1 if missed else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
