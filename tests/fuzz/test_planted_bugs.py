@@ -1,0 +1,65 @@
+"""A planted bug makes a difference when its trigger comes, and the difference is noted."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from netem.wire.shutdown import StopRequest
+from tests.planted_bugs import BESIDE, PLANTS, DifferenceProbe
+from tests.small_scenario import SMALL
+from worldsim.campaign.flight_site import LocalSite, Order
+from worldsim.fuzz.flights import Hangar, Task
+from worldsim.scenario.tables import Scenario
+from worldsim.search.drafts import loaded
+
+FAR = SMALL.replace("[-1.3, 0, 0]", "[-4.0, 0, 0]")
+"""The second agent flies for seconds."""
+
+
+def flying(event: str) -> Scenario:
+    return loaded(f"event = [{event}]\n{FAR}", BESIDE)
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Iterator[LocalSite]:
+    yield LocalSite(1, tmp_path / "work")
+
+
+@pytest.mark.pure
+@pytest.mark.parametrize(
+    ("name", "event", "earliest_s", "latest_s"),
+    [
+        ("held_command", "{ at_s = 2.0, kill = [1] }", 2.0, 2.3),
+        ("lasting_partition", "{ at_s = 2.0, partition = [[0], [1]], for_s = 1.0 }", 3.0, 3.05),
+        ("forgotten_tombstone", "{ at_s = 2.0, kill = [1] }", 2.1, 4.0),
+        ("version_alone", "{ at_s = 2.0, kill = [1], for_s = 1.0 }", 3.0, 4.5),
+    ],
+)
+def test_a_difference_is_noted_when_the_trigger_comes(
+    name: str,
+    event: str,
+    earliest_s: float,
+    latest_s: float,
+    site: LocalSite,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    PLANTS[name](monkeypatch)
+    order = Order(name, flying(event), DifferenceProbe(), (DifferenceProbe.FILE,))
+    (shown,) = site.fly([order], StopRequest())
+    at_s = json.loads(shown.files[DifferenceProbe.FILE])
+    assert at_s is not None
+    assert earliest_s <= at_s <= latest_s
+
+
+@pytest.mark.pure
+def test_an_unkeyed_draw_shows_in_a_second_flight(
+    site: LocalSite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lossy = f"{FAR}\n[netem]\nloss_percent = 30.0\n"
+    task = Task("it", loaded(lossy, BESIDE), twice=True)
+    (kept,) = Hangar(site, StopRequest()).fly([task])
+    PLANTS["unkeyed_draw"](monkeypatch)
+    (other,) = Hangar(site, StopRequest()).fly([task])
+    assert (kept.margins["repeat"], other.margins["repeat"]) == (1.0, -1.0)
