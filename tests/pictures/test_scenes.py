@@ -70,7 +70,7 @@ def test_nothing_is_drawn_away_from_the_team(moments: Moments) -> None:
         # At the start of a large fleet, the last slots of long queues are far away.
         reach_m = max(radius_m, np.nanmax(np.linalg.norm(tick.target - centre, axis=1), initial=0))
         drawn = [each for each in scene.entities() if not each.startswith(ELSEWHERE)]
-        assert {layout.VEHICLES, layout.AGENTS, layout.HEADINGS, layout.LINKS} <= set(drawn)
+        assert {layout.VEHICLES, layout.AGENTS, layout.LINKS} <= set(drawn)
         for entity in drawn:
             away = np.linalg.norm(scene.points(entity) - centre, axis=1).max()
             assert away <= 1.6 * reach_m, (entity, tick.time_s)

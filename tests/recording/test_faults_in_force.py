@@ -15,7 +15,7 @@ from worldsim.judge.radio_events import Healed, Jammed, Partitioned
 from worldsim.judge.run_events import Killed, Paused, PoseChanged, Resumed, RunEvent
 from worldsim.judge.tick import Tick
 from worldsim.recording import layout, palette
-from worldsim.recording.link_columns import missing_links
+from worldsim.recording.link_columns import hears_of, missing_links
 from worldsim.recording.recorder import RunRecorder
 from worldsim.recording.situation import Situations
 
@@ -130,7 +130,7 @@ def missing(links: list[tuple[int, int]], *events: RunEvent) -> dict[str, set[tu
     situations = Situations(AGENTS, SCENARIO.netem)
     for event in events:
         situations.handle_event(event)
-    found = missing_links(tick, situations.at(replace(tick, time_s=9.0)))
+    found = missing_links(tick, situations.at(replace(tick, time_s=9.0)), hears_of([tick])[0])
     return {
         entity: {(one, other) for one, other in pairs.tolist()} for entity, pairs in found.items()
     }

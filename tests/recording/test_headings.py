@@ -57,7 +57,7 @@ def test_the_turn_panel_has_every_limit(chunks: list[Chunk]) -> None:
 
 def test_arrows_point_where_vehicles_do(chunks: list[Chunk]) -> None:
     flown = list(straight_flight(differing()))
-    rows = [each.to_record_batch() for each in chunks if each.entity_path == layout.HEADINGS]
+    rows = [each.to_record_batch() for each in chunks if each.entity_path == layout.VEHICLES]
     moving = [row for row in rows if "Arrows3D:vectors" in row.schema.names]
     vectors, origins = (
         np.array([each for row in moving for each in row.column(component).to_pylist()])

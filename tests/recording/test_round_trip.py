@@ -7,8 +7,10 @@ from tempfile import TemporaryDirectory
 import msgspec
 import numpy as np
 import pytest
+import rerun as rr
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rerun.chunk import Chunk, RrdReader
 
 from netem.link_parameters import Conditions
 from tests.recording.flights import record, straight_flight, verdict_parts, wedge
@@ -17,6 +19,7 @@ from worldsim.judge.run_events import Killed, SlotChanged
 from worldsim.judge.tick import Tick
 from worldsim.judge.verdict import Judge
 from worldsim.recording import layout
+from worldsim.recording.components import number_column
 from worldsim.recording.readback import read_run
 from worldsim.recording.recorder import RunRecorder
 from worldsim.recording.verify import verify
@@ -89,6 +92,46 @@ def _assert_equal(before: Tick, after: Tick) -> None:
     real = before.links[before.links[:, 1] < AGENTS]
     np.testing.assert_array_equal(after.links, np.unique(real, axis=0).reshape(-1, 2))
     assert after.packets == before.packets
+
+
+def test_an_older_recording_is_read(tmp_path: Path) -> None:
+    scenario, new, old = wedge(4, duration_s=1.0), tmp_path / "new.rrd", tmp_path / "old.rrd"
+    flown = list(straight_flight(scenario))
+    record(RunRecorder(new, scenario, "new", mode="virtual"), scenario, flown)
+    stream = rr.RecordingStream("qswarm")
+    stream.set_sinks(rr.FileSink(old))
+    for chunk in RrdReader(new).stream():
+        rr.send_chunks(_as_formerly(chunk, list(flown[0].packets)), recording=stream)
+    stream.disconnect()
+    for before, after in zip(flown, read_run(old).ticks, strict=True):
+        _assert_equal(before, after)
+
+
+def _as_formerly(chunk: Chunk, counters: list[str]) -> list[Chunk]:
+    """Return a chunk as it was: missions, links and each counter had entities of their own."""
+    if chunk.is_static or chunk.entity_path not in {layout.PACKETS, layout.AGENT_STATE}:
+        return [] if chunk.entity_path == layout.PACKETS else [chunk]
+    batch, found = chunk.to_record_batch(), []
+    ticks = np.array(batch.column(layout.TICK).to_pylist())
+    if chunk.entity_path == layout.PACKETS:
+        counts = np.array(batch.column(layout.SCALARS).to_pylist())
+        times = [rr.TimeColumn(layout.TICK, sequence=ticks)]
+        return [
+            Chunk.from_columns(f"{layout.PACKETS}/{name}", times, rr.Scalars.columns(scalars=each))
+            for name, each in zip(counters, counts.T, strict=True)
+        ]
+    for part, entity in (
+        (layout.HEARS, layout.LINK_STATE),
+        (layout.MISSION, layout.MISSION_STATE),
+    ):
+        if part in batch.schema.names:
+            rows = batch.column(part)
+            there = np.flatnonzero(rows.is_valid().to_numpy(zero_copy_only=False))
+            column = number_column(part, np.stack([rows[row].values.to_numpy() for row in there]))
+            times = [rr.TimeColumn(layout.TICK, sequence=ticks[there])]
+            found.append(Chunk.from_columns(entity, times, [column]))
+            batch = batch.drop_columns([part])
+    return [*Chunk.from_record_batch(batch), *found]
 
 
 def test_scenario_and_events_are_read_back(tmp_path: Path) -> None:

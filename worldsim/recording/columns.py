@@ -53,6 +53,8 @@ def merged(blocks: Iterable[ColumnBlock]) -> list[ColumnBlock]:
 
 def _as_one(blocks: Sequence[ColumnBlock]) -> ColumnBlock:
     """Return blocks of one entity, of different components, as one."""
+    if len(blocks) == 1:
+        return blocks[0]
     rows = sorted({row for block in blocks for row in block.rows})
     columns: list[rr.ComponentColumn] = []
     for block in blocks:

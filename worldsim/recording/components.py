@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
-from pyarrow.lib import Array, FixedSizeListArray, FixedSizeListType, ListArray, py_buffer
+from pyarrow.lib import Array, FixedSizeListArray, FixedSizeListType, ListArray, py_buffer, string
 from pyarrow.lib import array as arrow_array
 
 Offsets = NDArray[np.int32]
@@ -99,6 +99,13 @@ def number_column(component: str, rows: NDArray[Any]) -> rr.ComponentColumn:
     offsets = np.arange(len(rows) + 1, dtype=np.int32) * np.int32(rows[0].size)
     numbers = ListArray.from_arrays(arrow_array(offsets), arrow_array(rows.ravel()))
     return ArrowColumn(rr.ComponentDescriptor(component), numbers)
+
+
+def text_column(component: str, texts: Sequence[str]) -> rr.ComponentColumn:
+    """Return a component of qswarm's own as a column: a text in each row."""
+    offsets = np.arange(len(texts) + 1, dtype=np.int32)
+    rows = ListArray.from_arrays(arrow_array(offsets), arrow_array(texts, type=string()))
+    return ArrowColumn(rr.ComponentDescriptor(component), rows)
 
 
 def spread(column: rr.ComponentColumn, at: NDArray[np.intp], rows: int) -> rr.ComponentColumn:

@@ -67,13 +67,19 @@ class HierarchyColumns:
         self._notes: dict[str, int] = {}
         """The number of each note, in the order in which they came."""
         self._label_changes = ChangeDetector()
+        self._small = agents <= layout.NAMED_MAX
+        self._sampled: NDArray[np.int16] | None = None
+        """What labels of a large fleet are made of, at the first tick of the next figures."""
         self._role_changes = ChangeDetector()
 
     def blocks(
         self, ticks: Sequence[Tick], situations: Sequence[Situation]
     ) -> Iterator[ColumnBlock]:
         """Yield the columns of a block; blocks come in order."""
-        yield from self._vehicle_labels(ticks, situations)
+        if self._small:
+            yield from self._changed_labels(self._label_keys(ticks, situations))
+        elif self._sampled is None:
+            self._sampled = self._label_keys(ticks[:1], situations[:1])
         hierarchies = [tick.hierarchy for tick in ticks if tick.hierarchy is not None]
         if len(hierarchies) == len(ticks):
             yield from self._parent_lines(ticks, hierarchies)
@@ -81,22 +87,20 @@ class HierarchyColumns:
     def figures(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
         """Yield agents' and queues' figures at the sampled ones of some ticks, and roles."""
         yield from self._queue_residuals(ticks, figures)
+        if self._sampled is not None:
+            yield from self._changed_labels(self._sampled)
+            self._sampled = None
         yield from self._agent_figures(ticks)
         hierarchies = [tick.hierarchy for tick in ticks if tick.hierarchy is not None]
         if len(hierarchies) == len(ticks):
             yield from self._roles(hierarchies)
 
-    def _vehicle_labels(
-        self, ticks: Sequence[Tick], situations: Sequence[Situation]
-    ) -> Iterator[ColumnBlock]:
+    def _changed_labels(self, keys: NDArray[np.int16]) -> Iterator[ColumnBlock]:
         """Yield the vehicles' labels: name, the role where it is not member, and what is in force.
 
-        Large fleets show a label only under the mouse pointer, so one row for each block is enough.
+        Large fleets show a label only under the mouse pointer: there they come with the figures.
         """
-        keys = self._label_keys(ticks, situations)
         rows = self._label_changes.changed_rows(keys)
-        if len(self._names) > layout.NAMED_MAX:
-            rows = rows[-1:]
         if rows:
             labels = [label for row in rows for label in self._labels(keys[row])]
             columns = [BOX_LABELS.rows(labels, len(self._names))]

@@ -14,7 +14,6 @@ TICK = "tick"
 WORLD = "/world"
 AGENTS = f"{WORLD}/agents"
 VEHICLES = f"{WORLD}/vehicles"
-HEADINGS = f"{WORLD}/headings"
 TARGETS = f"{WORLD}/targets"
 CAST_ZONES = f"{WORLD}/guidance/cast_zones"
 BOBBERS = f"{WORLD}/guidance/bobbers"
@@ -81,9 +80,11 @@ RUN_PROPERTIES = "/__properties/run"
 AGENT_STATE = "/state/agents"
 MISSION_STATE = "/state/missions"
 LINK_STATE = "/state/links"
+"""Entities of a part of the state in older recordings; now all of it has one."""
 
 POSITIONS = "Points3D:positions"
 SCALARS = "Scalars:scalars"
+SERIES_NAMES = "SeriesLines:names"
 """Components of rerun's own archetypes that a reader needs."""
 POSITION = "position"
 PLACE = "place"
@@ -148,12 +149,7 @@ def signal_name(entity: str) -> str | None:
     return entity.removeprefix(prefix) if entity.startswith(prefix) else None
 
 
-def packet_entity(counter: str) -> str:
-    """Return the entity that holds one of the medium's packet counters."""
-    return f"{PACKETS}/{counter}"
-
-
 def packet_counter(entity: str) -> str | None:
-    """Return the name of the packet counter that an entity holds; None for other entities."""
+    """Return the packet counter that an entity of an older recording holds; None for others."""
     prefix = f"{PACKETS}/"
     return entity.removeprefix(prefix) if entity.startswith(prefix) else None

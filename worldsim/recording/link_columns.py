@@ -24,13 +24,14 @@ MISSING_EVERY_S = (0.2, 5.0)
 """Missing links are looked for at least so often, also in a large fleet, where they are many."""
 MOVED_EVERY_S = 1.0
 """Between two looks, their lines move with the vehicles at least so often."""
+FAR_EVERY_S = 1.0
+"""Links out of range are many, and hidden until asked for: they are drawn less often."""
 
+NO_LINES: Floats = np.zeros((0, 2, 3))
 Missing = dict[str, NDArray[np.intp]]
 """Pairs of agents (K, 2) by entity."""
 Matrices = NDArray[np.bool_]
-"""For each tick, who hears whom (T, N * N)."""
-Pairs = tuple[NDArray[np.intp], NDArray[np.intp]]
-"""The lower and the higher agent of each pair."""
+"""For each tick, who hears whom (T, N, N)."""
 
 
 class LinkColumns:
@@ -42,25 +43,42 @@ class LinkColumns:
         """The missing links that are shown."""
         self._tick_hz = tick_hz
         self._sought_in: Situation | None = None
-        self._sought_at = self._moved_at = 0
+        self._sought_at = self._moved_at = self._far_at = 0
         """The ticks at which missing links were last looked for, and last drawn."""
         self._line_rate = LineRateLimiter(tick_hz, LINES_PER_S)
+        self._far: dict[int, Floats] = {}
+        self._far_before = 0
+        """The lines out of range by tick, and how many there were at the last one."""
+        self._counted: dict[int, list[int]] = {}
+        """Numbers of pairs by tick, which are yet to be sent."""
 
     def blocks(
         self, ticks: Sequence[Tick], situations: Sequence[Situation]
     ) -> Iterator[ColumnBlock]:
         """Yield the columns of a block; blocks come in order."""
-        hears = _hears(ticks)
+        hears = hears_of(ticks)
         yield from self._matrix(hears)
         heard = yield from self._lines(ticks, hears)
-        yield from self._verdicts(ticks, situations, heard)
+        yield from self._verdicts(ticks, situations, heard, hears)
+
+    def detail(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
+        """Yield how many links there are, and those out of range, of some ticks that were sent."""
+        row_of = {tick.index: row for row, tick in enumerate(ticks)}
+        if self._counted:
+            rows = [row_of[index] for index in self._counted]
+            counts = np.array(list(self._counted.values()))
+            yield ColumnBlock(layout.LINK_COUNTS, rows, [SCALARS.rows(counts)])
+        if self._far:
+            rows = [row_of[index] for index in self._far]
+            yield _strips(layout.LINKS_OUT_OF_RANGE, rows, list(self._far.values()))
+        self._counted, self._far = {}, {}
 
     def _matrix(self, hears: Matrices) -> Iterator[ColumnBlock]:
         # As bits: 5 kB for 200 agents, where pairs of numbers take 20.
-        bits = np.packbits(hears, axis=1)
+        bits = np.packbits(hears.reshape(len(hears), -1), axis=1)
         rows = self._matrix_changes.changed_rows(bits)
         if rows:
-            yield ColumnBlock(layout.LINK_STATE, rows, [number_column(layout.HEARS, bits[rows])])
+            yield ColumnBlock(layout.AGENT_STATE, rows, [number_column(layout.HEARS, bits[rows])])
 
     def _lines(
         self, ticks: Sequence[Tick], hears: Matrices
@@ -69,15 +87,12 @@ class LinkColumns:
 
         Of more than LINES_MAX, the shortest are drawn.
         """
-        agents = len(ticks[0].alive)
-        one, other = _pairs(agents)
-        there, back = one * agents + other, other * agents + one
         drawn: dict[int, Floats] = {}
         heard_pairs: dict[int, int] = {}
         for row, (tick, heard) in enumerate(zip(ticks, hears, strict=True)):
             if self._line_rate.allows(tick.index):
-                linked = np.flatnonzero(heard[there] | heard[back])
-                drawn[row] = _lines(tick, np.stack((one[linked], other[linked]), axis=1))
+                linked = _pairs(heard | heard.T)
+                drawn[row] = _lines(tick, linked)
                 heard_pairs[row] = len(linked)
                 self._line_rate.count(tick.index, len(drawn[row]))
         if drawn:
@@ -89,6 +104,7 @@ class LinkColumns:
         ticks: Sequence[Tick],
         situations: Sequence[Situation],
         heard: Mapping[int, int],
+        hears: Matrices,
     ) -> Iterator[ColumnBlock]:
         """Yield the pairs that do not hear each other, by the reason, where there are any.
 
@@ -96,17 +112,28 @@ class LinkColumns:
         move with the vehicles. heard: how many pairs hear each other, in which rows.
         """
         shown: dict[int, Missing] = {}
-        sought: dict[int, Missing] = {}
         before = self._missing
-        for row in heard:
-            if self._is_due(ticks[row], situations[row]):
-                sought[row] = self._missing = missing_links(ticks[row], situations[row])
-            if row in sought or self._has_moved(ticks[row]):
+        for row, linked in heard.items():
+            tick, situation = ticks[row], situations[row]
+            is_new, is_due = situation is not self._sought_in, self._is_due(tick, situation)
+            if is_due:
+                missing = self._missing = missing_links(tick, situation, hears[row])
+                self._counted[tick.index] = [linked, *map(len, missing.values())]
+            if is_due or self._has_moved(tick):
                 shown[row] = self._missing
-                self._moved_at = ticks[row].index
-        yield from self._counts([heard[row] for row in sought], sought)
-        for entity in (layout.LINKS_LOST, layout.LINKS_CUT, layout.LINKS_OUT_OF_RANGE):
+                self._moved_at = tick.index
+            if is_new or tick.index >= self._far_at + round(self._tick_hz * FAR_EVERY_S):
+                self._note_far(tick)
+        for entity in (layout.LINKS_LOST, layout.LINKS_CUT):
             yield from _moving_lines(entity, ticks, shown, len(before.get(entity, ())))
+
+    def _note_far(self, tick: Tick) -> None:
+        """Note the lines of links out of range at a tick, and none once, where they end."""
+        self._far_at = tick.index
+        lines = _lines(tick, self._missing[layout.LINKS_OUT_OF_RANGE])
+        if len(lines) or self._far_before:
+            self._far[tick.index] = lines
+        self._far_before = len(lines)
 
     def _has_moved(self, tick: Tick) -> bool:
         return tick.index >= self._moved_at + round(self._tick_hz * MOVED_EVERY_S)
@@ -120,36 +147,24 @@ class LinkColumns:
         self._sought_in, self._sought_at = situation, tick.index
         return True
 
-    def _counts(
-        self, heard: Sequence[int], missing: Mapping[int, Missing]
-    ) -> Iterator[ColumnBlock]:
-        """Yield how many pairs have a link, and how many are missing, by the reason."""
-        if missing:
-            counts = [
-                [linked, *(len(pairs) for pairs in each.values())]
-                for linked, each in zip(heard, missing.values(), strict=True)
-            ]
-            yield ColumnBlock(layout.LINK_COUNTS, list(missing), [SCALARS.rows(np.array(counts))])
 
-
-def missing_links(tick: Tick, situation: Situation) -> Missing:
+def missing_links(tick: Tick, situation: Situation, hears: NDArray[np.bool_]) -> Missing:
     """Return the pairs of agents (K, 2) that do not hear each other.
 
     By entity. A pair of running agents is cut where a fault cuts a direction in which it is not
     heard, else lost where such a direction is within its range, else out of range. Of large fleets,
-    none is out of range.
+    none is out of range. hears: who hears whom (N, N).
     """
     agents = len(tick.alive)
-    one, other = _pairs(agents)
-    hears, cut = _hears([tick])[0], situation.radio.cut(tick)
-    apart = tick.alive[one] & tick.alive[other]
-    apart &= ~(hears[one * agents + other] & hears[other * agents + one])
-    one, other = one[apart], other[apart]
-    pairs = np.stack((one, other), axis=1)
-    away = np.linalg.norm(tick.position[other] - tick.position[one], axis=1)
+    apart = ~(hears & hears.T) & tick.alive & tick.alive[:, None]
+    pairs = _pairs(apart)
+    one, other = pairs.T
+    along = tick.position[other] - tick.position[one]
+    away = np.sqrt(np.einsum("ij,ij->i", along, along))
+    cut = situation.radio.cut(tick)
     near, cuts = np.zeros((2, len(one)), dtype=np.bool_)
     for source, hearer in ((one, other), (other, one)):
-        unheard = ~hears[hearer * agents + source]
+        unheard = ~hears[hearer, source]
         unheard &= situation.radio.in_range(away, source, hearer)
         near |= unheard
         cuts |= unheard & cut[source, hearer]
@@ -189,6 +204,8 @@ def _lines(tick: Tick, pairs: NDArray[np.intp]) -> Floats:
 
     Of more than LINES_MAX, the shortest.
     """
+    if not len(pairs):
+        return NO_LINES
     ends = tick.position[pairs]
     along = ends[:, 1] - ends[:, 0]
     square = np.einsum("ij,ij->i", along, along)
@@ -200,21 +217,30 @@ def _lines(tick: Tick, pairs: NDArray[np.intp]) -> Floats:
 
 
 @cache
-def _pairs(agents: int) -> Pairs:
-    """Return all pairs of agents."""
-    return np.triu_indices(agents, 1)
+def _above(agents: int) -> NDArray[np.bool_]:
+    """Return which of a matrix (N, N) has a pair of agents, the lower one first."""
+    return np.triu(np.ones((agents, agents), dtype=np.bool_), 1)
 
 
-def _hears(ticks: Sequence[Tick]) -> Matrices:
-    """Return who hears whom (T, N * N), from hearer to heard, row by row.
+def _pairs(chosen: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the pairs (K, 2) of agents, the lower one first, of a symmetric matrix (N, N)."""
+    agents = len(chosen)
+    at = np.flatnonzero(chosen & _above(agents))
+    return np.stack(np.divmod(at, agents), axis=1)
+
+
+def hears_of(ticks: Sequence[Tick]) -> Matrices:
+    """Return who hears whom (T, N, N), from hearer to heard.
 
     Telemetry may name agents that do not exist; their links are left out.
     """
     agents = len(ticks[0].alive)
-    hears = np.zeros((len(ticks), agents * agents), dtype=np.bool_)
+    hears = np.zeros((len(ticks), agents, agents), dtype=np.bool_)
     links = np.concatenate([tick.links for tick in ticks])
     row = np.repeat(np.arange(len(ticks)), [len(tick.links) for tick in ticks])
     hearer, heard = links.T.astype(np.int64)
     exist = (hearer >= 0) & (hearer < agents) & (heard >= 0) & (heard < agents)
-    hears[row[exist], hearer[exist] * agents + heard[exist]] = True
+    if not exist.all():
+        row, hearer, heard = row[exist], hearer[exist], heard[exist]
+    hears[row, hearer, heard] = True
     return hears

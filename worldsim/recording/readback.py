@@ -118,6 +118,7 @@ class _RecordedColumns:
         self.events: list[RunEvent] = []
         self.scenario_text: str | None = None
         self.mode: str | None = None
+        self._counter_names: list[str] = []
         for chunk in chunks:
             self._read(chunk)
 
@@ -126,9 +127,19 @@ class _RecordedColumns:
         return self._columns.get((entity, component), {})
 
     def packet_counters(self) -> dict[str, Column]:
-        """Return the columns of the medium's counters, by name."""
+        """Return the columns of the medium's counters, by name.
+
+        An older recording has an entity for each.
+        """
         named = {layout.packet_counter(entity): each for (entity, _), each in self._columns.items()}
-        return {name: column for name, column in named.items() if name is not None}
+        found = {name: column for name, column in named.items() if name is not None}
+        together = self.column(layout.PACKETS, layout.SCALARS)
+        for at, name in enumerate(self._counter_names):
+            counts = {tick: row[at : at + 1] for tick, row in together.items()}
+            found[name] = {
+                tick: count for tick, count in counts.items() if np.isfinite(count).any()
+            }
+        return found
 
     def signals(self) -> dict[str, Column]:
         """Return the columns of the controllers' signals, by name."""
@@ -142,12 +153,18 @@ class _RecordedColumns:
         elif chunk.entity_path == layout.RUN_PROPERTIES:
             self.mode = batch.column(layout.MODE)[0].as_py()[0]
         elif chunk.is_static:
-            return
+            self._read_names(chunk.entity_path, batch)
         elif chunk.entity_path == layout.EVENTS:
             encoded = batch.column(layout.EVENT).to_pylist()
             self.events.extend(event_of(json.loads(row[0])) for row in encoded)
         else:
             self._read_rows(chunk.entity_path, batch)
+
+    def _read_names(self, entity: str, batch: Any) -> None:
+        """Take the counters' names: each time that a new one comes, all are told."""
+        if entity == layout.PACKETS and layout.SERIES_NAMES in batch.schema.names:
+            names = batch.column(layout.SERIES_NAMES)[0].as_py()
+            self._counter_names = max(self._counter_names, names, key=len)
 
     def _read_rows(self, entity: str, batch: Any) -> None:
         if layout.TICK not in batch.schema.names:
@@ -156,7 +173,11 @@ class _RecordedColumns:
         for component in batch.schema.names:
             if component in COMPONENTS:
                 column = self._columns.setdefault((entity, component), {})
-                column.update(zip(ticks, _flat_rows(batch.column(component)), strict=True))
+                rows = batch.column(component)
+                # A row that is null keeps the one before.
+                there = rows.is_valid().to_pylist()
+                told = zip(ticks, _flat_rows(rows), there, strict=True)
+                column.update({tick: row for tick, row, valid in told if valid})
 
 
 def _flat_rows(lists: Any) -> list[NDArray[Any]]:
@@ -196,8 +217,8 @@ def _ticks(columns: _RecordedColumns, scenario: Scenario, positions: tuple[str, 
     always = [columns.column(*name) for name in (positions, *EVERY_TICK[1:])]
     position, target, force, turn, place, alive, attitude = always
     complete = sorted(set(position).intersection(*always))
-    hears = _latest(columns.column(layout.LINK_STATE, layout.HEARS), complete, _no_links(agents))
-    missions = columns.column(layout.MISSION_STATE, layout.MISSION)
+    hears = _latest(_state(columns, layout.LINK_STATE, layout.HEARS), complete, _no_links(agents))
+    missions = _state(columns, layout.MISSION_STATE, layout.MISSION)
     mission = _latest(missions, complete, np.zeros(agents))
     packets = _packets(columns.packet_counters(), complete)
     signals = columns.signals()
@@ -219,6 +240,11 @@ def _ticks(columns: _RecordedColumns, scenario: Scenario, positions: tuple[str, 
         )
         for row, index in enumerate(complete)
     ]
+
+
+def _state(columns: _RecordedColumns, formerly: str, component: str) -> Column:
+    """Return a component of the agents' state; formerly: its entity in older recordings."""
+    return columns.column(layout.AGENT_STATE, component) or columns.column(formerly, component)
 
 
 def _latest(column: Column, ticks: Sequence[int], first: NDArray[Any]) -> list[NDArray[Any]]:

@@ -36,7 +36,7 @@ from worldsim.recording.agent_colours import AgentColours
 from worldsim.recording.belief_columns import BeliefColumns
 from worldsim.recording.blueprint import blueprint_of
 from worldsim.recording.columns import ColumnBlock, Entity, merged
-from worldsim.recording.components import LOG_LEVELS, LOG_TEXTS
+from worldsim.recording.components import LOG_LEVELS, LOG_TEXTS, text_column
 from worldsim.recording.controller_columns import ControllerColumns
 from worldsim.recording.fault_columns import FaultColumns
 from worldsim.recording.formation_entities import FormationEntities
@@ -271,7 +271,7 @@ class RunRecorder:
             self._seen = []
 
     def _detail(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
-        yield from self._tick_columns.steady(len(ticks) - 1)
+        yield from self._tick_columns.detail(ticks)
         yield from self._hierarchy_columns.figures(ticks, figures)
         yield from self._state_columns.connectivity(ticks)
         if self._guidance is not None:
@@ -339,7 +339,7 @@ class RunRecorder:
         columns = [
             LOG_TEXTS.rows(texts),
             LOG_LEVELS.rows(levels),
-            *rr.AnyValues.columns(event=[json.dumps(as_row(event)) for event in self._events]),
+            text_column(layout.EVENT, [json.dumps(as_row(event)) for event in self._events]),
         ]
         at = _time_columns(times_s, [self._tick_at(time_s) for time_s in times_s])
         rr.send_columns(layout.EVENTS, at, columns, recording=self._stream)
@@ -402,5 +402,5 @@ def _time_columns(times_s: list[float], ticks: list[int]) -> list[rr.TimeColumn]
     since_start = np.rint(np.array(times_s) * 1e9).astype("timedelta64[ns]")
     return [
         rr.TimeColumn(layout.SIM_TIME, duration=since_start),
-        rr.TimeColumn(layout.TICK, sequence=ticks),
+        rr.TimeColumn(layout.TICK, sequence=np.array(ticks, dtype=np.int64)),
     ]

@@ -31,6 +31,8 @@ class StateColumns:
         self._small = agents <= layout.NAMED_MAX
         self._ticks_per_sample = max(1, round(tick_hz / LAMBDA2_HZ))
         self._shown: dict[str, str] = {}
+        self._noted = False
+        """Whether anything has been wrong with an agent."""
         self._links = b""
         self._lambda2: float | None = None
 
@@ -48,8 +50,11 @@ class StateColumns:
         pairs = zip(ticks, figures, strict=True)
         phases = [self._phase(tick, each) for tick, each in pairs]
         yield from self._states(layout.TEAM_PHASE, phases)
-        yield from self._states(layout.RADIO_CONDITION, [_radio(each) for each in situations])
-        for agent in range(self._named):
+        radio = {id(each): _radio(each) for each in situations}
+        yield from self._states(layout.RADIO_CONDITION, [radio[id(each)] for each in situations])
+        noted = any(any(each.notes) for each in {id(each): each for each in situations}.values())
+        self._noted = self._noted or noted
+        for agent in range(self._named if self._noted else 0):
             yield from self._conditions(agent, situations)
 
     def _phase(self, tick: Tick, figures: Figures) -> str:

@@ -94,7 +94,7 @@ def _world_styles(scenario: Scenario) -> Iterator[Entity]:
     )
     yield Entity(layout.VEHICLES, boxes)
     heading = rr.Arrows3D.from_fields(colors=np.array([palette.HEADING]), radii=[HEADING_RADIUS_M])
-    yield Entity(layout.HEADINGS, heading)
+    yield Entity(layout.VEHICLES, heading)
     yield from _guidance_styles()
     yield from _fault_styles()
 

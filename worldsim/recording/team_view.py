@@ -8,7 +8,7 @@ that rests in the world: it moves by whole cells, to stay below the team.
 """
 
 from collections.abc import Iterator, Sequence
-from math import ceil, exp, log10
+from math import ceil, exp, floor, log10
 
 import numpy as np
 import rerun as rr
@@ -47,7 +47,7 @@ class TeamView:
         self._centre: NDArray[np.float64] | None = None
         self._radius_m = LEAST_RADIUS_M
         self._cell_m = 0.0
-        self._corner: NDArray[np.int64] | None = None
+        self._corner: tuple[int, int, int] | None = None
         """Of the ground's middle, in cells; None before the first tick."""
 
     def blocks(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
@@ -59,7 +59,9 @@ class TeamView:
         columns = [TRANSLATIONS.rows(centres[:, None]), SCALES.rows(scales)]
         yield ColumnBlock(layout.TEAM, range(len(ticks)), columns)
         rows, places = [], []
-        for row, (centre, radius_m) in enumerate(zip(centres, radii_m.tolist(), strict=True)):
+        for row, (centre, radius_m) in enumerate(
+            zip(centres.tolist(), radii_m.tolist(), strict=True)
+        ):
             cell_m = self._cell_m
             place = self._ground(centre, radius_m)
             if place is not None:
@@ -72,13 +74,12 @@ class TeamView:
 
     def _centres(self, team: Floats) -> Floats:
         """Return the view's centre at each tick (T, 3) [m; world frame]."""
-        absent = np.isnan(team)
-        low = np.where(absent, np.inf, team).min(axis=1)
-        high = np.where(absent, -np.inf, team).max(axis=1)
+        # The least and the greatest leave out NaN, unless there is nothing else.
+        middles = 0.5 * (np.fmin.reduce(team, axis=2) + np.fmax.reduce(team, axis=2))
         centres = np.zeros((len(team), 3))
-        for row, (least, most) in enumerate(zip(low, high, strict=True)):
-            if np.isfinite(least).all():
-                middle = 0.5 * (least + most)
+        for row, known in enumerate(np.isfinite(middles).all(axis=1).tolist()):
+            if known:
+                middle = middles[row]
                 before = middle if self._centre is None else self._centre
                 self._centre = before + self._follow * (middle - before)
             centres[row] = 0.0 if self._centre is None else self._centre
@@ -86,9 +87,9 @@ class TeamView:
 
     def _radii_m(self, ticks: Sequence[Tick], team: Floats, centres: Floats) -> Floats:
         """Return the view's radius at each tick (T,) [m]."""
-        targets = np.stack([tick.target for tick in ticks])
+        targets = np.stack([tick.target.T for tick in ticks])
         alive = np.stack([tick.alive for tick in ticks])
-        aims: Floats = np.where(alive[..., None], targets, np.nan).astype(np.float64)
+        aims: Floats = np.where(alive[:, None, :], targets, np.nan).astype(np.float64)
         team_m, aims_m = _reach(team, centres), _reach(aims, centres)
         least_m = np.maximum(team_m, LEAST_RADIUS_M)
         reach_m = np.maximum(team_m, np.minimum(aims_m, TARGETS_WITHIN * least_m))
@@ -99,44 +100,43 @@ class TeamView:
             radii_m[row] = self._radius_m
         return radii_m
 
-    def _ground(self, centre: NDArray[np.float64], radius_m: float) -> Floats | None:
+    def _ground(self, centre: Sequence[float], radius_m: float) -> Floats | None:
         """Return where the ground is now (3,) [m; world frame]; None where nothing changes."""
         cell_m = self._cell_m
         if not CELL * radius_m <= cell_m <= 2.6 * CELL * radius_m:
             cell_m = _round_length(CELL * radius_m)
-        height = centre[2] - BELOW * radius_m
-        corner = np.array(
-            [*np.rint(centre[:2] / cell_m), np.floor(height / cell_m)], dtype=np.int64
-        )
-        last = self._corner
+        x, y, z = centre
+        height, last = (z - BELOW * radius_m) / cell_m, self._corner
+        corner = (round(x / cell_m), round(y / cell_m), floor(height))
         if cell_m == self._cell_m and last is not None:
             # The height is kept for a cell more, lest the ground jumps with every breath.
-            corner[2] = last[2] if 0 <= height / cell_m - last[2] + 1.0 <= 3.0 else corner[2]
-            if (corner == last).all():
+            level = last[2] if 0.0 <= height - last[2] + 1.0 <= 3.0 else corner[2]
+            corner = (*corner[:2], level)
+            if corner == last:
                 return None
         self._cell_m, self._corner = cell_m, corner
-        place: Floats = corner.astype(np.float64) * cell_m
+        place: Floats = np.array(corner, dtype=np.float64) * cell_m
         return place
 
 
 def _team(ticks: Sequence[Tick]) -> Floats:
-    """Return the positions of running agents (T, N, 3) [m; world frame], NaN for the others.
+    """Return the positions of running agents (T, 3, N) [m; world frame], NaN for the others.
 
     Where none is running, those of all vehicles.
     """
-    position = np.stack([tick.position for tick in ticks])
+    position = np.stack([tick.position.T for tick in ticks])
     running = np.stack([tick.alive for tick in ticks])
-    seen = running & np.isfinite(position).all(axis=2)
+    seen = running & np.isfinite(position).all(axis=1)
     running[~np.any(seen, axis=1)] = True
-    team: Floats = np.where(running[..., None], position, np.nan)
+    team: Floats = np.where(running[:, None, :], position, np.nan)
     return team
 
 
 def _reach(points: Floats, centres: Floats) -> Floats:
-    """Return how far the farthest of points (T, N, 3) is from a centre (T, 3), NaN left out."""
-    away = points - centres[:, None, :]
-    square = np.einsum("ijk,ijk->ij", away, away)
-    reach: Floats = np.sqrt(np.where(np.isnan(square), 0.0, square).max(axis=1))
+    """Return how far the farthest of points (T, 3, N) is from a centre (T, 3), NaN left out."""
+    away = points - centres[:, :, None]
+    np.square(away, out=away)
+    reach: Floats = np.sqrt(np.fmax.reduce(away.sum(axis=1), axis=1, initial=0.0))
     return reach
 
 
