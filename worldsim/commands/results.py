@@ -1,7 +1,7 @@
 """The commands that make something of finished runs: a page, pictures, a film, tables."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from worldsim.results.progress_line import ProgressLine
 
 commands = typer.Typer()
+REPORTED = (
+    "report takes runs, folders of runs, the folder of a sweep, or that of a finding of"
+    " `qswarm fuzz`"
+)
 RecordedRun = Annotated[
     Path, typer.Argument(metavar="RUN", help="The output directory of a run, or its recording.")
 ]
@@ -72,10 +76,19 @@ def export(
         "qswarm report runs/mine",
         "qswarm report runs/mine runs/theirs --out both.html",
         "qswarm report runs/twenty --out twenty.html    # a folder of many runs",
+        "qswarm report runs/radio    # the folder of a sweep: curves, maps, where it breaks",
+        "qswarm report runs/lf/findings/reform-3    # what a search found, and its cause",
     )
 )
 def report(
-    runs: Recordings,
+    runs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RUN",
+            help="Run directories, directories of many runs, or recordings; or one directory of"
+            " a sweep, or of a finding of `qswarm fuzz`.",
+        ),
+    ],
     out: Annotated[
         Path | None,
         typer.Option(
@@ -90,15 +103,71 @@ def report(
     Expectations with their margins, forces, distances, turns, packets, the network, faults and
     provenance. The page is one file that loads nothing, to keep or to send. Several runs stand side
     by side. Every figure is computed from the recording and compared with summary.json.
+
+    Of a sweep the page holds its curves and maps, where it breaks, and the table of its cells; of a
+    finding its explanation, its margins over time, its scenario, and the reports of runs in it.
     """
+    special = [each for each in map(_special, runs) if each is not None]
+    if len(runs) == 1 and special:
+        return _report_special(special[0], runs[0], out)
+    if special:
+        raise typer.BadParameter("a sweep or a finding is reported alone", param_hint="RUN")
+    return _report_runs(runs, out)
+
+
+class _Special(NamedTuple):
+    """How to report a folder that is none of runs."""
+
+    write: "Callable[[Path, Path, Callable[[str], None]], Path]"
+
+
+def _special(folder: Path) -> _Special | None:
+    """Return how to report the folder of a sweep or of a finding; None for any other path."""
+    from worldsim.fuzz.finding_page import is_finding, report_finding
+    from worldsim.sweep.journal import is_sweep
+    from worldsim.sweep.sweep_page import report_sweep
+
+    if is_sweep(folder):
+        return _Special(report_sweep)
+    return _Special(report_finding) if is_finding(folder) else None
+
+
+def _report_special(special: _Special, folder: Path, out: Path | None) -> int:
+    """Write the page of a sweep or of a finding."""
     from worldsim.recording.readback import RecordingError
-    from worldsim.recording.viewer import recordings
+    from worldsim.report.report import PAGE, ReportError
+    from worldsim.results.progress_line import ProgressLine
+    from worldsim.results.run_folder import RunDirectoryError
+    from worldsim.scenario.toml import ScenarioError
+
+    progress, page = ProgressLine(), out or folder / "report" / PAGE
+    try:
+        figures = special.write(folder, page, progress.update)
+    except (RunDirectoryError, ScenarioError, RecordingError, ReportError) as error:
+        progress.clear()
+        complain(" ".join(str(error).splitlines()))
+        return BAD_INPUT
+    progress.clear()
+    print(f"{page}\n{figures}/")
+    return PASS
+
+
+def _report_runs(runs: list[Path], out: Path | None) -> int:
+    """Write the page of some runs."""
+    from worldsim.fuzz.finding_page import search_hint
+    from worldsim.recording.readback import RecordingError
+    from worldsim.recording.viewer import ViewerError, recordings
     from worldsim.report.report import PAGE, ReportError
     from worldsim.report.report import report as write
     from worldsim.results.progress_line import ProgressLine
     from worldsim.results.run import open as open_run
 
-    found = [_folder_of(recording) for recording in recordings(runs)]
+    try:
+        found = [_folder_of(recording) for recording in recordings(runs)]
+    except ViewerError as error:
+        hint = next((hint for hint in map(search_hint, runs) if hint is not None), None)
+        complain(hint or f"{error}; {REPORTED}")
+        return BAD_INPUT
     if len(found) > 1 and out is None:
         raise typer.BadParameter("several runs need a file to write to", param_hint="--out")
     progress = ProgressLine()

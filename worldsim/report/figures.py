@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from worldsim.report import curves, network, views
+from worldsim.report.page_parts import DrawnFigure
 from worldsim.report.shown import Fault, Shown
 from worldsim.report.style import drawing, new_figure, png_of, svg_of
 
@@ -20,16 +21,6 @@ RIGHT_END = 0.97
 """Snapshots take so much of the width: labels of axes in 3D are not counted in their layout."""
 MAX_WIDE = 1.8
 """A flight that is wider than so many times its breadth is drawn with one view below the other."""
-
-
-class DrawnFigure(NamedTuple):
-    """A figure as files and as a part of the page."""
-
-    name: str
-    title: str
-    caption: str
-    svg: str
-    png: bytes
 
 
 class _Recipe(NamedTuple):

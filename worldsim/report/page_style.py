@@ -44,6 +44,8 @@ figure { margin: 0; } figure svg { width: 100%; height: auto; display: block; }
 figure svg text { font-family: inherit !important; }
 td small { display: block; color: var(--muted); font-size: 13.5px; max-width: 70ch; }
 .checked { color: var(--muted); font-size: 13.5px; margin-top: 10px; }
+pre { background: var(--soft); border-radius: 8px; padding: 14px 18px; overflow-x: auto;
+  font: 13px/1.5 ui-monospace, "SF Mono", Menlo, Consolas, monospace; }
 ul { margin: 8px 0; padding-left: 20px; } li { margin: 3px 0; }
 .notes { border-left: 4px solid var(--doubt); background: #fdf8ec; padding: 8px 18px;
   border-radius: 0 8px 8px 0; margin: 16px 0; }

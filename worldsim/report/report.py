@@ -1,11 +1,12 @@
 """Writing a report: the page, and each figure as SVG and PNG beside it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from shutil import rmtree
 
-from worldsim.report.figures import DrawnFigure, drawn_figures
+from worldsim.report.figures import drawn_figures
 from worldsim.report.page import MAX_DRAWN, page
+from worldsim.report.page_parts import DrawnFigure
 from worldsim.report.shown import Shown
 from worldsim.results.run import Run
 
@@ -25,19 +26,34 @@ def report(runs: Sequence[Run], file: Path, progress: Progress) -> Path:
     what is being drawn. Raises ReportError where the page or the folder exists, or cannot be
     written.
     """
-    folder = file.with_name(FIGURES if file.name == PAGE else f"{file.stem}-{FIGURES}")
-    for path in (file, folder):
+    refuse_existing(file)
+    few = len(runs) <= MAX_DRAWN
+    drawn = [(run, drawn_of(run, progress) if few else []) for run in runs]
+    own = {f"{number}-{run.scenario.name}": each for number, (run, each) in enumerate(drawn)}
+    figures = {"": drawn[0][1]} if len(runs) == 1 else own if few else {}
+    return write(file, page(drawn), figures)
+
+
+def refuse_existing(file: Path) -> None:
+    """Raise ReportError where a page, or the folder of its figures, exists."""
+    for path in (file, _folder_of(file)):
         if path.exists():
             raise ReportError(f"{path}: exists; nothing is overwritten")
-    few = len(runs) <= MAX_DRAWN
-    drawn = [(run, _drawn(run, progress) if few else []) for run in runs]
+
+
+def write(file: Path, text: str, figures: Mapping[str, Sequence[DrawnFigure]]) -> Path:
+    """Write a page and its figures beside it; return the figures' folder.
+
+    figures: by the folder below it, "" for itself. Raises ReportError.
+    """
+    refuse_existing(file)
+    folder = _folder_of(file)
     try:
         folder.mkdir(parents=True)
         try:
-            for number, (run, figures) in enumerate(drawn if few else ()):
-                own = folder if len(drawn) == 1 else folder / f"{number}-{run.scenario.name}"
-                _write(figures, own)
-            file.write_text(page(drawn), encoding="utf-8")
+            for name, some in figures.items():
+                _write(some, folder / name)
+            file.write_text(text, encoding="utf-8")
         except OSError:
             rmtree(folder, ignore_errors=True)
             raise
@@ -46,7 +62,13 @@ def report(runs: Sequence[Run], file: Path, progress: Progress) -> Path:
     return folder
 
 
-def _drawn(run: Run, progress: Progress) -> list[DrawnFigure]:
+def _folder_of(file: Path) -> Path:
+    """Return the folder of a page's figures."""
+    return file.with_name(FIGURES if file.name == PAGE else f"{file.stem}-{FIGURES}")
+
+
+def drawn_of(run: Run, progress: Progress) -> list[DrawnFigure]:
+    """Return the figures of a run; none of one without a tick."""
     if not run.ticks:
         return []
     name = run.scenario.name

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from worldsim.judge.finding import ExpectationRow
+from worldsim.report.page_parts import UNKNOWN, Figure, provenance
 from worldsim.results.expectation_text import (
     CONVERGE,
     Circumstances,
@@ -19,7 +20,6 @@ from worldsim.results.fault_rows import fault_texts
 from worldsim.results.outcome import INVARIANT_WORDS
 from worldsim.results.run import Run
 
-UNKNOWN = "-"
 AT_LEAST = (
     "min_separation_m",
     "min_obstacle_distance_m",
@@ -62,15 +62,6 @@ UNITS = {
     "attitude_within_deg": Unit("largest attitude error", "deg", 1),
     "reform_within_s": Unit("formation restored after a fault", "s", 2),
 }
-
-
-class Figure(NamedTuple):
-    """A figure of the page: its words, and the key and value that it stands for."""
-
-    text: str
-    key: str = ""
-    """The path in summary.json, joined by dots; empty for what is no figure of it."""
-    value: Any = None
 
 
 class Verdict(NamedTuple):
@@ -220,23 +211,13 @@ def heading(run: Run) -> str:
 def provenance_rows(run: Run) -> list[tuple[str, str]]:
     """Return what produced the run: code, packages, host, seed and hash."""
     known = run.summary or {}
-    commit = known.get("commit")
-    source = f"{commit}{' (modified)' if known.get('commit_dirty') else ''}" if commit else UNKNOWN
-    host = known.get("host") or {}
-    machine = ", ".join(str(host[key]) for key in ("os", "kernel", "machine") if key in host)
-    cpus = f", {host['cpus']} CPUs" if "cpus" in host else ""
-    packages = (known.get("packages") or {}).items()
     pace = known.get("real_time_factor")
     late = known.get("late_tick_fraction")
     return [
         ("scenario", run.scenario.name),
         ("seed", str(run.scenario.seed)),
         ("clock", MODES.get(str(run.mode), UNKNOWN)),
-        ("qswarm", str(known.get("version") or UNKNOWN)),
-        ("commit", source),
-        ("Python", str(known.get("python") or UNKNOWN)),
-        ("packages", ", ".join(f"{name} {version}" for name, version in packages) or UNKNOWN),
-        ("host", f"{machine}{cpus}" or UNKNOWN),
+        *provenance(known),
         ("pace", UNKNOWN if pace is None else f"{pace:.3g} times real time"),
         ("late ticks", UNKNOWN if late is None else f"{100.0 * late:.2f} %"),
         ("trace_sha256", str(known.get("trace_sha256") or UNKNOWN)),

@@ -25,6 +25,8 @@ APART = 0.007
 HEIGHT_IN, MAP_HEIGHT_IN = 3.4, 3.2
 MAP = LinearSegmentedColormap.from_list("qswarm", [GRID, "#7fb3cc", ACCENT])
 LATE_MAP = LinearSegmentedColormap.from_list("qswarm-late", ["#fbf1e2", "#e6b980", "#b06a1f"])
+WHITE_LIGHT, INK_LIGHT = 1.05, 0.067
+"""Luminances of the two colours of texts, with the 0.05 that a contrast adds."""
 SHARE, LATE = "share of flights that pass", "converged in, median [s]"
 
 
@@ -170,17 +172,22 @@ def _map(
     axes.imshow(values, cmap=colours, vmin=0.0, vmax=most, origin="lower", aspect="auto")
     for row, line in enumerate(texts):
         for column, text in enumerate(line):
-            dark = most == 1.0 and values[row, column] > 0.6
-            axes.text(
-                column, row, text, ha="center", va="center", fontsize=8.0,
-                color="white" if dark else INK,
-            )  # fmt: skip
+            value = values[row, column]
+            colour = INK if np.isnan(value) else _readable(colours(value / most))
+            axes.text(column, row, text, ha="center", va="center", fontsize=8.0, color=colour)
     axes.set_xticks(range(len(across.values)), across.values)
     axes.set_yticks(range(len(up.values)), up.values)
     axes.set(xlabel=across.key, ylabel=up.key)
     axes.grid(visible=False)
     axes.tick_params(colors=MUTED)
     axes.set_facecolor(GRID)
+
+
+def _readable(background: tuple[float, float, float, float]) -> str:
+    """Return the colour of a text that stands out the more from its background (WCAG 2.2)."""
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in background[:3]]
+    light = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] + 0.05
+    return "white" if WHITE_LIGHT / light > light / INK_LIGHT else INK
 
 
 def _value(value: float | None, missing: float = float("nan")) -> float:

@@ -11,18 +11,28 @@ from worldsim.results.exit_status import INTERRUPTION
 from worldsim.sweep.plan import Plan
 from worldsim.sweep.result import CellRow, Rows, Summary
 
+Row = tuple[str, ...]
+
 
 def sweep_text(summary: Summary, folder: Path) -> str:
     """Return the table of a sweep's cells, its breaks and its outcome."""
+    head, rows = cells_table(summary["cells"])
     return "\n".join(
         [
-            *aligned(_table(summary["cells"])),
+            *aligned([head, *rows]),
             *([""] if summary["breaks"] else []),
             *(f"{row['key']}{_where(row['where'])}: {row['text']}" for row in summary["breaks"]),
             "",
             closing_line(summary, folder),
         ]
     )
+
+
+def cells_table(cells: list[CellRow]) -> tuple[Row, list[Row]]:
+    """Return the head and the rows of the table of a sweep's cells, as texts."""
+    keys = list(cells[0]["settings"])
+    heads = ("flights", "pass", "share", "95 %", "converged in", "least separation")
+    return (*keys, *heads), [_row(cell) for cell in cells]
 
 
 def closing_line(summary: Summary, folder: Path) -> str:
@@ -72,12 +82,6 @@ def settings_text(settings: dict[str, str]) -> str:
 def figure_text(value: float | None, form: str = ".3g") -> str:
     """Return a figure, "-" where it was not measured."""
     return "-" if value is None else f"{value:{form}}"
-
-
-def _table(cells: list[CellRow]) -> list[tuple[str, ...]]:
-    keys = list(cells[0]["settings"])
-    heads = ("flights", "pass", "share", "95 %", "converged in", "least separation")
-    return [(*keys, *heads), *(_row(cell) for cell in cells)]
 
 
 def _row(cell: CellRow) -> tuple[str, ...]:
