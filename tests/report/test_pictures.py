@@ -18,7 +18,7 @@ from worldsim.report.film import FilmError, default_speed, write_film
 from worldsim.report.shown import Shown
 from worldsim.report.stills import Stills, facts
 from worldsim.report.style import drawing
-from worldsim.report.views import moment_region
+from worldsim.report.views import AZIMUTHS_DEG, ELEVATION_DEG, azimuth_deg, moment_region
 
 MOVING = (
     SMALL
@@ -150,3 +150,13 @@ def test_a_film_that_cannot_be_written_says_why(
     with pytest.raises(FilmError, match=r"\.avi: a film is \.mp4 or \.gif"):
         write_film(shown, tmp_path / "film.avi", 10.0, lambda _: None)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_view_is_one_in_which_no_vehicle_hides_another() -> None:
+    first = AZIMUTHS_DEG[0]
+    apart = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 0.0]])
+    assert azimuth_deg(apart) == first
+    around, up = np.radians(first), np.radians(ELEVATION_DEG)
+    sight = [np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)]
+    assert azimuth_deg(np.array([[0.0, 0.0, 0.0], sight])) != first
+    assert azimuth_deg(np.full((3, 3), np.nan)) == first

@@ -23,6 +23,8 @@ from worldsim.report.style import (
 from worldsim.scenario.tables import CONVERGED_M, Scenario
 
 PANEL_IN, HEAD_IN = 1.7, 0.7
+ROOM = 1.3
+"""Of the height of a curve: above it, the line of the trouble is named."""
 NEAR = 0.03
 """Events so near to each other share a mark [of the flight]."""
 
@@ -104,7 +106,7 @@ def _figure(finding: dict[str, Any], scenario: Scenario, curves: list[Curve]) ->
         axes.set_title(curve.name)
         axes.label_outer()
         if axes.get_yscale() == "linear":
-            axes.set_ylim(0.0, 1.08 * max(curve.limit_m, float(np.nanmax(curve.values))))
+            axes.set_ylim(0.0, ROOM * max(curve.limit_m, float(np.nanmax(curve.values))))
     _name_marks(panels[0], finding, until_s)
     return figure
 
@@ -135,7 +137,6 @@ def _name_marks(axes: Axes, finding: dict[str, Any], until_s: float) -> None:
         fontsize=8.0,
         fontweight="bold",
         color=LIMIT,
-        bbox={"facecolor": "white", "alpha": 0.85, "linewidth": 0.0, "pad": 1.0},
     )
 
 

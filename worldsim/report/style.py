@@ -94,7 +94,7 @@ def time_axis(axes: Axes, until_s: float) -> None:
     """Label the horizontal axis as simulated time from 0 to the end."""
     axes.set_xlim(0.0, max(until_s, 1e-3))
     axes.set_xlabel("simulated time [s]")
-    axes.xaxis.set_major_locator(MaxNLocator(8))
+    axes.xaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))
 
 
 def limit_lines(axes: Axes, values: Sequence[float], label: str) -> None:

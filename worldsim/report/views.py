@@ -21,7 +21,11 @@ from worldsim.truth.vehicle import Floats
 
 CURVE_STEPS = 24
 SPHERE_STEPS = 14
-ELEVATION_DEG, AZIMUTH_DEG = 24.0, -58.0
+ELEVATION_DEG = 24.0
+AZIMUTHS_DEG = (-58.0, -70.0, -46.0, -34.0, -22.0, -80.0, -106.0)
+"""Directions to look from, the first choice first."""
+BETTER = 1.25
+"""Another direction is taken where it keeps vehicles so much farther apart."""
 LEAST_SIZE_M = 2.0
 MAX_NAMED = 20
 """With more agents, vehicles have no names."""
@@ -78,6 +82,31 @@ def moment_region(shown: Shown, row: int, trail_s: float = TRAIL_S) -> Region:
     return region_of(np.concatenate(points))
 
 
+def azimuth_deg(position: Floats) -> float:
+    """Return where to look from in 3D, so that no vehicle hides another one or its name.
+
+    position: of the vehicles (N, 3) [m; world frame].
+    """
+    known = position[~np.isnan(position).any(axis=1)]
+    if not 2 <= len(known) <= MAX_NAMED:
+        return AZIMUTHS_DEG[0]
+    apart = [_least_apart(known, azimuth) for azimuth in AZIMUTHS_DEG]
+    best = max(apart)
+    # Small differences, as between two runs of one scenario, leave the first choice.
+    chosen = next(index for index, each in enumerate(apart) if BETTER * each >= best)
+    return AZIMUTHS_DEG[chosen]
+
+
+def _least_apart(points: Floats, azimuth: float) -> float:
+    """Return how near two points (N, 3) come in the picture from an azimuth [deg]."""
+    around, up = np.radians(azimuth), np.radians(ELEVATION_DEG)
+    x, y, z = points.T
+    away = x * np.cos(around) + y * np.sin(around)
+    seen = np.stack((y * np.cos(around) - x * np.sin(around), z * np.cos(up) - away * np.sin(up)))
+    apart = np.linalg.norm(seen[:, :, None] - seen[:, None, :], axis=0)
+    return float(apart[np.triu_indices(len(points), 1)].min())
+
+
 def draw_moment(axes: Space, shown: Shown, row: int, seen: Region, scale: float = 1.0) -> None:
     """Draw the team at a tick in 3D, with the trails of the last seconds.
 
@@ -97,7 +126,7 @@ def draw_moment(axes: Space, shown: Shown, row: int, seen: Region, scale: float 
         *tick.position.T, s=20 * scale**2, c=colours, depthshade=False, edgecolors="white", lw=0.5
     )
     _name(axes, shown, tick, 6.5 * scale)
-    _frame(axes, seen)
+    _frame(axes, seen, azimuth_deg(shown.position[-1]))
 
 
 def draw_flat(
@@ -230,7 +259,7 @@ def _name(axes: Space, shown: Shown, tick: Tick, size_pt: float) -> None:
             axes.text(x, y, z, f"\u00a0{name}", fontsize=size_pt, color=INK)
 
 
-def _frame(axes: Space, region: Region) -> None:
+def _frame(axes: Space, region: Region, azimuth: float) -> None:
     axes.set(
         xlim=(region.low[0], region.high[0]),
         ylim=(region.low[1], region.high[1]),
@@ -238,7 +267,7 @@ def _frame(axes: Space, region: Region) -> None:
     )
     axes.set_box_aspect(region.size.tolist(), zoom=0.92)
     axes.patch.set_visible(False)  # it would hide the label of the axes to the left
-    axes.view_init(elev=ELEVATION_DEG, azim=AZIMUTH_DEG)
+    axes.view_init(elev=ELEVATION_DEG, azim=azimuth)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_pane_color("#f7f8fa")
         axis.line.set_color(FAINT)
