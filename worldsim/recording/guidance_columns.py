@@ -44,7 +44,8 @@ class GuidanceColumns:
             for vehicle in (scenario.vehicles if scenario.rows <= layout.NAMED_MAX else ())
         ]
         self._outline = np.array([_outline(zone) for zone in self._zones])
-        self._ticks_per_sample = max(1, round(scenario.fleet.tick_hz / SAMPLES_HZ))
+        samples_hz = SAMPLES_HZ if scenario.rows <= layout.FEW_MAX else 0.5 * SAMPLES_HZ
+        self._ticks_per_sample = max(1, round(scenario.fleet.tick_hz / samples_hz))
 
     def blocks(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
         """Yield the columns of a block; blocks come in order."""

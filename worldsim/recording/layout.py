@@ -96,6 +96,8 @@ EVENT = "event"
 MODE = "mode"
 """Components of qswarm's own: read back, but not shown."""
 
+FEW_MAX = 25
+"""With more agents, what takes time for each agent or pair of them, or more, has half its rate."""
 NAMED_MAX = 50
 """With more agents, vehicles have no visible labels and roles are not recorded."""
 

@@ -20,8 +20,10 @@ LINES_MAX = 400
 LINES_PER_S = 2000
 """More lines at once, or in a second, would cost more than everything else in the recording."""
 
-MISSING_EVERY_S = (0.2, 5.0)
-"""Missing links are looked for at least so often, also in a large fleet, where they are many."""
+MISSING_EVERY_S = ((layout.FEW_MAX, 0.2), (layout.NAMED_MAX, 0.4))
+"""Missing links of up to so many agents are looked for at least so often."""
+MISSING_OF_LARGE_S = 5.0
+"""The same of more agents, where they are many."""
 MOVED_EVERY_S = 1.0
 """Between two looks, their lines move with the vehicles at least so often."""
 FAR_EVERY_S = 1.0
@@ -140,7 +142,9 @@ class LinkColumns:
 
     def _is_due(self, tick: Tick, situation: Situation) -> bool:
         """Return whether missing links are to be found at a tick."""
-        every_s = MISSING_EVERY_S[len(tick.alive) > layout.NAMED_MAX]
+        agents = len(tick.alive)
+        times = (every_s for most, every_s in MISSING_EVERY_S if agents <= most)
+        every_s = next(times, MISSING_OF_LARGE_S)
         next_at = self._sought_at + round(self._tick_hz * every_s)
         if situation is self._sought_in and tick.index < next_at:
             return False
@@ -161,13 +165,14 @@ def missing_links(tick: Tick, situation: Situation, hears: NDArray[np.bool_]) ->
     one, other = pairs.T
     along = tick.position[other] - tick.position[one]
     away = np.sqrt(np.einsum("ij,ij->i", along, along))
-    cut = situation.radio.cut(tick)
     near, cuts = np.zeros((2, len(one)), dtype=np.bool_)
+    cut = situation.radio.cut(tick) if situation.radio.cuts else None
     for source, hearer in ((one, other), (other, one)):
-        unheard = ~hears[hearer, source]
-        unheard &= situation.radio.in_range(away, source, hearer)
+        unheard = situation.radio.in_range(away, source, hearer)
+        unheard &= ~hears[hearer, source]
         near |= unheard
-        cuts |= unheard & cut[source, hearer]
+        if cut is not None:
+            cuts |= unheard & cut[source, hearer]
     far = ~near if agents <= layout.NAMED_MAX else np.zeros_like(near)
     return {
         layout.LINKS_CUT: pairs[cuts],
@@ -236,11 +241,10 @@ def hears_of(ticks: Sequence[Tick]) -> Matrices:
     """
     agents = len(ticks[0].alive)
     hears = np.zeros((len(ticks), agents, agents), dtype=np.bool_)
-    links = np.concatenate([tick.links for tick in ticks])
+    links = np.concatenate([tick.links for tick in ticks]).astype(np.int64)
     row = np.repeat(np.arange(len(ticks)), [len(tick.links) for tick in ticks])
-    hearer, heard = links.T.astype(np.int64)
-    exist = (hearer >= 0) & (hearer < agents) & (heard >= 0) & (heard < agents)
-    if not exist.all():
-        row, hearer, heard = row[exist], hearer[exist], heard[exist]
-    hears[row, hearer, heard] = True
+    if links.size and (links.min() < 0 or links.max() >= agents):
+        exist = ((links >= 0) & (links < agents)).all(axis=1)
+        row, links = row[exist], links[exist]
+    hears.reshape(-1)[(row * agents + links[:, 0]) * agents + links[:, 1]] = True
     return hears

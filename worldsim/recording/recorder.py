@@ -271,7 +271,7 @@ class RunRecorder:
             self._seen = []
 
     def _detail(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
-        yield from self._tick_columns.detail(ticks)
+        yield from self._tick_columns.detail(ticks, figures)
         yield from self._hierarchy_columns.figures(ticks, figures)
         yield from self._state_columns.connectivity(ticks)
         if self._guidance is not None:

@@ -77,6 +77,9 @@ class RadioRules:
         for source in rows:
             if models.common(LOCAL, source) is None:
                 self._reach_m[source] = [models.of_link(LOCAL, source, b).reach_m for b in rows]
+        low_m, high_m = float(self._reach_m.min()), float(self._reach_m.max())
+        self._common_m = low_m if low_m == high_m else None
+        """The range of all links; None where they differ."""
         self._network = network
         changed = any(isinstance(each.fault, Conditions) for each in network.in_force.values())
         faults = {"changed": changed, "flap": network.flapping, "outage": bool(network.outages)}
@@ -99,8 +102,17 @@ class RadioRules:
         hearer: NDArray[np.intp],
     ) -> NDArray[np.bool_]:
         """Return which links (K,) are within their range; distance (K,) [m], not so for NaN."""
-        within: NDArray[np.bool_] = distance <= self._reach_m[source, hearer]
+        reach_m = self._common_m
+        within: NDArray[np.bool_] = distance <= (
+            self._reach_m[source, hearer] if reach_m is None else reach_m
+        )
         return within
+
+    @property
+    def cuts(self) -> bool:
+        """Whether a fault in force may cut any link."""
+        steady = self._down or self._network.partitioned
+        return bool(steady or self._obstructed or self._network.flapping)
 
     def cut(self, tick: Tick) -> NDArray[np.bool_]:
         """Return which links a partition, a jam, a flap or an outage cuts at a tick (N, N)."""

@@ -29,7 +29,8 @@ class StateColumns:
         self._formation = formation
         self._named = min(agents, layout.NAMED_MAX)
         self._small = agents <= layout.NAMED_MAX
-        self._ticks_per_sample = max(1, round(tick_hz / LAMBDA2_HZ))
+        samples_hz = LAMBDA2_HZ if agents <= layout.FEW_MAX else 0.5 * LAMBDA2_HZ
+        self._ticks_per_sample = max(1, round(tick_hz / samples_hz))
         self._shown: dict[str, str] = {}
         self._noted = False
         """Whether anything has been wrong with an agent."""

@@ -8,7 +8,8 @@ that rests in the world: it moves by whole cells, to stay below the team.
 """
 
 from collections.abc import Iterator, Sequence
-from math import ceil, exp, floor, log10
+from math import ceil, exp, floor, isfinite, log10
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -44,7 +45,7 @@ class TeamView:
     def __init__(self, tick_s: float) -> None:
         self._follow = 1.0 - exp(-tick_s / FOLLOW_S)
         self._shrink = exp(-tick_s / SHRINK_S)
-        self._centre: NDArray[np.float64] | None = None
+        self._centre: list[float] | None = None
         self._radius_m = LEAST_RADIUS_M
         self._cell_m = 0.0
         self._corner: tuple[int, int, int] | None = None
@@ -74,22 +75,23 @@ class TeamView:
 
     def _centres(self, team: Floats) -> Floats:
         """Return the view's centre at each tick (T, 3) [m; world frame]."""
-        # The least and the greatest leave out NaN, unless there is nothing else.
-        middles = 0.5 * (np.fmin.reduce(team, axis=2) + np.fmax.reduce(team, axis=2))
+        middles: Floats = 0.5 * (_least(team) + _most(team))
         centres = np.zeros((len(team), 3))
-        for row, known in enumerate(np.isfinite(middles).all(axis=1).tolist()):
-            if known:
-                middle = middles[row]
-                before = middle if self._centre is None else self._centre
-                self._centre = before + self._follow * (middle - before)
-            centres[row] = 0.0 if self._centre is None else self._centre
+        centre = self._centre
+        for row, middle in enumerate(middles.tolist()):
+            if all(map(isfinite, middle)):
+                before = middle if centre is None else centre
+                pairs = zip(before, middle, strict=True)
+                centre = [was + self._follow * (now - was) for was, now in pairs]
+            centres[row] = 0.0 if centre is None else centre
+        self._centre = centre
         return centres
 
     def _radii_m(self, ticks: Sequence[Tick], team: Floats, centres: Floats) -> Floats:
         """Return the view's radius at each tick (T,) [m]."""
-        targets = np.stack([tick.target.T for tick in ticks])
+        targets = _by_coordinate([tick.target for tick in ticks])
         alive = np.stack([tick.alive for tick in ticks])
-        aims: Floats = np.where(alive[:, None, :], targets, np.nan).astype(np.float64)
+        aims = targets if alive.all() else np.where(alive[:, None, :], targets, np.nan)
         team_m, aims_m = _reach(team, centres), _reach(aims, centres)
         least_m = np.maximum(team_m, LEAST_RADIUS_M)
         reach_m = np.maximum(team_m, np.minimum(aims_m, TARGETS_WITHIN * least_m))
@@ -124,20 +126,41 @@ def _team(ticks: Sequence[Tick]) -> Floats:
 
     Where none is running, those of all vehicles.
     """
-    position = np.stack([tick.position.T for tick in ticks])
+    position = _by_coordinate([tick.position for tick in ticks])
     running = np.stack([tick.alive for tick in ticks])
+    if running.all():
+        return position
     seen = running & np.isfinite(position).all(axis=1)
     running[~np.any(seen, axis=1)] = True
     team: Floats = np.where(running[:, None, :], position, np.nan)
     return team
 
 
+def _by_coordinate(points: Sequence[NDArray[Any]]) -> Floats:
+    """Return points (N, 3) of some ticks as (T, 3, N), one coordinate after the other."""
+    return np.ascontiguousarray(np.stack(points).transpose(0, 2, 1), dtype=np.float64)
+
+
 def _reach(points: Floats, centres: Floats) -> Floats:
     """Return how far the farthest of points (T, 3, N) is from a centre (T, 3), NaN left out."""
     away = points - centres[:, :, None]
     np.square(away, out=away)
-    reach: Floats = np.sqrt(np.fmax.reduce(away.sum(axis=1), axis=1, initial=0.0))
+    most = _most(away[:, 0] + away[:, 1] + away[:, 2])
+    reach: Floats = np.sqrt(np.where(np.isnan(most), 0.0, most))
     return reach
+
+
+def _least(values: Floats) -> Floats:
+    """Return the least along the last axis, NaN left out; NaN where there is nothing else."""
+    least: Floats = values.min(axis=-1)
+    # Much faster than to look for NaN at once: as a rule there is none.
+    return np.fmin.reduce(values, axis=-1) if np.isnan(least).any() else least
+
+
+def _most(values: Floats) -> Floats:
+    """Return the greatest along the last axis, as _least does."""
+    most: Floats = values.max(axis=-1)
+    return np.fmax.reduce(values, axis=-1) if np.isnan(most).any() else most
 
 
 def _round_length(least_m: float) -> float:

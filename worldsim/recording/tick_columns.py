@@ -6,6 +6,7 @@ missions, links, counters) have a row where they changed; a viewer shows the lat
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import nan
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -63,15 +64,19 @@ class TickColumns:
         """Yield the columns of a block; blocks come in order."""
         yield from _poses(ticks)
         yield from self._headings(ticks)
-        yield from _metrics(ticks, figures)
+        yield from _judged_metrics(ticks)
+        if len(ticks[0].alive) <= layout.NAMED_MAX:
+            yield from _distances(ticks, figures)
         yield _state(ticks)
         yield from self._missions(ticks)
         yield from self._coloured_entities(ticks, [each.dead for each in situations])
         yield from self._links.blocks(ticks, situations)
         yield from self._packets(ticks)
 
-    def detail(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
+    def detail(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
         """Yield what hardly changes or has a lower rate, of some ticks that were sent."""
+        if len(ticks[0].alive) > layout.NAMED_MAX:
+            yield from _distances(ticks, figures)
         yield from self._links.detail(ticks)
         yield from self._reference_lines(len(ticks) - 1)
         series = self._colours.series()
@@ -205,20 +210,29 @@ def _quaternions(attitude: Float32s) -> Float32s:
     ) + np.float32(0.0)  # no negative zeros: equal rows of a level fleet compress well
 
 
-def _metrics(ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
-    """Yield agents' metrics; those that a reader cannot compute from the rest at every tick."""
-    every, sparse = list(range(len(ticks))), _sparse_rows(ticks)
+def _judged_metrics(ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
+    """Yield agents' metrics that a reader cannot compute from the rest, at every tick."""
+    every = range(len(ticks))
+    yield ColumnBlock(layout.FORCE, every, [_scalars([tick.force for tick in ticks])])
+    yield ColumnBlock(layout.TURN_DEG, every, [_scalars([tick.turn_deg for tick in ticks])])
+
+
+def _distances(ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
+    """Yield agents' distances, for viewers only; of a large fleet, at some ticks."""
+    sparse = _sparse_rows(ticks)
     distance = [(row, figures[row].obstacle_distance) for row in sparse]
     near = {row: each for row, each in distance if each is not None}
     for entity, rows, values in (
-        (layout.FORCE, every, [tick.force for tick in ticks]),
-        (layout.TURN_DEG, every, [tick.turn_deg for tick in ticks]),
         (layout.SEPARATION, sparse, [figures[row].separation for row in sparse]),
         (layout.SLOT_ERROR, sparse, [_finite(figures[row].slot_error) for row in sparse]),
         (layout.OBSTACLE_DISTANCE, list(near), list(near.values())),
     ):
         if rows:
-            yield ColumnBlock(entity, rows, [components.SCALARS.rows(np.stack(values))])
+            yield ColumnBlock(entity, rows, [_scalars(values)])
+
+
+def _scalars(values: Sequence[NDArray[Any]]) -> rr.ComponentColumn:
+    return components.SCALARS.rows(np.stack(values))
 
 
 def _finite(values: Floats) -> Floats:
