@@ -8,8 +8,6 @@ from worldsim.judge.run_events import Killed, QueueChanged, SlotChanged
 from worldsim.recording.recorder import RunRecorder
 
 AGENTS = 9
-COUNTERS = 5
-"""Of the radio, in the flight."""
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +35,8 @@ def chunks(tmp_path_factory: pytest.TempPathFactory) -> list[Chunk]:
         ("/metrics/separation", "Scalars:scalars", AGENTS),
         ("/metrics/slot_error", "Scalars:scalars", AGENTS),
         ("/metrics/turn_deg", "Scalars:scalars", AGENTS),
-        ("/metrics/packets", "Scalars:scalars", COUNTERS),
+        ("/metrics/packets/sent", "Scalars:scalars", 1),
+        ("/metrics/packets/dropped_loss", "Scalars:scalars", 1),
         ("/log/events", "TextLog:text", 1),
     ],
 )

@@ -101,25 +101,18 @@ def test_an_older_recording_is_read(tmp_path: Path) -> None:
     stream = rr.RecordingStream("qswarm")
     stream.set_sinks(rr.FileSink(old))
     for chunk in RrdReader(new).stream():
-        rr.send_chunks(_as_formerly(chunk, list(flown[0].packets)), recording=stream)
+        rr.send_chunks(_as_formerly(chunk), recording=stream)
     stream.disconnect()
     for before, after in zip(flown, read_run(old).ticks, strict=True):
         _assert_equal(before, after)
 
 
-def _as_formerly(chunk: Chunk, counters: list[str]) -> list[Chunk]:
-    """Return a chunk as it was: missions, links and each counter had entities of their own."""
-    if chunk.is_static or chunk.entity_path not in {layout.PACKETS, layout.AGENT_STATE}:
-        return [] if chunk.entity_path == layout.PACKETS else [chunk]
+def _as_formerly(chunk: Chunk) -> list[Chunk]:
+    """Return a chunk as it was: missions and links had entities of their own."""
+    if chunk.is_static or chunk.entity_path != layout.AGENT_STATE:
+        return [chunk]
     batch, found = chunk.to_record_batch(), []
     ticks = np.array(batch.column(layout.TICK).to_pylist())
-    if chunk.entity_path == layout.PACKETS:
-        counts = np.array(batch.column(layout.SCALARS).to_pylist())
-        times = [rr.TimeColumn(layout.TICK, sequence=ticks)]
-        return [
-            Chunk.from_columns(f"{layout.PACKETS}/{name}", times, rr.Scalars.columns(scalars=each))
-            for name, each in zip(counters, counts.T, strict=True)
-        ]
     for part, entity in (
         (layout.HEARS, layout.LINK_STATE),
         (layout.MISSION, layout.MISSION_STATE),

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from worldsim.commands.options import Recordings, complain, examples
+from worldsim.commands.options import complain, examples
 from worldsim.results.exit_status import BAD_INPUT, PASS
 
 if TYPE_CHECKING:

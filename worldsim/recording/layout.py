@@ -151,7 +151,12 @@ def signal_name(entity: str) -> str | None:
     return entity.removeprefix(prefix) if entity.startswith(prefix) else None
 
 
+def packet_entity(counter: str) -> str:
+    """Return the entity that holds one of the medium's packet counters."""
+    return f"{PACKETS}/{counter}"
+
+
 def packet_counter(entity: str) -> str | None:
-    """Return the packet counter that an entity of an older recording holds; None for others."""
+    """Return the name of the packet counter that an entity holds; None for other entities."""
     prefix = f"{PACKETS}/"
     return entity.removeprefix(prefix) if entity.startswith(prefix) else None

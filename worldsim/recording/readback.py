@@ -118,7 +118,6 @@ class _RecordedColumns:
         self.events: list[RunEvent] = []
         self.scenario_text: str | None = None
         self.mode: str | None = None
-        self._counter_names: list[str] = []
         for chunk in chunks:
             self._read(chunk)
 
@@ -127,19 +126,9 @@ class _RecordedColumns:
         return self._columns.get((entity, component), {})
 
     def packet_counters(self) -> dict[str, Column]:
-        """Return the columns of the medium's counters, by name.
-
-        An older recording has an entity for each.
-        """
+        """Return the columns of the medium's counters, by name."""
         named = {layout.packet_counter(entity): each for (entity, _), each in self._columns.items()}
-        found = {name: column for name, column in named.items() if name is not None}
-        together = self.column(layout.PACKETS, layout.SCALARS)
-        for at, name in enumerate(self._counter_names):
-            counts = {tick: row[at : at + 1] for tick, row in together.items()}
-            found[name] = {
-                tick: count for tick, count in counts.items() if np.isfinite(count).any()
-            }
-        return found
+        return {name: column for name, column in named.items() if name is not None}
 
     def signals(self) -> dict[str, Column]:
         """Return the columns of the controllers' signals, by name."""
@@ -153,18 +142,12 @@ class _RecordedColumns:
         elif chunk.entity_path == layout.RUN_PROPERTIES:
             self.mode = batch.column(layout.MODE)[0].as_py()[0]
         elif chunk.is_static:
-            self._read_names(chunk.entity_path, batch)
+            return
         elif chunk.entity_path == layout.EVENTS:
             encoded = batch.column(layout.EVENT).to_pylist()
             self.events.extend(event_of(json.loads(row[0])) for row in encoded)
         else:
             self._read_rows(chunk.entity_path, batch)
-
-    def _read_names(self, entity: str, batch: Any) -> None:
-        """Take the counters' names: each time that a new one comes, all are told."""
-        if entity == layout.PACKETS and layout.SERIES_NAMES in batch.schema.names:
-            names = batch.column(layout.SERIES_NAMES)[0].as_py()
-            self._counter_names = max(self._counter_names, names, key=len)
 
     def _read_rows(self, entity: str, batch: Any) -> None:
         if layout.TICK not in batch.schema.names:

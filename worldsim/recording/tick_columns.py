@@ -5,7 +5,6 @@ missions, links, counters) have a row where they changed; a viewer shows the lat
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import nan
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ from worldsim.recording.columns import ChangeDetector, ColumnBlock
 from worldsim.recording.components import number_column
 from worldsim.recording.link_columns import LinkColumns
 from worldsim.recording.situation import Situation
-from worldsim.recording.static_entities import SERIES_WIDTH
 from worldsim.truth.vehicle import Floats
 
 ARROW_RADII = 2.6
@@ -50,9 +48,7 @@ class TickColumns:
         self._colour_changes = ChangeDetector()
         self._series_changes = ChangeDetector()
         self._mission_changes = ChangeDetector()
-        self._counters: list[str] = []
-        """The radio's counters so far, in the order in which they came."""
-        self._counter_changes = ChangeDetector()
+        self._counter_changes: dict[str, ChangeDetector] = {}
         self._agent_metrics = layout.agent_metrics(obstacles=layout.OBSTACLE_DISTANCE in limits)
 
     def blocks(
@@ -71,13 +67,13 @@ class TickColumns:
         yield from self._missions(ticks)
         yield from self._coloured_entities(ticks, [each.dead for each in situations])
         yield from self._links.blocks(ticks, situations)
-        yield from self._packets(ticks)
 
     def detail(self, ticks: Sequence[Tick], figures: Sequence[Figures]) -> Iterator[ColumnBlock]:
         """Yield what hardly changes or has a lower rate, of some ticks that were sent."""
         if len(ticks[0].alive) > layout.NAMED_MAX:
             yield from _distances(ticks, figures)
         yield from self._links.detail(ticks)
+        yield from self._packets(ticks)
         yield from self._reference_lines(len(ticks) - 1)
         series = self._colours.series()
         if self._series_changes.changed_rows(series[None]):
@@ -119,29 +115,16 @@ class TickColumns:
             yield ColumnBlock(layout.AGENT_STATE, rows, columns)
 
     def _packets(self, ticks: Sequence[Tick]) -> Iterator[ColumnBlock]:
-        known = [row for row, tick in enumerate(ticks) if tick.packets]
-        told = dict.fromkeys(name for row in known for name in ticks[row].packets)
-        new = [name for name in told if name not in self._counters]
-        if new:
-            self._counters += new
-            self._counter_changes = ChangeDetector()
-            count = len(self._counters)
-            styles = rr.SeriesLines.columns(
-                names=self._counters,
-                colors=palette.agent_colours(count),
-                widths=[SERIES_WIDTH] * count,
-            )
-            yield ColumnBlock(layout.PACKETS, (), styles.partition([count]))
-        if known:
-            # NaN: a missing counter is not zero. I8 is not evaluated before the first counters.
-            table = [
-                [ticks[row].packets.get(name, nan) for name in self._counters] for row in known
-            ]
-            counts = np.array(table)
-            changed = self._counter_changes.changed_rows(counts)
+        for counter in dict.fromkeys(counter for tick in ticks for counter in tick.packets):
+            # A missing counter is not zero: I8 is not evaluated before the first counters come.
+            known = [row for row, tick in enumerate(ticks) if counter in tick.packets]
+            counts = np.array([ticks[row].packets[counter] for row in known], dtype=np.float64)
+            detector = self._counter_changes.setdefault(counter, ChangeDetector())
+            changed = detector.changed_rows(counts)
             if changed:
-                columns = [components.SCALARS.rows(counts[changed])]
-                yield ColumnBlock(layout.PACKETS, [known[at] for at in changed], columns)
+                rows = [known[at] for at in changed]
+                columns = [components.SCALARS.rows(counts[changed, None])]
+                yield ColumnBlock(layout.packet_entity(counter), rows, columns)
 
     def _reference_lines(self, last: int) -> Iterator[ColumnBlock]:
         """Yield the reference lines from the first to the last row."""
