@@ -133,9 +133,14 @@ class View:
         return self._vacant
 
     def is_spare(self, vertex: int) -> bool:
-        """Whether a vertex stays empty, for the team is too small to fill all that there are."""
-        place = self.map.vertex_places[vertex]
-        return place not in self.blocked and vertex not in self.map.led(self.total, self.blocked)
+        """Whether a vertex needs no leader, for the team is too small to fill all that there are.
+
+        The leader of one that is taken stands in its queue, unless the vertices need all members.
+        """
+        led = self.map.led(self.total, self.blocked)
+        if self.map.vertex_places[vertex] in self.blocked:
+            return 0 < self.total <= len(led)
+        return vertex not in led
 
     @property
     def wanted(self) -> tuple[int, ...]:

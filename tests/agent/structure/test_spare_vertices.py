@@ -65,3 +65,17 @@ partition = [[0], [1], [2], [3]]
     invariants = judge.invariants()
     assert invariants["I2"].ticks > 100
     assert invariants["I2"].violations == invariants["I6"].violations == 0
+
+
+def test_the_leader_of_a_vertex_that_a_dead_vehicle_takes_fills_another() -> None:
+    """Two agents left, V2 taken: they stand in V1 and V3."""
+    killed = """
+[[event]]
+at_s = 10.0
+kill = ["vertex:V2", "vertex:V4"]
+"""
+    text = FOUR_VERTICES.format(seed=3, left="V2", netem="").partition("[[event]]")[0]
+    judge = fly(parse(text + killed)).loop.judge
+    (recovery,) = judge.recoveries
+    assert recovery.reformed_s is not None
+    assert judge.invariants()["I2"].violations == 0
