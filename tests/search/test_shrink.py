@@ -39,6 +39,17 @@ def fails(tables: Tables) -> float | None:
     return 3.5 if killed and "radius_m" in tables["vehicle"] else None
 
 
+def test_a_fault_strikes_as_few_agents_as_do() -> None:
+    def struck(tables: Tables) -> float | None:
+        paused = [event["pause"] for event in tables.get("event", []) if "pause" in event]
+        return 3.5 if paused else None
+
+    event = [{"at_s": 1.0, "for_s": 1.0, "pause": ["random:3", "queue:Q1"]}]
+    small = shrunk(tomllib.loads(TOO_NEAR) | {"event": event}, struck)
+    assert small is not None
+    assert small["event"][0]["pause"] in (["random:1"], ["queue:Q1"])
+
+
 def test_only_what_makes_it_fail_is_left() -> None:
     small = shrunk(tomllib.loads(TOO_NEAR), fails)
     assert small is not None

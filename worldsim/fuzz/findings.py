@@ -16,6 +16,7 @@ from worldsim.fuzz.folder import (
     findings_in,
     read_finding,
 )
+from worldsim.fuzz.listed_start import with_listed_start
 from worldsim.fuzz.pages import page
 from worldsim.fuzz.probe import MarginProbe
 from worldsim.results.provenance import provenance
@@ -96,6 +97,7 @@ def shrink(folder: Path, hangar: Hangar, say: Say, budget: int = BUDGET) -> Row 
         return None
     flights = 0
     if first_s is not None:
+        tables, first_s = _listed(tables, first_s, file, name, hangar)
         shrinker = Shrinker(tables, first_s, timed=name in TIMED)
         while flights < budget and (batch := shrinker.batch(hangar.at_once)):
             found = _violations(batch, file, name, hangar)
@@ -114,6 +116,18 @@ def shrink(folder: Path, hangar: Hangar, say: Say, budget: int = BUDGET) -> Row 
     finding |= explanation(last, name, tables["duration_s"])
     keep(folder, finding)
     return finding
+
+
+def _listed(
+    tables: Tables, first_s: float, file: Path, name: str, hangar: Hangar
+) -> tuple[Tables, float]:
+    """Return tables with the start written out, and when they violate a property.
+
+    Those given, where the start is written out already or nothing is violated from there.
+    """
+    listed = with_listed_start(tables, loaded(as_toml(tables), file))
+    found_s = _violations([listed], file, name, hangar)[0] if listed is not None else None
+    return (tables, first_s) if listed is None or found_s is None else (listed, found_s)
 
 
 def _size(shrinker: Shrinker) -> str:

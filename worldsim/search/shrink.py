@@ -277,9 +277,25 @@ def _milder(tables: Tables, _: float | None) -> Iterator[Tables]:
             if isinstance(value, dict):
                 for inner in value:
                     yield _changed(tables, index, {key: _without(value, inner)})
-            if isinstance(value, list) and len(value) > 1 and key in ("kill", "leave", "pause"):
-                for each in value:
-                    yield _changed(tables, index, {key: [k for k in value if k != each]})
+                for fewer in _fewer_selected(value.get("agents")):
+                    yield _changed(tables, index, {key: {**value, "agents": fewer}})
+            if isinstance(value, list) and key in ("kill", "leave", "pause", "restart"):
+                for fewer in _fewer_selected(value):
+                    yield _changed(tables, index, {key: fewer})
+
+
+def _fewer_selected(selectors: Any) -> Iterator[list[Any]]:
+    """Yield selectors of fewer agents: without one of them, or of fewer at random."""
+    kept = selectors if isinstance(selectors, list) else []
+    for at, each in enumerate(kept):
+        others = kept[:at] + kept[at + 1 :]
+        if others:
+            yield others
+        kind, _, count = str(each).partition(":")
+        fewer = {1, int(count) // 2} if kind == "random" else {1} if kind == "all" else set[int]()
+        for number in sorted(fewer):
+            if number >= 1 and f"random:{number}" != each:
+                yield [*others, f"random:{number}"]
 
 
 def _briefer(tables: Tables, _: float | None) -> Iterator[Tables]:
