@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from shutil import copytree
 from typing import Any, Final
@@ -16,9 +17,9 @@ from worldsim.fuzz.folder import (
     findings_in,
     read_finding,
 )
-from worldsim.fuzz.listed_start import with_listed_start
 from worldsim.fuzz.pages import page
 from worldsim.fuzz.probe import MarginProbe
+from worldsim.fuzz.spelled_out import with_listed_start, with_named_agents
 from worldsim.results.provenance import provenance
 from worldsim.results.run_folder import write_json
 from worldsim.scenario.file import as_toml
@@ -97,7 +98,7 @@ def shrink(folder: Path, hangar: Hangar, say: Say, budget: int = BUDGET) -> Row 
         return None
     flights = 0
     if first_s is not None:
-        tables, first_s = _listed(tables, first_s, file, name, hangar)
+        tables, first_s = _spelled_out(tables, first_s, file, name, hangar)
         shrinker = Shrinker(tables, first_s, timed=name in TIMED)
         while flights < budget and (batch := shrinker.batch(hangar.at_once)):
             found = _violations(batch, file, name, hangar)
@@ -118,16 +119,25 @@ def shrink(folder: Path, hangar: Hangar, say: Say, budget: int = BUDGET) -> Row 
     return finding
 
 
-def _listed(
+def _spelled_out(
     tables: Tables, first_s: float, file: Path, name: str, hangar: Hangar
 ) -> tuple[Tables, float]:
-    """Return tables with the start written out, and when they violate a property.
+    """Return tables with what was drawn written out, and when they violate a property.
 
-    Those given, where the start is written out already or nothing is violated from there.
+    What does not violate it any more when it is written out stays as it was drawn.
     """
-    listed = with_listed_start(tables, loaded(as_toml(tables), file))
-    found_s = _violations([listed], file, name, hangar)[0] if listed is not None else None
-    return (tables, first_s) if listed is None or found_s is None else (listed, found_s)
+    scenario = loaded(as_toml(tables), file)
+    flown = hangar.measure("drawn", scenario)
+    rows = flown.events if flown is not None else ()
+    spells: tuple[Callable[[Tables], Tables], ...] = (
+        partial(with_named_agents, rows=rows),
+        partial(with_listed_start, scenario=scenario),
+    )
+    for spell in spells:
+        spelled = spell(tables)
+        if spelled != tables and (found_s := _violations([spelled], file, name, hangar)[0]):
+            tables, first_s = spelled, found_s
+    return tables, first_s
 
 
 def _size(shrinker: Shrinker) -> str:
