@@ -137,14 +137,14 @@ SENTENCES: list[tuple[dict[str, Any], str]] = [
             **{"kind": "partition", **NO_AGENT, "number": 1, "groups": [[0, 1], [2]]},
             **{"parted": "clean", "bridge": [], **SCHEDULED},
         },
-        "radio partitioned (clean): 0, 1 | 2 (scheduled)",
+        "radio partitioned (clean): a0, a1 | a2 (scheduled)",
     ),
     (
         {
             **{"kind": "partition", **NO_AGENT, "number": 1, "groups": [[0], [2]]},
             **{"parted": "bridge", "bridge": [3], **SCHEDULED},
         },
-        "radio partitioned (bridge): 0 | 2, bridged by 3 (scheduled)",
+        "radio partitioned (bridge): a0 | a2, bridged by a3 (scheduled)",
     ),
     ({"kind": "heal", **NO_AGENT, "number": 1, **SCHEDULED}, "partition healed (scheduled)"),
     ({"kind": "heal", **NO_AGENT, **BY_OPERATOR}, "all partitions healed (by the operator)"),
@@ -161,7 +161,7 @@ SENTENCES: list[tuple[dict[str, Any], str]] = [
             **{"kind": "flap", **NO_AGENT, "number": 3},
             **{"flap": {"period_s": 1.0, "links": [[0, 1]], "from_s": 1.0}, **SCHEDULED},
         },
-        "links flap with a period of 1 s: 0 -> 1 (scheduled)",
+        "links flap with a period of 1 s: a0 -> a1 (scheduled)",
     ),
     (
         {

@@ -146,8 +146,10 @@ def radio_sentence(event: RadioRunEvent) -> str:
     """Return what an event did to the radio, as a sentence."""
     match event:
         case Partitioned(groups=groups, parted=kind, bridge=bridge):
-            across = f", bridged by {_list(bridge)}" if bridge else ""
-            words = f"radio partitioned ({kind}): {' | '.join(map(_list, groups))}{across}"
+            sides = " | ".join(map(_agents, groups))
+            rest = " | all others" if len(groups) == 1 and not bridge else ""
+            across = f", bridged by {_agents(bridge)}" if bridge else ""
+            words = f"radio partitioned ({kind}): {sides}{rest}{across}"
         case Healed(number=number):
             words = "all partitions healed" if number is None else "partition healed"
         case Jammed(jam=Jam() as jam):
@@ -155,7 +157,7 @@ def radio_sentence(event: RadioRunEvent) -> str:
         case Jammed():
             words = "jam ended"
         case Flapped(flap=FlapWindow() as flap):
-            links = ", ".join(f"{source} -> {to}" for source, to in flap.links) or "all links"
+            links = ", ".join(f"a{source} -> a{to}" for source, to in flap.links) or "all links"
             words = f"links flap with a period of {flap.period_s:g} s: {links}"
         case Flapped():
             words = "flapping links restored"
@@ -315,6 +317,10 @@ def _dotted(table: dict[str, Any], prefix: str) -> Iterator[tuple[str, str]]:
             yield from _dotted(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _agents(ids: Sequence[int]) -> str:
+    return ", ".join([f"a{each}" for each in ids])
 
 
 def _list(values: Sequence[object]) -> str:
