@@ -18,7 +18,7 @@ from worldsim.sweep.figures import INK, MAP, _readable
 from worldsim.sweep.journal import Journal, read_sweep
 from worldsim.sweep.result import breaks_of, cells_of
 
-CORPUS = Path(__file__).parents[1] / "fuzz" / "corpus" / "blind-and-left-alone"
+FINDING = Path(__file__).parent / "a_finding"
 SEEDS = 6
 
 
@@ -72,7 +72,7 @@ def test_the_report_of_a_sweep_that_goes_on_says_what_is_missing(tmp_path: Path)
 @pytest.fixture(scope="module")
 def finding(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("found") / "blind"
-    shutil.copytree(CORPUS, folder)
+    shutil.copytree(FINDING, folder)
     return folder
 
 
@@ -98,7 +98,7 @@ def test_the_report_of_a_finding_explains_it(finding: Path) -> None:
 
 def test_a_finding_that_is_not_explained_yet_has_a_page_too(tmp_path: Path) -> None:
     folder = tmp_path / "new"
-    shutil.copytree(CORPUS, folder)
+    shutil.copytree(FINDING, folder)
     known = json.loads((folder / "finding.json").read_text())
     for key in ("cause", "events", "margins"):
         del known[key]
@@ -149,7 +149,7 @@ def test_what_cannot_be_reported_is_refused(
     kind: str, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "folder"
-    shutil.copytree(CORPUS, folder / "findings" / "one")
+    shutil.copytree(FINDING, folder / "findings" / "one")
     arguments = {
         "empty": [folder / "findings"],
         "search": [folder],
