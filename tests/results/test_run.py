@@ -155,7 +155,7 @@ def test_events_are_those_of_the_folder(folder: Path, whole: Run) -> None:
         for row in events.numpy()
     ]
     assert again == lines
-    assert "a0 takes slot 1 of queue Q" in events["text"].tolist()
+    assert "a0 takes slot 1 of queue Q1" in events["text"].tolist()
 
 
 def test_a_role_holds_from_its_event_on(whole: Run) -> None:

@@ -93,7 +93,7 @@ class Flood:
 
 def run(attack: Attack, row: "memoryview[int]") -> int:
     """Attack until this process is killed. Returns 1 where it cannot, after saying why."""
-    os.nice(NICENESS)
+    os.setpriority(os.PRIO_PROCESS, 0, max(NICENESS, os.getpriority(os.PRIO_PROCESS, 0)))
     try:
         with ExitStack() as sessions:
             puts = _insider(attack, sessions) if attack.agents else _outsider(attack)

@@ -54,7 +54,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, _end)
     # In a process group of its own, it may print to a terminal all the same.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
-    os.nice(LOWEST_PRIORITY)
+    os.setpriority(os.PRIO_PROCESS, 0, LOWEST_PRIORITY)
     # Whatever wakes up in the run interrupts it at once.
     os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     feeder = Feeder(feed)
