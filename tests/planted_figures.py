@@ -30,7 +30,7 @@ from tests.planted_bugs import (
 )
 from worldsim.campaign.flight_site import LocalSite, Order
 from worldsim.fuzz.cause import find_cause
-from worldsim.fuzz.findings import begin, shrink
+from worldsim.fuzz.findings import begin, flights_for, shrink
 from worldsim.fuzz.flights import WORK, Hangar, Task
 from worldsim.fuzz.folder import SCENARIO, Row, read_finding
 from worldsim.fuzz.fuzz import Drawn, drawn, generations, row_of, task_of
@@ -72,8 +72,8 @@ class Bench:
     def row(self, name: str, trial: Drawn) -> Row:
         """Return what a trial showed with a bug planted; without one for an empty name."""
         text = trial.trial.text.partition("\n")[2]  # without its name
-        twice = task_of(trial).twice
-        key = sha256(f"{name} {twice} {text}".encode()).hexdigest()
+        flights = task_of(trial).flights
+        key = sha256(f"{name} {flights} {text}".encode()).hexdigest()
         if key not in self._rows:
             self.say(f"{name or 'no bug'}: seed {trial.seed}; {len(self._rows)} flights")
             with planted(name):
@@ -154,8 +154,9 @@ def find(bench: Bench, names: list[str], seeds: range, budget: int) -> bool:
 def violated(bench: Bench, folder: Path, name: str) -> list[str]:
     """Return what a finding's scenario violates with a bug planted; without one for no name."""
     scenario = loaded((folder / SCENARIO).read_text("utf-8"), BESIDE)
+    flights = flights_for(read_finding(folder)["property"])
     with planted(name):
-        (flown,) = bench.hangar.fly([Task("replay", scenario, twice=name == "unkeyed_draw")])
+        (flown,) = bench.hangar.fly([Task("replay", scenario, flights=flights)])
     return [key for key, margin in flown.margins.items() if margin < 0.0]
 
 

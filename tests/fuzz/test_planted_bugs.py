@@ -58,7 +58,7 @@ def test_an_unkeyed_draw_shows_in_a_second_flight(
     site: LocalSite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lossy = f"{FAR}\n[netem]\nloss_percent = 30.0\n"
-    task = Task("it", loaded(lossy, BESIDE), twice=True)
+    task = Task("it", loaded(lossy, BESIDE), flights=2)
     (kept,) = Hangar(site, StopRequest()).fly([task])
     PLANTS["unkeyed_draw"](monkeypatch)
     (other,) = Hangar(site, StopRequest()).fly([task])

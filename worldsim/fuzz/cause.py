@@ -11,7 +11,7 @@ from math import ceil
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from worldsim.fuzz.findings import REPEAT, TIMED, keep
+from worldsim.fuzz.findings import TIMED, flights_for, keep
 from worldsim.fuzz.flights import Hangar, Task
 from worldsim.fuzz.folder import SCENARIO, Row, read_finding
 from worldsim.fuzz.probe import Redraw
@@ -133,7 +133,7 @@ class _Prober:
         return loaded(text, self._file)
 
     def _task(self, name: str, scenario: Scenario, probe: Redraw | None = None) -> Task:
-        return Task(name, scenario, probe, twice=self.finding["property"] == REPEAT)
+        return Task(name, scenario, probe, flights_for(self.finding["property"]))
 
     def _failed(self, tasks: list[Task]) -> int:
         name, found = self.finding["property"], list(self._hangar.fly(tasks))

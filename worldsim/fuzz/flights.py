@@ -38,8 +38,8 @@ class Task(NamedTuple):
     name: str
     scenario: Scenario
     probe: FlightProbe | None = None
-    twice: bool = False
-    """Whether it is flown twice, to compare the traces."""
+    flights: int = 1
+    """How often it is flown; the traces are compared."""
 
 
 class Hangar(NamedTuple):
@@ -55,16 +55,13 @@ class Hangar(NamedTuple):
         """
         tasks_of = {task.name: task for task in tasks}
         orders = [order for task in tasks_of.values() for order in _orders(task)]
-        before: dict[str, Flown] = {}
+        made: dict[str, list[Flown]] = {name: [] for name in tasks_of}
         for shown in self.site.fly(orders, self.stop) if orders else ():
-            task = tasks_of[shown.key.removesuffix(AGAIN)]
-            flown = _flown(shown, task)
-            if not task.twice:
-                yield flown
-            elif task.name in before:
-                yield _compared(before.pop(task.name), flown)
-            else:
-                before[task.name] = flown
+            task = tasks_of[shown.key.partition(AGAIN)[0]]
+            flights = made[task.name]
+            flights.append(_flown(shown, task))
+            if len(flights) == task.flights:
+                yield _compared(flights)
 
     @property
     def at_once(self) -> int:
@@ -82,8 +79,8 @@ class Hangar(NamedTuple):
 
 def _orders(task: Task) -> Iterator[Order]:
     wanted = (MARGINS_FILE, EVENTS_FILE) if isinstance(task.probe, MarginProbe) else ()
-    for end in ("", AGAIN) if task.twice else ("",):
-        yield Order(f"{task.name}{end}", task.scenario, task.probe, wanted)
+    for number in range(task.flights):
+        yield Order(f"{task.name}{number * AGAIN}", task.scenario, task.probe, wanted)
 
 
 def _flown(shown: Shown, task: Task) -> Flown:
@@ -98,9 +95,13 @@ def _flown(shown: Shown, task: Task) -> Flown:
     return flown._replace(measured=json.loads(shown.files[MARGINS_FILE]), events=events)
 
 
-def _compared(one: Flown, other: Flown) -> Flown:
-    """Return what a flight showed, and whether it showed the same twice."""
-    return one._replace(margins=of_repetition(one.margins, one.trace == other.trace))
+def _compared(flights: list[Flown]) -> Flown:
+    """Return what a flight showed, and whether any repetition showed the same."""
+    one, *others = flights
+    if not others:
+        return one
+    same = any(one.trace == other.trace for other in others)
+    return one._replace(margins=of_repetition(one.margins, same))
 
 
 def violated_s(flown: Flown, scenario: Scenario, name: str) -> float | None:

@@ -165,7 +165,8 @@ def drawn(terms: Terms, beside: Path, seed: int, guide: Guide | None) -> Drawn:
 def task_of(drawn: Drawn) -> Task:
     """Return the flight of a seed."""
     probe = MarginProbe(drawn.scenario)
-    return Task(str(drawn.seed), drawn.scenario, probe, twice=drawn.seed % TWICE_EVERY == 0)
+    flights = 2 if drawn.seed % TWICE_EVERY == 0 else 1
+    return Task(str(drawn.seed), drawn.scenario, probe, flights)
 
 
 def _in_order(scenario: Scenario, flown: Flown) -> list[str]:

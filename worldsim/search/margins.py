@@ -53,7 +53,7 @@ def of_error() -> Margins:
 
 
 def of_repetition(margins: Margins, same: bool) -> Margins:
-    """Return the margins of a flight that was flown twice. same: whether the traces are equal."""
+    """Return the margins of a flight that was repeated. same: whether the traces are equal."""
     return {**margins, "repeat": 1.0 if same else -1.0}
 
 
