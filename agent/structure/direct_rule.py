@@ -175,9 +175,13 @@ class DirectRule:
         if claim.number > 0 and now_s - claim.since_s < view.timing.hold_s:
             return
         place = self._assigned(view, claim, self.heard)
-        # Who is to stand in a vertex without a leader takes the lead instead.
-        if place is not None and place not in view.map.vertex_of:
+        if place is None:
+            return
+        if place not in view.map.vertex_of:
             self._take(view, claim, place)
+        elif claim.number > 0:
+            # It will take the lead of this vertex; the own number is another's already.
+            claim.give_up(place.queue, now_s)
 
     def _is_all(self, view: View) -> bool:
         """Whether those heard are the team: as the leader says, or since the others are lost."""

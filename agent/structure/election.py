@@ -94,6 +94,14 @@ class Election:
         self, view: View, claim: Claim, tree: Tree, vertex: int, direct: DirectRule | None
     ) -> bool:
         now_s, timing = view.now_s, view.timing
+        silent_s = now_s - tree.advanced_s
+        if (
+            direct is not None
+            and claim.ranked
+            and silent_s > timing.lost_s
+            and direct.succeeds(view, claim, vertex)
+        ):
+            return True
         if claim.number < 1:
             listen_s = timing.listen_s if view.heard else ALONE_S
             if view.map.vertices > 1:
@@ -104,10 +112,8 @@ class Election:
             return now_s - began_s >= listen_s and self._is_nearest(view, vertex)
         wait_s = timing.lost_s + self._turn_s(view, claim, vertex)
         if direct is not None:
-            if now_s - tree.advanced_s > timing.lost_s and direct.succeeds(view, claim, vertex):
-                return True
             wait_s += TURN_S + TURN_LATENCIES * timing.latency_s
-        return now_s - tree.advanced_s > wait_s and self._is_first(view, claim, vertex)
+        return silent_s > wait_s and self._is_first(view, claim, vertex)
 
     def _is_nearest(self, view: View, vertex: int) -> bool:
         """Whether no agent heard is nearer to the vertex and may lead it."""

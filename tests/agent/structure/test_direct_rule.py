@@ -144,6 +144,15 @@ def test_those_left_close_up_while_nobody_leads_the_vertex_yet():
     assert (flight.claim.number, flight.claim.leads) == (2, False)
 
 
+def test_who_is_to_lead_a_vertex_gives_its_number_up_at_once():
+    """The assignment gives that number to another one, which takes it now."""
+    flight = Flight()
+    assert flight.run(1.0, neighbours(4, 4, 4))
+    left = [heard(k, (-9.0 - k, 0.0, 0.0), LINE.place(0, k), heard=3) for k in (1, 2)]
+    flight.run(2.0, left, [None])
+    assert (flight.claim.number, flight.claim.queue, flight.claim.leads) == (0, 0, False)
+
+
 def test_a_leader_whose_vertex_is_taken_shares_the_queues_with_the_others():
     """It may stand in a place that the layout has not; then the others have one too many."""
     at = {1: (-2.0, -2.0, 0.0), 2: (-1.0, 1.0, 0.0), 3: (-1.2, 1.2, 0.0)}
