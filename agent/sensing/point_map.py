@@ -5,8 +5,8 @@ some seconds, and a point that a later ray passes through: vehicles move on and 
 """
 
 from array import array
-from collections.abc import Iterable, Sequence
-from math import atan2, hypot, pi
+from collections.abc import Sequence
+from math import atan2, cos, hypot, inf, pi, sqrt
 from typing import Final
 
 from agent.messages import NO_ECHO_MM, PROXIMITY_RANGE_M, Scan, Vector
@@ -22,7 +22,7 @@ PASSED_M: Final = 0.3
 MISSES: Final = 2
 """So many rays without an echo show it too; a single one may be a dropout."""
 NEIGHBOUR_RADIUS_M: Final = 0.3
-"""A point nearer than this to a neighbour's reported position belongs to that neighbour."""
+"""An echo that may come from nearer than this to a neighbour's reported position is its echo."""
 
 Cube = tuple[int, int, int]
 
@@ -63,9 +63,13 @@ class PointMap:
         axes = turned(pattern.axes, yaw)
         if pattern.grid is not None:
             self._clear_passed(pattern.grid, ranges, pattern.range_m, here, yaw)
+        x, y, z = here
+        near = [(u - x, v - y, w - z) for u, v, w in others]
         for axis, millimetres in zip(axes, ranges, strict=True):
             if millimetres != NO_ECHO_MM:
-                self._add_echo(axis, 0.001 * millimetres, here, now_s, others)
+                away_m = 0.001 * millimetres
+                if not _is_of_any(near, axis, away_m, pattern.half):
+                    self._add_point(here, axis, away_m, now_s)
 
     def near_points(self, here: Vector, now_s: float) -> tuple[Vector, ...]:
         """Return the points within PROXIMITY_RANGE_M of a position, nearest first.
@@ -84,14 +88,8 @@ class PointMap:
         found.sort()
         return tuple(relative for _, relative in found[:MAX_NEAR_POINTS])
 
-    def _add_echo(
-        self, axis: Vector, away_m: float, here: Vector, now_s: float, others: Iterable[Vector]
-    ) -> None:
+    def _add_point(self, here: Vector, axis: Vector, away_m: float, now_s: float) -> None:
         x, y, z = (p + away_m * a for p, a in zip(here, axis, strict=True))
-        square = NEIGHBOUR_RADIUS_M * NEIGHBOUR_RADIUS_M
-        for u, v, w in others:
-            if (x - u) ** 2 + (y - v) ** 2 + (z - w) ** 2 < square:
-                return
         cube = (round(x / CUBE_M), round(y / CUBE_M), round(z / CUBE_M))
         if cube in self._points or len(self._points) < MAX_POINTS:
             self._points[cube] = MapPoint((x, y, z), now_s)
@@ -119,6 +117,32 @@ class PointMap:
                 gone.append(cube)
         for cube in gone:
             del self._points[cube]
+
+
+def _is_of_any(near: Sequence[Vector], axis: Vector, away_m: float, half: float) -> bool:
+    """Whether an echo may be a neighbour's: a beam does not say from where in it an echo comes.
+
+    near: the neighbours' positions, relative [m; world axes]. half: half the beam's angle [rad].
+    """
+    misses_m = [_miss_m(point, axis, away_m, half) for point in near]
+    return min(misses_m, default=inf) < NEIGHBOUR_RADIUS_M
+
+
+def _miss_m(point: Vector, axis: Vector, away_m: float, half: float) -> float:
+    """Return how far a point is from where an echo may come from, in the beam and so far away [m].
+
+    Exact where that is less than NEIGHBOUR_RADIUS_M, else too small.
+    """
+    u, v, w = point
+    square = u * u + v * v + w * w
+    point_m = sqrt(square)
+    short_m = abs(point_m - away_m)
+    if short_m >= NEIGHBOUR_RADIUS_M:
+        return short_m
+    ahead_m = u * axis[0] + v * axis[1] + w * axis[2]
+    off_axis = atan2(sqrt(max(0.0, square - ahead_m * ahead_m)), ahead_m)
+    off_beam = max(0.0, off_axis - half)
+    return sqrt(short_m * short_m + 2.0 * point_m * away_m * (1.0 - cos(off_beam)))
 
 
 def _passed(point: MapPoint, millimetres: int, away_m: float) -> bool:

@@ -38,6 +38,7 @@ class Pattern(NamedTuple):
     beams: tuple[tuple[Vector, ...], ...]  # the rays about each axis, unit vectors [body frame]
     range_m: float  # [m]
     every: int  # period of the scans [ticks]
+    half: float = 0.0  # half the angle of each beam [rad]; 0: a single ray
     grid: Grid | None = None  # layout of a laser's rays
 
 
@@ -62,6 +63,7 @@ def _sonar_pattern(sonar: Sonar, tick_hz: float) -> Pattern:
         beams=tuple(_beam(axis, half) for axis in axes),
         range_m=sonar.range_m,
         every=_every(sonar.rate_hz, tick_hz),
+        half=half,
     )
 
 

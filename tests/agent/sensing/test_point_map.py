@@ -1,11 +1,11 @@
 """The point map: points stay for a while, and go when a ray passes through them."""
 
 from array import array
-from math import hypot, pi
+from math import cos, hypot, pi, radians, sin
 
 import pytest
 
-from agent.config import Sensors
+from agent.config import SCANNERS, Sensors, Sonar
 from agent.messages import NO_ECHO_MM, Scan
 from agent.sensing.point_map import KEPT_S, MAX_NEAR_POINTS, PointMap
 from agent.sensing.ray_pattern import pattern_of
@@ -13,6 +13,7 @@ from agent.sensing.ray_pattern import pattern_of
 SENSORS = Sensors(coverage="planar")
 ORIGIN = (0.0, 0.0, 0.0)
 AHEAD = 30
+SONAR = SCANNERS.index("sonar")
 
 
 def scan(**metres):
@@ -71,6 +72,32 @@ def test_a_neighbour_is_no_obstacle():
     known = points()
     known.add_scan(scan(r30=1.5), ORIGIN, 0.0, 0.0, others=[(1.6, 0.1, 0.0)])
     assert len(known) == 0
+
+
+@pytest.mark.parametrize(
+    ("beam_deg", "off_deg", "is_neighbour"),
+    [(60.0, 28.0, True), (60.0, 40.0, True), (60.0, 60.0, False), (10.0, 28.0, False)],
+)
+def test_an_echo_of_a_wide_beam_is_a_neighbours_anywhere_in_the_beam(
+    beam_deg: float, off_deg: float, is_neighbour: bool
+) -> None:
+    """The echo is 1.5 m ahead on the axis, the neighbour as far off beside it."""
+    sonar = Sonar(ring=8, beam_deg=beam_deg)
+    known = PointMap([pattern_of("sonar", Sensors(sonar=sonar), 20.0)])
+    echoes = array("H", [NO_ECHO_MM] * 10)
+    echoes[0] = 1500
+    there = (1.5 * cos(radians(off_deg)), 1.5 * sin(radians(off_deg)), 0.0)
+    known.add_scan(Scan(kind=SONAR, ranges=echoes.tobytes()), ORIGIN, 0.0, 0.0, others=[there])
+    assert len(known) == (0 if is_neighbour else 1)
+
+
+def test_a_wide_beam_shows_an_obstacle_in_front_of_a_neighbour() -> None:
+    known = PointMap([pattern_of("sonar", Sensors(sonar=Sonar(ring=8, beam_deg=60.0)), 20.0)])
+    echoes = array("H", [NO_ECHO_MM] * 10)
+    echoes[0] = 1100
+    scan = Scan(kind=SONAR, ranges=echoes.tobytes())
+    known.add_scan(scan, ORIGIN, 0.0, 0.0, others=[(1.5, 0.0, 0.0)])
+    assert len(known) == 1
 
 
 def test_of_many_points_the_nearest_are_returned():
