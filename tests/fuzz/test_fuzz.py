@@ -27,8 +27,8 @@ from worldsim.search.drafts import cautions, loaded
 from worldsim.search.trials import Terms
 
 SEEDS = range(2, 3)
-CORPUS = Path(__file__).parent / "corpus"
-"""What is known to fail, each with its cause."""
+CORPUS, MENDED = (Path(__file__).parent / name for name in ("corpus", "mended"))
+"""What is known to fail, and what failed once."""
 HUNTERS = """
 name = "hunters"
 [fleet]
@@ -215,9 +215,11 @@ def test_the_trouble_of_a_time_that_runs_out_is_where_progress_ends() -> None:
     assert trouble_of({**stands, "first_s": {"I4": 2.5}}, "I4", 60.0) == 2.5
 
 
-def test_the_findings_of_the_corpus_still_fail(tmp_path: Path) -> None:
-    """One that is mended shows as fixed: then it leaves the corpus."""
+@pytest.mark.parametrize(("folder", "state"), [(CORPUS, "known"), (MENDED, "fixed")])
+def test_findings_of_the_corpus_still_fail_and_mended_ones_do_not(
+    folder: Path, state: str, tmp_path: Path
+) -> None:
     with stop_requests() as stop:
-        states = refly(CORPUS, hangar(tmp_path, stop), lambda _: None)
-    assert states == dict.fromkeys(states, "known")
-    assert len(states) == len(list(CORPUS.iterdir()))
+        states = refly(folder, hangar(tmp_path, stop), lambda _: None)
+    assert states == dict.fromkeys(states, state)
+    assert len(states) == len(list(folder.glob("*/scenario.toml")))
