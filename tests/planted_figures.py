@@ -30,10 +30,11 @@ from tests.planted_bugs import (
 )
 from worldsim.campaign.flight_site import LocalSite, Order
 from worldsim.fuzz.cause import find_cause
-from worldsim.fuzz.findings import begin, flights_for, shrink
+from worldsim.fuzz.findings import begin, flights_for
 from worldsim.fuzz.flights import WORK, Hangar, Task
 from worldsim.fuzz.folder import SCENARIO, Row, read_finding
 from worldsim.fuzz.fuzz import Drawn, drawn, generations, row_of, task_of
+from worldsim.fuzz.shrinking import shrink
 from worldsim.results.progress_line import ProgressLine
 from worldsim.search.drafts import loaded
 from worldsim.search.guide import Guide

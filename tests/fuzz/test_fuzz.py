@@ -21,6 +21,7 @@ from worldsim.fuzz.flights import Hangar
 from worldsim.fuzz.folder import SearchFolder, read_finding
 from worldsim.fuzz.fuzz import Search, fuzz
 from worldsim.fuzz.pages import curve
+from worldsim.fuzz.probe import Rest
 from worldsim.results.exit_status import BAD_INPUT, FAIL, INCONCLUSIVE, PASS
 from worldsim.results.run_folder import RunDirectoryError
 from worldsim.search.drafts import cautions, loaded
@@ -204,6 +205,18 @@ def test_a_finding_is_explained_before_it_is_made_small(tmp_path: Path) -> None:
     assert "slot_error_m" in page
     begin(tmp_path, SMALL, {**row, "violated": ["error"]}, flown._replace(measured=None))
     assert "First tick of trouble: not known." in (tmp_path / "finding.md").read_text()
+
+
+def test_a_flight_tells_since_when_all_vehicles_stand_still() -> None:
+    rest = Rest()
+    for tick in range(10):
+        x = min(0.2 * tick, 1.0)  # it flies for five ticks
+        rest.see([(x, 0.0, 0.0), None], 0.1 * tick)
+    assert rest.since_s == pytest.approx(0.5)
+    rest.see([(1.0, 0.0, 0.04), None], 1.0)
+    assert rest.since_s == pytest.approx(0.5)
+    rest.see([(1.0, 0.0, 0.04), (0.0, 0.0, 0.0)], 1.1)
+    assert rest.since_s == pytest.approx(1.1), "one that joins"
 
 
 def test_the_trouble_of_a_time_that_runs_out_is_where_progress_ends() -> None:

@@ -8,7 +8,8 @@ from tests.random_flights.generate import objection, scenario
 from tests.random_flights.shrink import flies
 from worldsim.scenario.file import as_toml
 from worldsim.search.draws import Tables
-from worldsim.search.shrink import Shrinker, Size, shrunk, tidy
+from worldsim.search.shrink import Shrinker, Size, limit_s, quiet_from_s, shrunk, tidy
+from worldsim.search.trials import fair_s
 
 TOO_NEAR = """
 duration_s = 30.0
@@ -85,6 +86,31 @@ def test_a_violation_that_shows_at_the_end_is_looked_for_earlier() -> None:
     small = shrunk(tomllib.loads(TOO_NEAR), parts)
     assert small is not None
     assert 2.0 < small["duration_s"] <= 4.0
+
+
+def test_a_time_limit_stays_fair_unless_it_is_certain_that_more_time_does_not_help() -> None:
+    """The team comes to rest 9 s after the last event, as long as three agents are there."""
+
+    def stuck(tables: Tables) -> float | None:
+        allowed_s = limit_s(tables)
+        assert allowed_s is not None
+        if tables["fleet"]["agents"] < 3:
+            return None
+        certain_s = quiet_from_s(tables) + 9.0
+        return certain_s if rests and certain_s <= tables["duration_s"] else tables["duration_s"]
+
+    tables = tomllib.loads(TOO_NEAR) | {"duration_s": 100.0}
+    tables["expect"] = {"converge_within_s": 80.0, "reform_within_s": 80.0, "converge": True}
+    for rests in (True, False):
+        small = shrunk(tables, stuck, timed=True)
+        assert small is not None
+        allowed_s = 9.0 if rests else fair_s(small)
+        assert small["expect"] == {
+            "converge_within_s": allowed_s,
+            "reform_within_s": allowed_s,
+            "converge": True,
+        }
+        assert Size.of(small) == (0, 3, allowed_s + 3.0)
 
 
 def test_the_batch_size_changes_no_result() -> None:

@@ -1,13 +1,12 @@
-"""Findings: a failing seed kept as a scenario, made smaller within a budget, and explained."""
+"""Findings: a failing seed kept as a scenario, explained, and flown again in later versions."""
 
 import tomllib
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from shutil import copytree
 from typing import Any, Final
 
-from worldsim.fuzz.flights import Flown, Hangar, Task, violated_s
+from worldsim.fuzz.flights import Flown, Hangar, Task
 from worldsim.fuzz.folder import (
     FINDING,
     ORIGINAL,
@@ -18,16 +17,13 @@ from worldsim.fuzz.folder import (
     read_finding,
 )
 from worldsim.fuzz.pages import page
-from worldsim.fuzz.probe import MarginProbe
-from worldsim.fuzz.spelled_out import with_listed_start, with_named_agents
 from worldsim.results.provenance import provenance
 from worldsim.results.run_folder import write_json
-from worldsim.scenario.file import as_toml
 from worldsim.scenario.tables import CONVERGED_M
 from worldsim.scenario.toml import ScenarioError
-from worldsim.search.drafts import cautions, loaded, objection
+from worldsim.search.drafts import loaded
 from worldsim.search.draws import Tables
-from worldsim.search.shrink import Shrinker, Size, tidy
+from worldsim.search.shrink import Size
 
 TIMED: Final = ("converge", "reform")
 """Properties that are violated where a time runs out."""
@@ -37,8 +33,6 @@ REPEAT: Final = "repeat"
 REPETITIONS: Final = 5
 """How often a finding of REPEAT is flown: it counts where no flight repeats the first, so that a
 difference that only shows by chance does not pass for a smaller scenario."""
-BUDGET: Final = 150
-"""Flights that shrink one finding at most."""
 POINTS: Final = 240
 """How many values of each margin a finding keeps at most."""
 EVENTS: Final = 8
@@ -89,83 +83,9 @@ def signature(name: str, tables: Tables) -> str:
     return " ".join([name, *sorted(kinds)])
 
 
-def shrink(folder: Path, hangar: Hangar, say: Say, budget: int = BUDGET) -> Row | None:
-    """Make a finding's scenario smaller, and explain it; None where a stop was requested.
-
-    A finding that cannot be replayed stays as it is.
-    """
-    finding, file = read_finding(folder), folder / SCENARIO
-    name, tables = finding["property"], tomllib.loads(file.read_text(encoding="utf-8"))
-    first_s = _violations([tables], file, name, hangar)[0]
-    if hangar.stopped():
-        return None
-    flights = 0
-    if first_s is not None:
-        tables, first_s = _spelled_out(tables, first_s, file, name, hangar)
-        shrinker = Shrinker(tables, first_s, timed=name in TIMED)
-        while flights < budget and (batch := shrinker.batch(hangar.at_once)):
-            found = _violations(batch, file, name, hangar)
-            if hangar.stopped():
-                return None
-            flights += len(batch)
-            if shrinker.take(zip(batch, found, strict=True)):
-                file.write_text(as_toml(tidy(shrinker.smallest)), encoding="utf-8")
-            say(f"shrinking {folder.name}: {flights} of {budget} flights, {_size(shrinker)}")
-        tables = tidy(shrinker.smallest)
-    finding |= {"shrunk": True, "shrink_flights": flights, "size": Size.of(tables)._asdict()}
-    finding["signature"] = signature(name, tables)
-    last = hangar.measure("last", loaded(as_toml(tables), file))
-    if last is None:
-        return None
-    finding |= explanation(last, name, tables["duration_s"])
-    keep(folder, finding)
-    return finding
-
-
-def _spelled_out(
-    tables: Tables, first_s: float, file: Path, name: str, hangar: Hangar
-) -> tuple[Tables, float]:
-    """Return tables with what was drawn written out, and when they violate a property.
-
-    What does not violate it any more when it is written out stays as it was drawn.
-    """
-    scenario = loaded(as_toml(tables), file)
-    flown = hangar.measure("drawn", scenario)
-    rows = flown.events if flown is not None else ()
-    spells: tuple[Callable[[Tables], Tables], ...] = (
-        partial(with_named_agents, rows=rows),
-        partial(with_listed_start, scenario=scenario),
-    )
-    for spell in spells:
-        spelled = spell(tables)
-        if spelled != tables and (found_s := _violations([spelled], file, name, hangar)[0]):
-            tables, first_s = spelled, found_s
-    return tables, first_s
-
-
 def flights_for(name: str) -> int:
     """Return how often a scenario is flown that may violate a property."""
     return REPETITIONS if name == REPEAT else 1
-
-
-def _size(shrinker: Shrinker) -> str:
-    size = Size.of(shrinker.smallest)
-    return f"{size.faults} faults, {size.agents} agents, {size.duration_s:g} s"
-
-
-def _violations(batch: list[Tables], file: Path, name: str, hangar: Hangar) -> list[float | None]:
-    """Return when each candidate violates a property; None where it does not or cannot fly."""
-    tasks, allowed = [], cautions(loaded(file.read_text(encoding="utf-8"), file))
-    for number, tables in enumerate(batch):
-        text = as_toml(tidy(tables))
-        if not objection(text, file, allowed):
-            scenario = loaded(text, file)
-            tasks.append(Task(str(number), scenario, MarginProbe(scenario), flights_for(name)))
-    found: list[float | None] = [None] * len(batch)
-    scenarios = {task.name: task.scenario for task in tasks}
-    for flown in hangar.fly(tasks):
-        found[int(flown.name)] = violated_s(flown, scenarios[flown.name], name)
-    return found
 
 
 def explanation(flown: Flown, name: str, duration_s: float) -> Row:
@@ -182,7 +102,9 @@ def explanation(flown: Flown, name: str, duration_s: float) -> Row:
         "trouble_s": trouble_s,
         "last_event": faults[-1] if faults else None,
         "events": before[-EVENTS:],
-        "margins": {name: thinned(rows) for name, rows in measured.items() if name != "first_s"},
+        "margins": {
+            name: thinned(rows) for name, rows in measured.items() if isinstance(rows, list)
+        },
         "trace_sha256": flown.trace,
     }
 

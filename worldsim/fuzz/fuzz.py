@@ -13,11 +13,12 @@ from typing import Any, Final, NamedTuple
 
 from netem.wire.shutdown import stop_requests
 from worldsim.campaign.flight_site import FlightSite, SiteError
-from worldsim.fuzz.findings import BUDGET, begin, refly, shrink, take_in
+from worldsim.fuzz.findings import begin, refly, take_in
 from worldsim.fuzz.flights import Flown, Hangar, Task, violated_s
 from worldsim.fuzz.folder import TABLE, Row, SearchFolder, findings_in, read_finding
 from worldsim.fuzz.pages import closing, table
 from worldsim.fuzz.probe import MarginProbe
+from worldsim.fuzz.shrinking import BUDGET, shrink
 from worldsim.results.exit_status import FAIL, INCONCLUSIVE, INTERRUPTED, INTERRUPTION, PASS
 from worldsim.results.progress_line import ProgressLine
 from worldsim.scenario.tables import Scenario

@@ -51,14 +51,15 @@ class Size(NamedTuple):
 class Shrinker:
     """Makes tables smaller that violate a property.
 
-    violated_s: when they do [s; simulated time]. timed: whether the property is a time limit, which
-    stays as long as is fair.
+    violated_s: when they do [s; simulated time]. timed: whether the property is a time limit; then
+    that is when it is certain that more time does not help.
     """
 
     def __init__(self, tables: Tables, violated_s: float, timed: bool) -> None:
         self.smallest = tables
         """The smallest tables so far that violate the property."""
-        self._violated_s, self._timed = violated_s, timed
+        self._violated_s = violated_s
+        self._passes = PASSES_OF_A_LIMIT if timed else PASSES
         self._tried = {_key(tables)}
         self._pass = self._idle = 0
         self._candidates = self._of_pass()
@@ -66,7 +67,7 @@ class Shrinker:
     def batch(self, count: int) -> list[Tables]:
         """Return up to ``count`` candidates, the first to be preferred; none: it is smallest."""
         found: list[Tables] = []
-        while len(found) < count and self._idle < len(PASSES):
+        while len(found) < count and self._idle < len(self._passes):
             candidate = next(self._candidates, None)
             if candidate is None:
                 if found:
@@ -93,8 +94,7 @@ class Shrinker:
         return False
 
     def _of_pass(self) -> Iterator[Tables]:
-        make = PASSES[self._pass % len(PASSES)]
-        return make(self.smallest, None if self._timed else self._violated_s)
+        return self._passes[self._pass % len(self._passes)](self.smallest, self._violated_s)
 
 
 def shrunk(
@@ -119,28 +119,46 @@ def tidy(tables: Tables) -> Tables:
     return {key: value for key, value in tables.items() if value not in ([], {}, None)}
 
 
-def _shorter(tables: Tables, violated_s: float | None) -> Iterator[Tables]:
-    """Yield tables that end soon after the violation, or after the time that is fair.
+def limit_s(tables: Tables) -> float | None:
+    """Return the time in which the team is to form its formation [s]; None for no limit."""
+    found: float | None = (tables.get("expect") or {}).get("converge_within_s")
+    return found
+
+
+def _shorter(tables: Tables, violated_s: float) -> Iterator[Tables]:
+    """Yield tables that end soon after the violation.
 
     A violation at the very end may have shown earlier: two flights may part at any time.
     """
-    if violated_s is not None:
-        at_end = violated_s >= tables["duration_s"]
-        shares = (0.05, 0.1, 0.25, 0.5, 0.9) if at_end else ()
-        soon_s = [] if at_end else [violated_s + AFTER_S]
-        for after_s in (*soon_s, *(share * violated_s for share in shares)):
-            end_s = ceil(10.0 * after_s) / 10.0
-            if end_s < tables["duration_s"]:
-                yield from _ending(tables, end_s)
-        return
-    limit_s = (tables.get("expect") or {}).get("converge_within_s")
-    if limit_s is None:
-        return
-    limit_s = min(limit_s, fair_s(tables))
-    end_s = quiet_from_s(tables) + limit_s + 3.0
+    at_end = violated_s >= tables["duration_s"]
+    shares = (0.05, 0.1, 0.25, 0.5, 0.9) if at_end else ()
+    soon_s = [] if at_end else [violated_s + AFTER_S]
+    for after_s in (*soon_s, *(share * violated_s for share in shares)):
+        end_s = ceil(10.0 * after_s) / 10.0
+        if end_s < tables["duration_s"]:
+            yield from _ending(tables, end_s)
+
+
+def _fair(tables: Tables, _: float) -> Iterator[Tables]:
+    """Yield tables with no more time than is fair for the team that is left."""
+    given_s = limit_s(tables)
+    if given_s is not None:
+        yield from _allowing(tables, min(given_s, fair_s(tables)))
+
+
+def _certain(tables: Tables, certain_s: float) -> Iterator[Tables]:
+    """Yield tables with no more time than it takes to be certain that more does not help."""
+    given_s, enough_s = limit_s(tables), float(ceil(certain_s - quiet_from_s(tables)))
+    if given_s is not None and 1.0 <= enough_s < given_s:
+        yield from _allowing(tables, enough_s)
+
+
+def _allowing(tables: Tables, allowed_s: float) -> Iterator[Tables]:
+    """Yield tables with a time limit, and the 3 s for which a team must stay in its places."""
+    end_s = quiet_from_s(tables) + allowed_s + 3.0
     if end_s < tables["duration_s"]:
         found = copy.deepcopy(tables) | {"duration_s": end_s}
-        found["expect"] |= {key: limit_s for key in LIMITS if key in found["expect"]}
+        found["expect"] |= {key: allowed_s for key in LIMITS if key in found["expect"]}
         yield found
 
 
@@ -169,7 +187,7 @@ def _ending(tables: Tables, end_s: float) -> Iterator[Tables]:
     yield found
 
 
-def _fewer_events(tables: Tables, _: float | None) -> Iterator[Tables]:
+def _fewer_events(tables: Tables, _: float) -> Iterator[Tables]:
     """Yield tables without all, half, a quarter of the events, and so on."""
     events = tables.get("event") or []
     size = len(events)
@@ -180,19 +198,19 @@ def _fewer_events(tables: Tables, _: float | None) -> Iterator[Tables]:
         size //= 2
 
 
-def _without_tables(tables: Tables, _: float | None) -> Iterator[Tables]:
+def _without_tables(tables: Tables, _: float) -> Iterator[Tables]:
     for name in TABLES:
         if tables.get(name):
             yield copy.deepcopy({key: value for key, value in tables.items() if key != name})
 
 
-def _one_line(tables: Tables, _: float | None) -> Iterator[Tables]:
+def _one_line(tables: Tables, _: float) -> Iterator[Tables]:
     """Yield tables with a formation of one queue, which a team of any size can form."""
     if tables.get("formation") != FALLBACK:
         yield copy.deepcopy({**tables, "formation": FALLBACK})
 
 
-def _fewer_agents(tables: Tables, _: float | None) -> Iterator[Tables]:
+def _fewer_agents(tables: Tables, _: float) -> Iterator[Tables]:
     agents, start = tables["fleet"]["agents"], tables["fleet"].get("start") or {}
     if start.get("kind") != "list":
         for fewer in sorted({2, agents // 2, agents - 1}):
@@ -257,20 +275,20 @@ def _regrouped(partition: Any, new: dict[int, int]) -> Any:
     return found
 
 
-def _fewer_items(tables: Tables, _: float | None) -> Iterator[Tables]:
+def _fewer_items(tables: Tables, _: float) -> Iterator[Tables]:
     for path in ((name,) for name in LISTS):
         yield from _without_items(tables, path)
     yield from _without_items(tables, ("netem", "link"))
 
 
-def _fewer_keys(tables: Tables, _: float | None) -> Iterator[Tables]:
+def _fewer_keys(tables: Tables, _: float) -> Iterator[Tables]:
     for name in KEYS_OF:
         yield from _without_keys(tables, (name,))
     for name in SENSORS:
         yield from _without_keys(tables, ("sensor", name))
 
 
-def _milder(tables: Tables, _: float | None) -> Iterator[Tables]:
+def _milder(tables: Tables, _: float) -> Iterator[Tables]:
     """Yield tables of which one fault strikes fewer agents, or has a key less."""
     for index, event in enumerate(tables.get("event") or ()):
         for key, value in event.items():
@@ -298,7 +316,7 @@ def _fewer_selected(selectors: Any) -> Iterator[list[Any]]:
                 yield [*others, f"random:{number}"]
 
 
-def _briefer(tables: Tables, _: float | None) -> Iterator[Tables]:
+def _briefer(tables: Tables, _: float) -> Iterator[Tables]:
     """Yield tables of which one fault is shorter, comes once, or at a whole second."""
     for index, event in enumerate(tables.get("event") or ()):
         for_s = event.get("for_s") or 0.0
@@ -312,21 +330,31 @@ def _briefer(tables: Tables, _: float | None) -> Iterator[Tables]:
             yield _changed(tables, index, {}, without="every_s")
 
 
-def _earlier(tables: Tables, violated_s: float | None) -> Iterator[Tables]:
-    """Yield tables whose events come earlier, all by as much, and that end earlier."""
+def _earlier(tables: Tables, _: float) -> Iterator[Tables]:
+    """Yield tables whose events come earlier, all by as much."""
     events = tables.get("event") or []
-    first_s = min((each["at_s"] for each in events), default=0.0)
+    first_s = _first_s(tables)
     for by_s in (float(int(each)) for each in (first_s - 1.0, first_s / 2.0, 1.0)):
-        if by_s >= 1.0 and first_s - by_s >= 1.0:
+        if events and by_s >= 1.0 and first_s - by_s >= 1.0:
             found = copy.deepcopy(tables)
             for event in found["event"]:
                 event["at_s"] = round(event["at_s"] - by_s, 1)
-            if violated_s is None:
-                found["duration_s"] = round(found["duration_s"] - by_s, 1)
             yield found
 
 
-def _rounder(tables: Tables, _: float | None) -> Iterator[Tables]:
+def _earlier_and_shorter(tables: Tables, violated_s: float) -> Iterator[Tables]:
+    """Yield tables whose events come earlier, and that end as much earlier."""
+    for found in _earlier(tables, violated_s):
+        by_s = _first_s(tables) - _first_s(found)
+        yield found | {"duration_s": round(tables["duration_s"] - by_s, 1)}
+
+
+def _first_s(tables: Tables) -> float:
+    """Return when the first event comes [s]; 0 for none."""
+    return min((float(each["at_s"]) for each in tables.get("event") or ()), default=0.0)
+
+
+def _rounder(tables: Tables, _: float) -> Iterator[Tables]:
     """Yield tables with a usual value in place of a drawn one, or with fewer digits."""
     for path, key, usual in USUAL:
         if _inner(tables, path).get(key, usual) != usual:
@@ -350,20 +378,11 @@ def _rounder(tables: Tables, _: float | None) -> Iterator[Tables]:
                 yield found
 
 
-PASSES = (
-    _shorter,
-    _fewer_events,
-    _without_tables,
-    _one_line,
-    _fewer_agents,
-    _earlier,
-    _shorter,
-    _fewer_items,
-    _fewer_keys,
-    _milder,
-    _briefer,
-    _rounder,
-)
+FEWER = (_fewer_events, _without_tables, _one_line, _fewer_agents)
+SIMPLER = (_fewer_items, _fewer_keys, _milder, _briefer, _rounder)
+PASSES = (_shorter, *FEWER, _earlier, _shorter, *SIMPLER)
+PASSES_OF_A_LIMIT = (_fair, *FEWER, _earlier_and_shorter, _fair, *SIMPLER, _certain)
+"""A limit becomes shorter than fair last: a team that comes to rest later is then no smaller."""
 
 
 def _changed(tables: Tables, index: int, change: Tables, without: str = "") -> Tables:
