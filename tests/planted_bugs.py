@@ -146,14 +146,15 @@ def held_command(patch: pytest.MonkeyPatch) -> None:
 
 
 def broken_promise(patch: pytest.MonkeyPatch) -> None:
-    """A promise broken: without a sensor, a vehicle flies faster than it said it would."""
-    right: Any = PromiseFilter.speed_limit
+    """A promise broken: without a sensor, a vehicle promises the least speed, and flies faster."""
+    right = PromiseFilter.promise
 
-    def speed_limit(self: Any) -> float:
-        Difference.note(right.fget(self) < self._max_speed)
-        return float(self._max_speed)
+    def promise(self: Any, now_s: float, speed: float, reports: Any) -> float:
+        held = right(self, now_s, speed, reports)
+        Difference.note(held > self._least_cap)
+        return float(self._least_cap)
 
-    patch.setattr(PromiseFilter, "speed_limit", property(speed_limit))
+    patch.setattr(PromiseFilter, "promise", promise)
 
 
 def stale_frame(patch: pytest.MonkeyPatch) -> None:

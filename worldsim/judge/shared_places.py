@@ -9,10 +9,12 @@ Claims = list[tuple[int, int]]
 """The place (queue, rank) that each agent claims; row i = agent i."""
 Hears = NDArray[np.bool_]
 """Whether the agent of a row hears that of a column."""
+WHOLE = 1.0 + 1e-9
+"""More than all of the time allowed, but for rounding."""
 
 
 class SharedPlaces:
-    """For each agent, whether another agent that need know it claims its place, and since when.
+    """For each agent, whether another agent that need know it claims its place, and how long.
 
     local: whether an agent knows the claims of those that it hears, as under leaders and trees.
     Under the assignment it knows those of its whole component.
@@ -22,8 +24,9 @@ class SharedPlaces:
         self.local = local
         self._claims: Claims = []
         self._shared: list[bool] = []
-        self._since: dict[int, tuple[tuple[int, int], float]] = {}
-        """For each agent that shares its place: the place, and since when [s; simulated time]."""
+        self._spent: dict[int, tuple[tuple[int, int], float]] = {}
+        """For each agent that shares its place: the place, and the share of the time allowed."""
+        self._seen_s = 0.0
 
     def find(self, claims: Claims, members: Sequence[list[int]], hears: Hears | None) -> None:
         """Find the agents that share their place. members: the rows of each component."""
@@ -38,22 +41,27 @@ class SharedPlaces:
                         self._shared[row] = not self.local or _hears_rival(row, sharing, hears)
 
     def count_lasting(self, time_s: float, longest_s: float) -> int:
-        """Return how many agents have shared their present place for longer than that [s]."""
+        """Return how many agents have shared their present place for longer than allowed.
+
+        longest_s: how long they may under the present radio [s]; infinite: for any time. Where the
+        radio changes meanwhile, the shares of the time allowed under each add up.
+        """
+        since_s, self._seen_s = time_s - self._seen_s, time_s
         if not any(self._shared):
-            self._since = {}
+            self._spent = {}
             return 0
-        since = {}
+        spent = {}
         for row, shared in enumerate(self._shared):
             if shared:
-                claim, from_s = self._since.get(row, (None, time_s))
+                claim, before = self._spent.get(row, (None, 0.0))
                 now = self._claims[row]
-                since[row] = (now, from_s if claim == now else time_s)
-        self._since = since
-        return sum(time_s - from_s > longest_s for _, from_s in since.values())
+                spent[row] = (now, before + since_s / longest_s if claim == now else 0.0)
+        self._spent = spent
+        return sum(each > WHOLE for _, each in spent.values())
 
     def forget(self) -> None:
         """Start anew: none has shared its place until now."""
-        self._since = {}
+        self._spent = {}
 
 
 def _hears_rival(row: int, sharing: Sequence[int], hears: Hears | None) -> bool:
