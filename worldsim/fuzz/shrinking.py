@@ -12,6 +12,7 @@ from worldsim.fuzz.folder import SCENARIO, Row, read_finding
 from worldsim.fuzz.probe import MarginProbe
 from worldsim.fuzz.spelled_out import with_listed_start, with_named_agents
 from worldsim.scenario.file import as_toml
+from worldsim.scenario.tables import CONVERGED_M
 from worldsim.search.drafts import cautions, loaded, objection
 from worldsim.search.draws import Tables
 from worldsim.search.shrink import Shrinker, Size, limit_s, quiet_from_s, tidy
@@ -20,7 +21,7 @@ from worldsim.search.trials import fair_s
 BUDGET: Final = 150
 """Flights that shrink one finding at most."""
 REST_S: Final = 10.0
-"""A team whose vehicles have all stood still for so long will not move in more time either [s]."""
+"""A team that stood still out of its places for so long will not move in more time either [s]."""
 
 
 def shrink(folder: Path, hangar: Hangar, say: Say, budget: int = BUDGET) -> Row | None:
@@ -97,8 +98,9 @@ class _Trials:
         quiet_s, allowed_s = quiet_from_s(tables), limit_s(tables)
         if allowed_s is None or flown.measured is None:
             return at_s
+        errors_m = [each for each in flown.measured["slot_error_m"] if each is not None]
         rested_s = max(float(flown.measured["rest_since_s"]), quiet_s) + REST_S
-        if rested_s <= quiet_s + allowed_s:
+        if errors_m and errors_m[-1] > CONVERGED_M and rested_s <= quiet_s + allowed_s:
             return rested_s
         enough_s = fair_s(tables)
         if self._drawn_s is not None:
