@@ -139,6 +139,16 @@ def test_a_fourth_change_of_role_without_a_fault_violates_i6() -> None:
     assert judged(flight(), *flips[:3], fault, flips[3])["I6"][1] == 0
 
 
+def test_faults_of_two_kinds_at_one_time_allow_twice_as_many_changes_of_role() -> None:
+    roles: tuple[Role, ...] = ("vertex", "member", "vertex", "distress")
+    flips = [RoleChanged(t_s=10.0 + k, agent=3, role=role) for k, role in enumerate(roles)]
+    healed = msgspec.structs.replace(HEALED, t_s=9.5)
+    radio = ConditionsChanged(t_s=9.5, agent=None, planned=True, number=0, conditions=Conditions())
+    assert judged(flight(), healed, *flips)["I6"][1] == 1
+    assert judged(flight(), healed, healed, *flips)["I6"][1] == 1
+    assert judged(flight(), healed, radio, *flips)["I6"][1] == 0
+
+
 def test_i6_counts_leads_and_not_who_follows_whom() -> None:
     roles: tuple[Role, ...] = ("distress", "member", "sub-vertex", "member", "vertex", "member")
     following = [RoleChanged(t_s=10.0 + k, agent=3, role=role) for k, role in enumerate(roles)]

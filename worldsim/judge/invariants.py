@@ -132,12 +132,12 @@ class Invariants:
                 if event.agent is not None:
                     self._places.restart(event.agent)
                     self._leads.forget(event.agent)
-                self._fault(event.t_s, event.t_s + self._boot_s)
+                self._fault(event, event.t_s + self._boot_s)
             case Killed() | Left() | Paused() | Resumed() | FormationGiven() | FrameGiven():
-                self._fault(event.t_s, event.t_s)
+                self._fault(event, event.t_s)
             case WorldStopped() | Reconnected():
                 self._unobserved = isinstance(event, WorldStopped)
-                self._fault(event.t_s, event.t_s)
+                self._fault(event, event.t_s)
             case (
                 SlotChanged()
                 | QueueChanged()
@@ -156,14 +156,14 @@ class Invariants:
         self._connectivity.handle_agent_fault(event)
         self._shared.forget()
         self._busy_until_s = max(self._busy_until_s, event.over_s)
-        self._fault(event.t_s, event.over_s)
+        self._fault(event, event.over_s)
 
     def _handle_radio(self, event: RadioRunEvent) -> None:
         if isinstance(event, Sabotaged):
             return  # whatever somebody sends, it excuses nobody
         self._connectivity.handle_event(event)
         self._unobserved = self._unobserved or isinstance(event, NetemOutage)
-        self._fault(event.t_s, event.t_s)
+        self._fault(event, event.t_s)
 
     def see(self, tick: Tick, phase: Phase) -> None:
         """Evaluate a tick, which the phase has seen."""
@@ -210,9 +210,10 @@ class Invariants:
         label = int(self._components.label[agent])
         return self._twice_s < inf and label >= 0 and bool(self._components.closed[label])
 
-    def _fault(self, begins_s: float, over_s: float) -> None:
-        """Start anew after a fault that begins and is over at these times [s]."""
-        self._components_due_s = begins_s
+    def _fault(self, event: RunEvent, over_s: float) -> None:
+        """Start anew after a fault. over_s: when it is over [s; simulated time]."""
+        self._leads.strike(event.t_s, type(event).__name__)
+        self._components_due_s = event.t_s
         self._restart_premises(over_s)
 
     def _excuse(self, time_s: float) -> None:

@@ -4,11 +4,12 @@ Whether others follow a member is their choice, and distress is a search: neithe
 """
 
 from collections import Counter
+from math import inf
 
 from worldsim.judge.run_events import RoleChanged
 
 MAX_CHANGES = 3
-"""An agent may change so often after each fault."""
+"""An agent may change so often after each fault; after two kinds at one time twice as often."""
 
 
 class LeadChanges:
@@ -18,6 +19,15 @@ class LeadChanges:
         self._leading: set[int] = set()
         self._changes: Counter[int] = Counter()
         self._excess = 0
+        self._kinds: set[str] = set()
+        """Kinds of the faults that the team answers to: those that came last, at one time."""
+        self._fault_s = -inf
+
+    def strike(self, t_s: float, kind: str) -> None:
+        """Take a fault at a time [s]; each kind is answered by changes of its own."""
+        if t_s != self._fault_s:
+            self._fault_s, self._kinds = t_s, set()
+        self._kinds.add(kind)
 
     def take(self, event: RoleChanged, *, informed: bool) -> None:
         """Take a change of role; informed: whether it counts, as news reaches the agent."""
@@ -27,7 +37,7 @@ class LeadChanges:
         self._leading ^= {agent}
         if informed:
             self._changes[agent] += 1
-            self._excess += self._changes[agent] > MAX_CHANGES
+            self._excess += self._changes[agent] > MAX_CHANGES * max(1, len(self._kinds))
 
     def forget(self, agent: int) -> None:
         """Take the start of an agent's new process, which leads nothing."""
