@@ -50,7 +50,7 @@ class PromiseFilter:
         speed: present own speed [m/s]. What the vehicle flies until a new command reaches it is
         part of the promise.
         """
-        gap = min((self._room(each, 0.0, self._max_speed) for each in reports), default=inf)
+        gap = min((self._room(each, 0.0, each.speed_cap) for each in reports), default=inf)
         self._cap = min(max(gap / CLOSING_S, self._least_cap), self._max_speed)
         if self._restarted and not self._promises:
             self._promises.append((now_s, self._least_cap))

@@ -26,6 +26,15 @@ def test_a_promise_limits_the_speed_for_three_seconds():
     assert filtered.speed_limit == MAX_SPEED
 
 
+def test_a_slow_promise_of_another_allows_a_faster_one():
+    """A ball grows at the speed that was promised, not at the speed that the fleet may fly."""
+    slow, fast = (
+        promises().promise(0.0, 0.0, [VehicleReport((0.6, 0.0, 0.0), age_s=0.5, speed_cap=cap)])
+        for cap in (0.05, 0.5)
+    )
+    assert (slow, fast) == (pytest.approx(0.325 / 1.3), pytest.approx(0.1 / 1.3))
+
+
 def test_a_promise_covers_the_command_that_is_still_flown():
     filtered = promises()
     filtered.promise(0.0, 0.0, [])
