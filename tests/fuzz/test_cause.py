@@ -88,6 +88,21 @@ def test_a_failure_that_an_event_brings_is_certain_from_the_event_on(
     assert "No draw matters" in found.text
 
 
+@pytest.mark.parametrize(("number", "end_s"), [(0, 2.0), (1, 3.0)])
+def test_a_failure_that_the_end_of_a_fault_brings_is_certain_from_its_end_on(
+    tmp_path: Path, number: int, end_s: float
+) -> None:
+    """Until then, the fault may last: a flight in which it does not end does not fail."""
+    at_s = [1.0, 2.5][number]
+
+    def fails(scenario: Scenario, _: float) -> bool:
+        return any(each.at_s == at_s and each.for_s for each in scenario.event)
+
+    found = cause_of(tmp_path, fails)
+    assert found.certain_s == end_s
+    assert found.text.endswith(f", and its end at {end_s:g} s.")
+
+
 def test_a_failure_that_a_draw_brings_is_certain_from_the_tick_of_the_draw_on(
     tmp_path: Path,
 ) -> None:

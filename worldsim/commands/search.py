@@ -193,9 +193,9 @@ def cause(
     """Find the tick from which on a finding's failure was certain.
 
     The flight is repeated as it was up to a tick; from there on it draws other numbers for radio
-    and sensors, and no later event happens. Bisection finds the first tick after which 95 % of
-    such flights fail. It also tells the last event without which nothing fails. Both are added to
-    finding.md. Exit status 1: the finding no longer fails.
+    and sensors, no event begins, and no fault ends. Bisection finds the first tick after which
+    95 % of such flights fail. It also tells the last event without which nothing fails. Both are
+    added to finding.md. Exit status 1: the finding no longer fails.
     """
     from netem.wire.shutdown import stop_requests
     from worldsim.fuzz.cause import find_cause

@@ -1,8 +1,9 @@
 """`qswarm cause`: from when on a failure was certain, whatever comes after.
 
 A flight is repeated up to a tick as it was; from there on the radio and the sensors draw other
-numbers, and no further event happens. The first tick from which on 95 % of such flights fail is
-found by bisection. Beside it, the timeline is cut: the last event without which nothing fails.
+numbers, and nothing further happens: no event begins, and no fault ends. The first tick from which
+on 95 % of such flights fail is found by bisection. Beside it, the timeline is cut: the last event
+without which nothing fails.
 """
 
 import tomllib
@@ -33,8 +34,8 @@ class Cause(NamedTuple):
     replays: bool
     """Whether the finding still fails."""
     certain_s: float | None = None
-    """The first tick from which on it fails in 95 % of draws without a further event [s]; None: not
-    before it shows."""
+    """The first tick from which on it fails in 95 % of draws if nothing further happens [s]; None:
+    not before it shows."""
     from_the_start: float | None = None
     """The share of other draws from the start on that fail too."""
     needed: Tables | None = None
@@ -62,8 +63,16 @@ class Cause(NamedTuple):
             told.append("It fails without any event.")
         else:
             rest = {key: value for key, value in self.needed.items() if key != "at_s"}
-            told.append(f"It needs the event at {self.needed['at_s']:g} s: {rest}.")
+            told.append(f"It needs the event at {self.needed['at_s']:g} s: {rest}{self._ending}.")
         return " ".join(told)
+
+    @property
+    def _ending(self) -> str:
+        """In words that the needed event ends; nothing where it is certain before."""
+        event = self.needed or {}
+        end_s = float(event.get("at_s", 0.0)) + float(event.get("for_s") or 0.0)
+        ends = bool(event.get("for_s")) and (self.certain_s or 0.0) >= end_s
+        return f", and its end at {end_s:g} s" if ends else ""
 
 
 class _Prober:
@@ -88,9 +97,8 @@ class _Prober:
         )
 
     def is_certain(self, tick: int) -> bool:
-        """Return whether it fails whatever is drawn from a tick on, without a further event."""
-        kept = [each for each in self.events if self.tick_of(each) <= tick]
-        scenario = self._of({**self.tables, "event": kept})
+        """Return whether it fails whatever is drawn from a tick on, if nothing further happens."""
+        scenario = self._of({**self.tables, "event": self._until(tick)})
         told = f"nothing but other draws from {self.seconds(tick):g} s on"
         spare = self._draws - ceil(CERTAIN * self._draws)
         return scenario is not None and self._share(tick, scenario, told, spare) >= CERTAIN
@@ -100,9 +108,32 @@ class _Prober:
         """The events of the finding's scenario, in the order of their times."""
         return sorted(self.tables.get("event") or (), key=lambda each: float(each["at_s"]))
 
-    def tick_of(self, event: Tables) -> int:
-        """Return the first tick that an event can change."""
-        return ceil(float(event["at_s"]) * self.scenario.fleet.tick_hz - 1e-9)
+    def turns(self) -> list[int]:
+        """Return the ticks in which an event begins or ends, in order, and the first tick."""
+        begins = [self._tick(each["at_s"]) for each in self.events]
+        return sorted({0, *begins, *filter(None, map(self._end, self.events))})
+
+    def _tick(self, at_s: float) -> int:
+        """Return the first tick that can be another one because of what happens at a time [s]."""
+        return ceil(float(at_s) * self.scenario.fleet.tick_hz - 1e-9)
+
+    def _end(self, event: Tables) -> int | None:
+        """Return the tick in which an event ends; None for one that does not."""
+        return self._tick(event["at_s"] + event["for_s"]) if event.get("for_s") else None
+
+    def _until(self, tick: int) -> list[Tables]:
+        """Return what has happened by a tick: a fault that ends later lasts to the end.
+
+        One that `qswarm check` does not let last for ever ends as it does.
+        """
+        kept: list[Tables] = []
+        for event in self.events:
+            if self._tick(event["at_s"]) <= tick:
+                lasting = {key: each for key, each in event.items() if key != "for_s"}
+                goes_on = (self._end(event) or 0) > tick
+                can = goes_on and self._of({**self.tables, "event": [*kept, lasting]}) is not None
+                kept.append(lasting if can else event)
+        return kept
 
     def seconds(self, tick: int) -> float:
         """Return the time of a tick [s]."""
@@ -165,7 +196,7 @@ def _certain_s(prober: _Prober, hangar: Hangar, no_draw_matters: bool) -> float 
     last = _last_tick(prober.finding, prober.scenario)
     ticks: Sequence[int] = range(last + 1)
     if no_draw_matters:  # only an event can have made it certain
-        ticks = sorted({0, *map(prober.tick_of, prober.events)})
+        ticks = prober.turns()
     low, high = -1, len(ticks) - 1
     if not prober.is_certain(ticks[high]):
         return None
