@@ -2,7 +2,7 @@
 
 import pytest
 
-from worldsim.search.margins import margins_of, of_error, score, violated
+from worldsim.search.margins import approached, margins_of, of_error, score, violated
 
 
 def summary(**rows: tuple[float | None, float | None, bool | None]) -> dict[str, object]:
@@ -42,6 +42,12 @@ def test_what_was_missed_is_negative_and_what_is_open_is_absent() -> None:
     assert margins_of(summary(converge=(40.0, None, False)))["converge"] == -1.0
     assert violated(found) == ["separation", "I7"]
     assert violated(of_error()) == ["error"]
+
+
+def test_what_a_flight_starts_with_is_not_what_it_came_near_to() -> None:
+    assert approached([0.1, 0.2, 0.5, 0.4, 0.6]) == 0.4
+    assert approached([0.1, None, 0.05, 0.3]) == 0.05
+    assert approached([0.1, 0.1, 0.2]) == approached([]) == 1.0
 
 
 def test_the_score_falls_with_the_least_margin_first() -> None:

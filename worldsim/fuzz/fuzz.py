@@ -25,7 +25,16 @@ from worldsim.scenario.tables import Scenario
 from worldsim.scenario.toml import ScenarioError
 from worldsim.search.drafts import loaded, objection
 from worldsim.search.guide import GENERATION, Guide
-from worldsim.search.margins import CONSERVATION, LIVENESS, SAFETY, score, violated
+from worldsim.search.margins import (
+    CONSERVATION,
+    DISTANCES,
+    LIVENESS,
+    SAFETY,
+    Margins,
+    approached,
+    score,
+    violated,
+)
 from worldsim.search.trials import Terms, Trial, trial
 
 WORD: Final = "fuzz"
@@ -192,7 +201,7 @@ def row_of(drawn: Drawn, flown: Flown) -> Row:
         "seed": drawn.seed,
         "how": drawn.how,
         "violated": bad,
-        "score": score(flown.margins),
+        "score": score(_flown_to(flown)),
         "margins": {name: round(value, 6) for name, value in flown.margins.items()},
         "reason": flown.reason,
         "violated_s": violated_s(flown, scenario, bad[0]) if bad else None,
@@ -201,6 +210,13 @@ def row_of(drawn: Drawn, flown: Flown) -> Row:
         "events": len(scenario.event),
         "trace_sha256": flown.trace,
     }
+
+
+def _flown_to(flown: Flown) -> Margins:
+    """Return the margins of a flight without the distances that it only started with."""
+    measured, margins = flown.measured or {}, flown.margins
+    kept = [name for name in DISTANCES.values() if margins.get(name, -1.0) >= 0.0]
+    return margins | {name: approached(measured[name]) for name in kept if measured.get(name)}
 
 
 class _Progress:

@@ -5,7 +5,8 @@ distance (separation, clearance), of the time allowed (converge, reform), or 1 a
 invariant merely holds or not.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, Final
 
 from worldsim.judge.metrics import ROUNDING_M
@@ -69,6 +70,17 @@ def score(margins: Margins) -> float:
     """
     values = [max(-1.0, min(1.0, each)) for each in margins.values()]
     return round(min(values) + 0.1 * sum(values) / len(values), 6) if values else 1.0
+
+
+def approached(margins: Sequence[float | None]) -> float:
+    """Return the least margin that is less than the one before: what a flight came near to.
+
+    A distance that the vehicles start with says nothing about what they do. margins: of each tick,
+    None where nothing was measured.
+    """
+    known = [each for each in margins if each is not None]
+    fell = [now for before, now in pairwise(known) if now < before]
+    return min(fell, default=1.0)
 
 
 def _property(expectation: str) -> str | None:
