@@ -1,0 +1,41 @@
+"""I6: how often an agent may take up and give up the lead of a vertex."""
+
+import pytest
+
+from agent.messages import Role
+from worldsim.judge.lead_changes import LeadChanges
+from worldsim.judge.run_events import RoleChanged
+
+
+@pytest.mark.parametrize(
+    ("kinds", "taken", "allowed"),
+    [
+        ([], 0, 3),
+        (["Killed"], 0, 3),
+        (["Killed", "Killed"], 0, 3),
+        (["Killed", "Paused"], 0, 6),
+        (["Killed"], 1, 6),
+        (["Killed", "Paused"], 2, 12),
+    ],
+)
+def test_each_kind_of_fault_and_each_taken_place_allows_three_changes(
+    kinds: list[str], taken: int, allowed: int
+) -> None:
+    leads = LeadChanges()
+    for kind in kinds:
+        leads.strike(1.0, kind)
+    leads.taken = taken
+    for change in range(20):
+        role: Role = "member" if change % 2 else "vertex"
+        leads.take(RoleChanged(t_s=1.0 + change, agent=3, role=role), informed=True)
+        assert (leads.take_excess() == 0) == (change < allowed)
+
+
+def test_a_later_fault_is_answered_for_itself() -> None:
+    leads = LeadChanges()
+    leads.strike(1.0, "Killed")
+    leads.strike(2.0, "Paused")
+    for change in range(4):
+        role: Role = "member" if change % 2 else "vertex"
+        leads.take(RoleChanged(t_s=3.0 + change, agent=3, role=role), informed=True)
+    assert leads.take_excess() == 1
