@@ -146,15 +146,18 @@ def held_command(patch: pytest.MonkeyPatch) -> None:
 
 
 def broken_promise(patch: pytest.MonkeyPatch) -> None:
-    """A promise broken: without a sensor, a vehicle promises the least speed, and flies faster."""
-    right = PromiseFilter.promise
+    """A promise broken: without a sensor, a vehicle flies at any speed, whatever it promised."""
+    right: Any = PromiseFilter.speed_limit
 
-    def promise(self: Any, now_s: float, speed: float, reports: Any) -> float:
-        held = right(self, now_s, speed, reports)
-        Difference.note(held > self._least_cap)
-        return float(self._least_cap)
+    def speed_limit(self: Any) -> float:
+        Difference.note(right.fget(self) < self._max_speed)
+        return float(self._max_speed)
 
-    patch.setattr(PromiseFilter, "promise", promise)
+    def needs_s(self: Any, speed: float) -> float:
+        return float(self._braking.stopping_s(max(speed, right.fget(self))))
+
+    patch.setattr(PromiseFilter, "speed_limit", property(speed_limit))
+    patch.setattr(PromiseFilter, "_needs_s", needs_s)
 
 
 def stale_frame(patch: pytest.MonkeyPatch) -> None:

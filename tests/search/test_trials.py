@@ -42,6 +42,17 @@ def test_a_base_keeps_its_team_and_gets_faults() -> None:
     assert any(each.event for each in varied)
 
 
+def test_a_base_keeps_its_vehicles_and_loses_the_faults_that_they_do_not_bear() -> None:
+    """Who knows others by radio alone stands still once one is silent: nobody dies for good."""
+    text = Path("deploy/scenarios/wedge-9.toml").read_text() + "\n[vehicle]\nsensors = []\n"
+    base = parse(text, Path("deploy/scenarios/x.toml"))
+    varied = [drawn(seed, Terms(base=msgspec.to_builtins(base))) for seed in range(8)]
+    assert {each.vehicle.sensors for each in varied} == {()}
+    kinds = {event.kind for each in varied for event in each.event}
+    assert kinds
+    assert not kinds & {"kill", "leave"}
+
+
 def test_safety_only_expects_no_formation() -> None:
     scenario = drawn(3, Terms(controller="flocking", safety_only=True))
     assert scenario.control.controller == "flocking"

@@ -55,10 +55,16 @@ def objection(
     return ""
 
 
-def accepted(tables: Tables, objections: Counter[str], objection: Objection) -> str | None:
+def accepted(
+    tables: Tables,
+    objections: Counter[str],
+    objection: Objection,
+    kept: frozenset[str] = frozenset(),
+) -> str | None:
     """Return the text that a check accepts without a word; None where repairs do not help.
 
-    objections: counts the keys that were left out.
+    objections: counts the keys that were objected to. kept: tables that stay as they are; what a
+    check objects to there goes with an event, as it goes together with the events.
     """
     for _ in range(REPAIRS):
         text = as_toml(tables)
@@ -68,9 +74,21 @@ def accepted(tables: Tables, objections: Counter[str], objection: Objection) -> 
         named = NAMED.match(said)
         key = named["key"] if named else "another key"
         objections[re.sub(r"\[\d+\]", "", key)] += 1
+        if key.partition(".")[0].partition("[")[0] in kept:
+            key = f"event[{_cause(tables, objection, said)}]"
         if not without(tables, key):
             return None
     return None
+
+
+def _cause(tables: Tables, objection: Objection, said: str) -> int:
+    """Return the last event without which a check does not say the same; else the last of all."""
+    events = tables.get("event") or []
+    for index in reversed(range(len(events))):
+        others = {**tables, "event": events[:index] + events[index + 1 :]}
+        if objection(as_toml(others)) != said:
+            return index
+    return len(events) - 1
 
 
 def without(tables: Tables, key: str) -> bool:
@@ -81,6 +99,8 @@ def without(tables: Tables, key: str) -> bool:
         if not isinstance(inner, dict) or name not in inner:
             return False
         if index:
+            if not 0 <= int(index) < len(inner[name]):
+                return False
             del inner[name][int(index)]
             return True
         outer, inner, last = inner, inner[name], name

@@ -43,6 +43,8 @@ SPARED = {"intruder", "disk_full"}
 """Actions that do nothing in virtual time without a recording."""
 MOVES = {"formation", "frame", "join"}
 """Actions by which a slot could come to be in an obstacle."""
+VARIED = frozenset({"event", "netem", "seed", "duration_s", "expect", "name"})
+"""What a trial of a given scenario changes; all else of it stays as it is."""
 SENSORS = (*[["proximity"]] * 6, [], ["sonar"], ["laser"])
 MOST_SCANNING = 4
 """So many agents scan at most: a scan costs as much as all else that an agent does."""
@@ -81,7 +83,8 @@ def trial(
     for attempt in range(DRAFTS):
         draw = GeneDraw(*words, attempt, given=given)
         tables = _of_base(draw, terms, terms.base) if terms.base else _drawn(draw, terms)
-        text = accepted({"name": name, **tables}, objections, check)
+        kept = frozenset(terms.base or ()) - VARIED
+        text = accepted({"name": name, **tables}, objections, check, kept)
         if text is not None:
             return Trial(text, draw.used)
         given = {}
