@@ -37,7 +37,7 @@ from worldsim.scenario.faults import (
 from worldsim.scenario.foreseen_fleet import FleetNow, ForeseenFleet
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.radio_checks import radio_problems
-from worldsim.scenario.rules import start_problem, tilt_problem
+from worldsim.scenario.rules import tilt_problem
 from worldsim.scenario.selectors import (
     AGENTS,
     RETURNING,
@@ -54,6 +54,7 @@ from worldsim.scenario.selectors import (
     parsed,
 )
 from worldsim.scenario.start import BoxStart, ListStart
+from worldsim.scenario.start_checks import start_problem
 from worldsim.scenario.tables import MAX_AGENTS, Scenario
 from worldsim.scenario.target_frame import (
     FrameChange,

@@ -4,15 +4,13 @@ A rule returns the problem of a scenario that breaks it, else None. A warning is
 scenario may break, at its own risk.
 """
 
-from collections.abc import Sequence
-from math import ceil, degrees, dist, hypot
+from math import ceil, degrees, hypot
 from pathlib import Path
-from typing import assert_never
 
 from agent.config import LEAST
 from agent.controller import COMMAND
 from agent.guidance.bobber import MIN_CAST_RATIO
-from agent.messages import FLIGHT_M, MAX_SCAN_B, Position
+from agent.messages import MAX_SCAN_B
 from agent.qstructure.formation import Formation, formation_of
 from agent.qstructure.frame_path import tip_speed
 from worldsim.scenario.events import EventTable
@@ -22,7 +20,11 @@ from worldsim.scenario.orientation_checks import yaws_not_held
 from worldsim.scenario.problem import Problem
 from worldsim.scenario.property_checks import properties_consistent
 from worldsim.scenario.safety_checks import SAFETY_WARNINGS
-from worldsim.scenario.start import BoxStart, ListStart
+from worldsim.scenario.start_checks import (
+    start_for_each_agent,
+    starts_inside,
+    starts_separated,
+)
 from worldsim.scenario.tables import CONVERGED_S, SLOTS_PER_TICK, AgentTable, Scenario
 from worldsim.scenario.target_frame import frame_problem, path_of
 from worldsim.scenario.team_checks import empty_queues
@@ -105,75 +107,6 @@ def _spacing_leaves_equilibrium(scenario: Scenario) -> Problem | None:
         f"{spacing:g} is too small for separation_m = {separation:g}; at least {least:g}"
         f" (separation_m + {least - separation:g})",
     )
-
-
-def _starts_separated(scenario: Scenario) -> Problem | None:
-    start, separation = scenario.fleet.start, scenario.control.separation_m
-    match start:
-        case BoxStart():
-            if start.spacing_m >= separation or scenario.fleet.agents == 1:
-                return None
-            detail = f"{start.spacing_m:g}; at least control.separation_m = {separation:g}"
-            return Problem("fleet.start.spacing_m", detail)
-        case ListStart():
-            return _listed_too_close(start.positions_m, separation)
-        case _:
-            assert_never(start)
-
-
-def _listed_too_close(positions_m: Sequence[Position], separation: float) -> Problem | None:
-    for i, here in enumerate(positions_m):
-        for j, there in enumerate(positions_m[:i]):
-            if dist(here, there) < separation:
-                return Problem(
-                    f"fleet.start.positions_m[{i}]",
-                    f"{dist(here, there):.3g} m from agent {j};"
-                    f" at least control.separation_m = {separation:g}",
-                )
-    return None
-
-
-def _starts_inside(scenario: Scenario) -> Problem | None:
-    problem = start_problem(scenario.fleet.start)
-    return problem.within("fleet.start") if problem is not None else None
-
-
-def start_problem(start: BoxStart | ListStart) -> Problem | None:
-    """Return the problem of a start box that sticks out of the world."""
-    match start:
-        case ListStart():
-            return None
-        case BoxStart():
-            for axis, (centre, size) in enumerate(zip(start.centre_m, start.size_m, strict=True)):
-                if abs(centre) + 0.5 * size > FLIGHT_M:
-                    detail = f"the box reaches beyond {FLIGHT_M:g} m, the edge of the world"
-                    return Problem(f"centre_m[{axis}]", detail)
-            return None
-        case _:
-            assert_never(start)
-
-
-def _start_for_each_agent(scenario: Scenario) -> Problem | None:
-    start = scenario.fleet.start
-    match start:
-        case BoxStart():
-            return None
-        case ListStart():
-            return _list_of_wrong_length(start, scenario.fleet.agents)
-        case _:
-            assert_never(start)
-
-
-def _list_of_wrong_length(start: ListStart, agents: int) -> Problem | None:
-    if len(start.positions_m) != agents:
-        detail = f"{len(start.positions_m)} positions for fleet.agents = {agents}; one for each"
-        return Problem("fleet.start.positions_m", detail)
-    if start.yaws_deg is not None and len(start.yaws_deg) != agents:
-        detail = (
-            f"{len(start.yaws_deg)} headings for fleet.agents = {agents}; one for each, or none"
-        )
-        return Problem("fleet.start.yaws_deg", detail)
-    return None
 
 
 def _known_agents(scenario: Scenario) -> Problem | None:
@@ -407,9 +340,9 @@ RULES = (
     _enough_agents,
     _at_least_one_tick,
     _spacing_leaves_equilibrium,
-    _start_for_each_agent,
-    _starts_inside,
-    _starts_separated,
+    start_for_each_agent,
+    starts_inside,
+    starts_separated,
     _known_agents,
     _agents_differ,
     _known_briefed,
