@@ -5,6 +5,7 @@ import tomllib
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
@@ -217,6 +218,16 @@ def test_a_flight_tells_since_when_all_vehicles_stand_still() -> None:
     assert rest.since_s == pytest.approx(0.5)
     rest.see([(1.0, 0.0, 0.04), (0.0, 0.0, 0.0)], 1.1)
     assert rest.since_s == pytest.approx(1.1), "one that joins"
+
+
+def test_a_page_tells_from_when_on_a_team_that_never_forms_stands_still(tmp_path: Path) -> None:
+    measured: Any = {"t_s": [0.0, 1.0], "slot_error_m": [3.0, 2.0], "rest_since_s": 9.0}
+    flown = flights.Flown("it", {"converge": -0.5}, "it did not converge", "", measured)
+    row = {"seed": 1, "how": "random", "violated": ["converge"], "reason": "", "duration_s": 5.0}
+    begin(tmp_path, SMALL, row, flown)
+    assert "stand still" not in (tmp_path / "finding.md").read_text()
+    begin(tmp_path, SMALL.replace("duration_s = 5.0", "duration_s = 20.0"), row, flown)
+    assert "All vehicles stand still from 9 s on." in (tmp_path / "finding.md").read_text()
 
 
 def test_the_trouble_of_a_time_that_runs_out_is_where_progress_ends() -> None:

@@ -100,6 +100,7 @@ def explanation(flown: Flown, name: str, duration_s: float) -> Row:
     return {
         "reason": flown.reason,
         "trouble_s": trouble_s,
+        "rest_since_s": measured.get("rest_since_s") if name in TIMED else None,
         "last_event": faults[-1] if faults else None,
         "events": before[-EVENTS:],
         "margins": {

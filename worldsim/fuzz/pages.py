@@ -10,8 +10,8 @@ from worldsim.search.margins import CONSERVATION, LIVENESS, PROPERTIES, SAFETY, 
 BLOCKS = "▁▂▃▄▅▆▇█"
 CURVE = 60
 """Characters of a curve."""
-EVENTS = 6
-"""Events shown before the first tick of trouble."""
+SEEN_AT_REST_S = 5.0
+"""A rest that begins later before the end of a flight says little [s]."""
 
 
 def table(rows: Iterable[Row]) -> str:
@@ -75,6 +75,7 @@ def page(finding: Row) -> str:
         "",
         f"First tick of trouble: {_seconds(finding['trouble_s'])}.",
         f"Last event before it: {_event_text(finding['last_event'])}.",
+        *_rest(finding),
         "",
         *_curves(finding.get("margins") or {}),
         *_events(finding.get("events") or []),
@@ -86,6 +87,14 @@ def page(finding: Row) -> str:
 
 def _seconds(time_s: float | None) -> str:
     return "not known" if time_s is None else f"{time_s:g} s"
+
+
+def _rest(finding: Row) -> list[str]:
+    """Return from when on no vehicle moves: then more time would not help a team."""
+    since_s, end_s = finding.get("rest_since_s"), finding["size"]["duration_s"]
+    if since_s is None or end_s - since_s < SEEN_AT_REST_S:
+        return []
+    return [f"All vehicles stand still from {since_s:g} s on."]
 
 
 def _size_row(name: str, size: Mapping[str, Any]) -> str:
