@@ -239,7 +239,9 @@ class Structure:
         elif claim.number < 1:
             if not self._direct.is_near:
                 self._numbers.take_first(view, claim)
-        elif not self._swaps.proceed(view, claim) and not self._numbers.keep_up(view, claim):
+        elif self._swaps.proceed(view, claim) or self._numbers.keep_up(view, claim):
+            pass
+        elif not self._direct.is_near:  # else partners that decide directly would not answer
             self._swaps.propose(view, claim)
 
     @property
