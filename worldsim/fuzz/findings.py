@@ -30,9 +30,8 @@ TIMED: Final = ("converge", "reform")
 ERROR: Final = "error"
 REPEAT: Final = "repeat"
 """The property for which a scenario is flown several times."""
-REPETITIONS: Final = 5
-"""How often a finding of REPEAT is flown: it counts where no flight repeats the first, so that a
-difference that only shows by chance does not pass for a smaller scenario."""
+REPETITIONS: Final = 8
+"""How often a finding of REPEAT is flown."""
 POINTS: Final = 240
 """How many values of each margin a finding keeps at most."""
 EVENTS: Final = 8

@@ -30,6 +30,8 @@ class Flown(NamedTuple):
     """What a MarginProbe saw."""
     events: tuple[Mapping[str, Any], ...] = ()
     """The rows of events.jsonl; only of a flight with a MarginProbe."""
+    different: int = 1
+    """How many different traces its repetitions have."""
 
 
 class Task(NamedTuple):
@@ -96,12 +98,12 @@ def _flown(shown: Shown, task: Task) -> Flown:
 
 
 def _compared(flights: list[Flown]) -> Flown:
-    """Return what a flight showed, and whether any repetition showed the same."""
-    one, *others = flights
-    if not others:
+    """Return what a flight showed, and whether its repetitions showed the same."""
+    one = flights[0]
+    if len(flights) == 1:
         return one
-    same = any(one.trace == other.trace for other in others)
-    return one._replace(margins=of_repetition(one.margins, same))
+    different = len({each.trace for each in flights})
+    return one._replace(margins=of_repetition(one.margins, different == 1), different=different)
 
 
 def violated_s(flown: Flown, scenario: Scenario, name: str) -> float | None:

@@ -6,7 +6,16 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from worldsim.fuzz.findings import TIMED, Say, explanation, flights_for, keep, signature
+from worldsim.fuzz.findings import (
+    REPEAT,
+    REPETITIONS,
+    TIMED,
+    Say,
+    explanation,
+    flights_for,
+    keep,
+    signature,
+)
 from worldsim.fuzz.flights import Flown, Hangar, Task, violated_s
 from worldsim.fuzz.folder import SCENARIO, Row, read_finding
 from worldsim.fuzz.probe import MarginProbe
@@ -87,6 +96,8 @@ class _Trials:
             tables = batch[int(flown.name)]
             if at_s is not None and self._name in TIMED:
                 at_s = self._certain_s(flown, tables, at_s)
+            if self._name == REPEAT and flown.different < REPETITIONS:
+                at_s = None  # where two of so many are alike, two flights may not show it
             found[int(flown.name)] = at_s
         return found
 
