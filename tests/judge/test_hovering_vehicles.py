@@ -113,3 +113,21 @@ def test_a_vehicle_half_a_spacing_from_a_place_may_or_may_not_take_it(
     assert vehicles.is_doubtful(seen, phase, TEAM) == doubtful
     taken = doubtful or away_m < 0.5
     assert vehicles.places_left_out(seen, phase, TEAM) == ({APEX} if taken else frozenset())
+
+
+@pytest.mark.parametrize("aside_m", [0.0, 0.3])
+def test_an_agent_that_stands_in_its_place_keeps_it_whatever_hovers_beside_it(
+    aside_m: float,
+) -> None:
+    """Where two places are near to each other, one dead vehicle would take both."""
+    vehicles, phase = HoveringVehicles(1.0), Judge(SCENARIO).phases[0]
+    for tick in straight_flight(SCENARIO):
+        position = tick.position.copy()
+        position[0], position[-1] = (aside_m, 0.0, 0.0), (0.0, 0.0, 0.4)  # the apex's own agent
+        seen = replace(tick, position=position)
+        vehicles.see(seen)
+        if tick.time_s > UNIDENTIFIED_AFTER_S + 0.1:
+            break
+    assert tuple(seen.place[0]) == APEX
+    kept = vehicles.places_left_out(seen, phase, TEAM)
+    assert kept == ({APEX} if aside_m else frozenset())

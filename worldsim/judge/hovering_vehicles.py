@@ -17,7 +17,7 @@ from agent.comms.unidentified_vehicles import SAME_VEHICLE_M, UNIDENTIFIED_AFTER
 from agent.controller import Flown
 from agent.messages import Place, Vector
 from agent.places.place_points import PlacePoints
-from agent.qstructure.formation import NO_PLACES, Layout
+from agent.qstructure.formation import NO_PLACES
 from worldsim.judge.phase import Phase
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import CONVERGED_M
@@ -59,10 +59,6 @@ class HoveringVehicles:
         square = moved * moved
         hover: NDArray[np.bool_] = square[:, 0] + square[:, 1] + square[:, 2] < SAME_VEHICLE_M**2
         return hover
-
-    def layout(self, tick: Tick, phase: Phase, team: list[int]) -> Layout:
-        """Return how a team (rows) fills the phase's formation around hovering vehicles."""
-        return phase.formation.layout(len(team), self.occupied_places(tick, phase, team))
 
     def occupied_places(
         self, tick: Tick, phase: Phase, team: list[int], seen: NDArray[np.bool_] | None = None
@@ -106,8 +102,14 @@ class HoveringVehicles:
         return surely != maybe
 
     def places_left_out(self, tick: Tick, phase: Phase, team: list[int]) -> frozenset[Place]:
-        """Return the places that others take from a team (rows), in doubt as its agents see it."""
+        """Return the places that others take from a team (rows), in doubt as its agents see it.
+
+        An agent that stands in its place keeps it, whatever hovers beside it.
+        """
         surely, maybe = self._bounds(tick, phase, team)
+        if maybe:
+            held = self.held_places(tick, phase, team)
+            surely, maybe = surely - held, maybe - held
         if surely == maybe:
             return surely
         claims = phase.claims(tick)
