@@ -36,6 +36,7 @@ from worldsim.fuzz.folder import SCENARIO, Row, read_finding
 from worldsim.fuzz.fuzz import Drawn, drawn, generations, row_of, task_of
 from worldsim.fuzz.shrinking import shrink
 from worldsim.results.progress_line import ProgressLine
+from worldsim.scenario.tables import Scenario
 from worldsim.search.drafts import loaded
 from worldsim.search.guide import Guide
 
@@ -190,16 +191,30 @@ def difference_s(bench: Bench, folder: Path, name: str) -> float | None:
     return at_s
 
 
+def trigger_s(scenario: Scenario, difference: float | None) -> float | None:
+    """Return when the last thing happened that can have made a bug act [s; simulated time].
+
+    That is an event, or its end, before the first difference; the start where there is none.
+    """
+    if difference is None:
+        return None
+    turns = [each.at_s for each in scenario.event]
+    turns += [each.at_s + each.for_s for each in scenario.event if each.for_s]
+    return max((each for each in turns if each <= difference), default=0.0)
+
+
 def causes(bench: Bench, names: list[str]) -> None:
-    """Print when each bug first makes a difference, and what ``qswarm cause`` says."""
-    print("| bug | first difference | certain from | cause |\n|---|---|---|---|")
+    """Print what made each bug act, its first difference, and what ``qswarm cause`` says."""
+    print("| bug | trigger | first difference | certain from | cause |\n|---|---|---|---|---|")
     for name in names:
         folder = bench.folder / "findings" / name
         at_s = difference_s(bench, folder, name)
         with planted(name):
             cause = find_cause(folder, bench.hangar, 20, bench.say)
         if cause is not None:
-            print(f"| {name} | {at_s} | {cause.certain_s} | {cause.text} |", flush=True)
+            scenario = loaded((folder / SCENARIO).read_text("utf-8"), BESIDE)
+            times = f"{trigger_s(scenario, at_s)} | {at_s} | {cause.certain_s}"
+            print(f"| {name} | {times} | {cause.text} |", flush=True)
 
 
 def main() -> int:
