@@ -10,21 +10,22 @@ from worldsim.judge.run_events import RoleChanged
 @pytest.mark.parametrize(
     ("kinds", "taken", "allowed"),
     [
-        ([], 0, 3),
-        (["Killed"], 0, 3),
-        (["Killed", "Killed"], 0, 3),
-        (["Killed", "Paused"], 0, 6),
-        (["Killed"], 1, 6),
-        (["Killed", "Paused"], 2, 12),
+        ([], [], 3),
+        (["Killed"], [], 3),
+        (["Killed", "Killed"], [], 3),
+        (["Killed", "Paused"], [], 6),
+        (["Killed"], [3], 6),
+        (["Killed"], [1, 2], 3),
+        (["Killed", "Paused"], [3, 4], 9),
     ],
 )
-def test_each_kind_of_fault_and_each_taken_place_allows_three_changes(
-    kinds: list[str], taken: int, allowed: int
+def test_each_kind_of_fault_and_a_taken_place_of_the_component_allow_three_changes(
+    kinds: list[str], taken: list[int], allowed: int
 ) -> None:
     leads = LeadChanges()
     for kind in kinds:
         leads.strike(1.0, kind)
-    leads.taken = taken
+    leads.near_taken = frozenset(taken)
     for change in range(20):
         role: Role = "member" if change % 2 else "vertex"
         leads.take(RoleChanged(t_s=1.0 + change, agent=3, role=role), informed=True)

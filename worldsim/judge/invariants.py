@@ -262,7 +262,12 @@ class Invariants:
         if seen == self._seen:
             return
         self._seen, claims = seen, phase.claims(tick)
-        self._leads.taken = sum(places is None or len(places) > 0 for places in blocked)
+        self._leads.near_taken = frozenset(
+            row
+            for rows, places in zip(members, blocked, strict=True)
+            if places is None or places
+            for row in rows
+        )
         if blocked != self._blocked_last:
             # A vehicle that comes to hover in a place, or goes, is news that has to spread.
             self._blocked_last = blocked

@@ -22,9 +22,9 @@ class LeadChanges:
         self._kinds: set[str] = set()
         """Kinds of the faults that the team answers to: those that came last, at one time."""
         self._fault_s = -inf
-        self.taken = 0
-        """Components in which a vehicle of others hovers in a place: one that an agent finds when
-        it comes near is answered as a fault is."""
+        self.near_taken: frozenset[int] = frozenset()
+        """Agents in whose component a vehicle of others hovers in a place: one that an agent finds
+        when it comes near is answered as a fault is."""
 
     def strike(self, t_s: float, kind: str) -> None:
         """Take a fault at a time [s]; each kind is answered by changes of its own."""
@@ -40,7 +40,7 @@ class LeadChanges:
         self._leading ^= {agent}
         if informed:
             self._changes[agent] += 1
-            answered = max(1, len(self._kinds)) + self.taken
+            answered = max(1, len(self._kinds)) + (agent in self.near_taken)
             self._excess += self._changes[agent] > MAX_CHANGES * answered
 
     def forget(self, agent: int) -> None:
