@@ -17,7 +17,7 @@ from worldsim.fuzz.findings import (
     signature,
 )
 from worldsim.fuzz.flights import Flown, Hangar, Task, violated_s
-from worldsim.fuzz.folder import SCENARIO, Row, read_finding
+from worldsim.fuzz.folder import ORIGINAL, SCENARIO, Row, read_finding
 from worldsim.fuzz.probe import MarginProbe
 from worldsim.fuzz.spelled_out import with_listed_start, with_named_agents
 from worldsim.scenario.file import as_toml
@@ -40,7 +40,9 @@ def shrink(folder: Path, hangar: Hangar, say: Say, budget: int = BUDGET) -> Row 
     """
     finding, file = read_finding(folder), folder / SCENARIO
     name, tables = finding["property"], tomllib.loads(file.read_text(encoding="utf-8"))
-    trials = _Trials(file, name, hangar, limit_s(tables))
+    # The scenario may be smaller already, where shrinking was interrupted.
+    drawn = tomllib.loads((folder / ORIGINAL).read_text(encoding="utf-8"))
+    trials = _Trials(file, name, hangar, limit_s(drawn))
     first_s = trials.violated([tables])[0]
     if hangar.stopped():
         return None
