@@ -36,6 +36,6 @@ class Repeating:
 def test_a_flight_is_repeated_and_its_traces_are_compared(
     traces: str, margin: float | None, different: int
 ) -> None:
-    task = Task("it", loaded(SMALL, Path("small.toml")), flights=len(traces))
+    task = Task("a-again-b", loaded(SMALL, Path("small.toml")), flights=len(traces))
     (flown,) = Hangar(Repeating(traces), StopRequest()).fly([task])
     assert (flown.margins.get("repeat"), flown.different) == (margin, different)

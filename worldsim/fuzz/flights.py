@@ -55,11 +55,16 @@ class Hangar(NamedTuple):
 
         Raises SiteError where the site can fly no more, RunWriteError where its disk is full.
         """
-        tasks_of = {task.name: task for task in tasks}
-        orders = [order for task in tasks_of.values() for order in _orders(task)]
-        made: dict[str, list[Flown]] = {name: [] for name in tasks_of}
+        orders: list[Order] = []
+        task_of: dict[str, Task] = {}
+        made: dict[str, list[Flown]] = {}
+        for task in tasks:
+            of_task = list(_orders(task))
+            orders += of_task
+            task_of |= {order.key: task for order in of_task}
+            made[task.name] = []
         for shown in self.site.fly(orders, self.stop) if orders else ():
-            task = tasks_of[shown.key.partition(AGAIN)[0]]
+            task = task_of[shown.key]
             flights = made[task.name]
             flights.append(_flown(shown, task))
             if len(flights) == task.flights:
