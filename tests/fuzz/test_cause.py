@@ -51,9 +51,9 @@ class Law:
             yield Flown(order.key, "fail" if bad else "pass", None, summary)
 
 
-def cause_of(folder: Path, fails: Fails) -> Cause:
-    """Return the cause of a finding with three events, which fails by a law."""
-    (folder / "scenario.toml").write_text(EVENTS + SMALL, encoding="utf-8")
+def cause_of(folder: Path, fails: Fails, events: str = EVENTS) -> Cause:
+    """Return the cause of a finding with some events, which fails by a law."""
+    (folder / "scenario.toml").write_text(events + SMALL, encoding="utf-8")
     size = {"faults": 3, "agents": 2, "duration_s": 5.0}
     finding: Any = {
         "name": "I3-0",
@@ -124,3 +124,20 @@ def test_a_failure_that_needs_nothing_is_certain_from_the_start(tmp_path: Path) 
 
 def test_what_does_not_fail_has_no_cause(tmp_path: Path) -> None:
     assert cause_of(tmp_path, lambda *_: False) == Cause(replays=False)
+
+
+def test_a_fault_that_comes_again_comes_once_until_then_and_is_undone_each_time(
+    tmp_path: Path,
+) -> None:
+    """Else each kill would last: a flight in which nobody is left would fail for sure."""
+    seen: list[tuple[float | None, float | None]] = []
+
+    def fails(scenario: Scenario, from_s: float) -> bool:
+        seen.extend((each.for_s, each.every_s) for each in scenario.event)
+        return any(each.every_s for each in scenario.event)
+
+    found = cause_of(
+        tmp_path, fails, "event = [{ at_s = 1.0, kill = [1], for_s = 0.5, every_s = 1.5 }]"
+    )
+    assert found.certain_s == 2.5
+    assert set(seen) == {(0.5, 1.5), (0.5, None), (None, None)}

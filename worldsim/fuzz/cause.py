@@ -109,9 +109,15 @@ class _Prober:
         return sorted(self.tables.get("event") or (), key=lambda each: float(each["at_s"]))
 
     def turns(self) -> list[int]:
-        """Return the ticks in which an event begins or ends, in order, and the first tick."""
+        """Return the ticks in which an event begins, ends or comes again, and the first tick.
+
+        In order. From where it has come again on it comes to the end, so later turns tell nothing.
+        """
         begins = [self._tick(each["at_s"]) for each in self.events]
-        return sorted({0, *begins, *filter(None, map(self._end, self.events))})
+        again = [
+            self._tick(each["at_s"] + each["every_s"]) for each in self.events if "every_s" in each
+        ]
+        return sorted({0, *begins, *again, *filter(None, map(self._end, self.events))})
 
     def _tick(self, at_s: float) -> int:
         """Return the first tick that can be another one because of what happens at a time [s]."""
@@ -124,15 +130,19 @@ class _Prober:
     def _until(self, tick: int) -> list[Tables]:
         """Return what has happened by a tick: a fault that ends later lasts to the end.
 
-        One that `qswarm check` does not let last for ever ends as it does.
+        One that `qswarm check` does not let last for ever ends as it does. One that has happened
+        again by then does so to the end.
         """
         kept: list[Tables] = []
         for event in self.events:
-            if self._tick(event["at_s"]) <= tick:
-                lasting = {key: each for key, each in event.items() if key != "for_s"}
+            if "every_s" in event and self._tick(event["at_s"] + event["every_s"]) <= tick:
+                kept.append(event)
+            elif self._tick(event["at_s"]) <= tick:
+                once = _without(event, "every_s")
+                lasting = _without(once, "for_s")
                 goes_on = (self._end(event) or 0) > tick
                 can = goes_on and self._of({**self.tables, "event": [*kept, lasting]}) is not None
-                kept.append(lasting if can else event)
+                kept.append(lasting if can else once)
         return kept
 
     def seconds(self, tick: int) -> float:
@@ -224,3 +234,7 @@ def _needed(prober: _Prober) -> Tables | None:
         if not prober.fails({**prober.tables, "event": events}):
             return last
     return None
+
+
+def _without(event: Tables, name: str) -> Tables:
+    return {key: each for key, each in event.items() if key != name}
