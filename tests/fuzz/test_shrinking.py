@@ -3,15 +3,18 @@
 import json
 import tomllib
 from collections.abc import Iterable, Iterator
+from math import inf
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 from netem.wire.shutdown import StopRequest
 from tests.small_scenario import SMALL
 from worldsim.campaign.flight_site import Flown, Order
 from worldsim.fuzz import flights
 from worldsim.fuzz.findings import begin
-from worldsim.fuzz.shrinking import shrink
+from worldsim.fuzz.shrinking import rest_s, shrink
 from worldsim.search.margins import margins_of
 
 DRAWN = """
@@ -65,3 +68,19 @@ def test_shrinking_that_goes_on_counts_a_time_limit_as_it_was_drawn(tmp_path: Pa
     assert found["shrink_flights"] > 0
     left = tomllib.loads((tmp_path / "scenario.toml").read_text(encoding="utf-8"))
     assert left["event"], "a smaller scenario counted in which the team still moves"
+
+
+@pytest.mark.parametrize(
+    ("tables", "seconds"),
+    [
+        ({}, 10.0),
+        ({"netem": {"loss_percent": 90.0}}, 60.0),
+        ({"netem": {"multihop": {"loss_percent": 80.0}}, "comms": {"multihop_hz": 1.0}}, 60.0),
+        ({"netem": {"loss_percent": 80.0}, "comms": {"multihop_hz": 0.0, "local_hz": 5.0}}, 12.0),
+        ({"netem": {"loss_percent": 100.0}}, inf),
+    ],
+)
+def test_a_team_may_stand_still_for_as_long_as_it_waits_for_news(
+    tables: dict[str, Any], seconds: float
+) -> None:
+    assert rest_s(tables) == pytest.approx(seconds)

@@ -3,9 +3,11 @@
 import tomllib
 from collections.abc import Callable
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import Final
 
+from agent.config import Comms
 from worldsim.fuzz.findings import (
     REPEAT,
     REPETITIONS,
@@ -29,8 +31,9 @@ from worldsim.search.trials import fair_s
 
 BUDGET: Final = 150
 """Flights that shrink one finding at most."""
-REST_S: Final = 10.0
-"""A team that stood still out of its places for so long will not move in more time either [s]."""
+REST_S, REST_ROUNDS = 10.0, 12.0
+"""A team that stood still out of its places for so long will not move in more time either [s]; nor
+for so many rounds of news that get through."""
 
 
 def shrink(folder: Path, hangar: Hangar, say: Say, budget: int = BUDGET) -> Row | None:
@@ -112,13 +115,27 @@ class _Trials:
         if allowed_s is None or flown.measured is None:
             return at_s
         errors_m = [each for each in flown.measured["slot_error_m"] if each is not None]
-        rested_s = max(float(flown.measured["rest_since_s"]), quiet_s) + REST_S
+        rested_s = max(float(flown.measured["rest_since_s"]), quiet_s) + rest_s(tables)
         if errors_m and errors_m[-1] > CONVERGED_M and rested_s <= quiet_s + allowed_s:
             return rested_s
         enough_s = fair_s(tables)
         if self._drawn_s is not None:
             enough_s = min(enough_s, self._drawn_s)
         return at_s if allowed_s >= enough_s else None
+
+
+def rest_s(tables: Tables) -> float:
+    """Return how long a team must stand still until it is certain that it waits for nothing [s]."""
+    radio, usual = tables.get("netem") or {}, Comms()
+    channels = (radio, radio.get("local") or {}, radio.get("multihop") or {})
+    lost = max(float(each.get("loss_percent") or 0.0) for each in channels) / 100.0
+    comms = {
+        "multihop_hz": usual.multihop_hz,
+        "local_hz": usual.local_hz,
+        **tables.get("comms", {}),
+    }
+    hz = float(comms["multihop_hz"] or comms["local_hz"])
+    return max(REST_S, REST_ROUNDS / (1.0 - lost) / hz) if lost < 1.0 else inf
 
 
 def _spelled_out(tables: Tables, first_s: float, trials: _Trials) -> tuple[Tables, float]:

@@ -188,7 +188,7 @@ class Invariants:
             self.tallies["I2"].count(self._breaches.vertices)
             self.tallies["I3"].count(self._breaches.shares)
         if self._quiet_since_s is not None and self._looks_again(tick, phase, last_claims):
-            self._restart_premises(tick.time_s)
+            self._start_anew(tick.time_s)
         self._evaluate_quiet(tick, last_claims, phase.at_slots)
 
     @property
@@ -218,14 +218,18 @@ class Invariants:
 
     def _excuse(self, time_s: float) -> None:
         """Evaluate nothing at a tick at which news takes no bounded time, and start anew then."""
-        self._restart_premises(time_s)
+        self._start_anew(time_s)
         self._shared.forget()
         self._leads.take_excess()
+
+    def _start_anew(self, time_s: float) -> None:
+        """Start anew where no event tells why."""
+        self._leads.restart(time_s)
+        self._restart_premises(time_s)
 
     def _restart_premises(self, time_s: float) -> None:
         self._fault_s = max(self._fault_s, time_s)
         self._quiet_since_s = None
-        self._leads.restart()
         self._moves.clear()
 
     def _find_components(self, tick: Tick) -> None:
@@ -235,7 +239,7 @@ class Invariants:
         self._places.hear(found.hears)
         last, self._components, self._members = self._components, found, found.members()
         if last is not None and last is not found and not last.same_as(found):
-            self._restart_premises(tick.time_s)
+            self._start_anew(tick.time_s)
             self._before = last.hops, last.loss
         if self._shared.local and len(self._claims):
             self._shared.find(self._claims, self._members, found.hears)

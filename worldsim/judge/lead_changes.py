@@ -10,6 +10,8 @@ from worldsim.judge.run_events import RoleChanged
 
 MAX_CHANGES = 3
 """An agent may change so often after each fault; after two kinds at one time twice as often."""
+EFFECT_S = 1.5
+"""So long after a fault the components that it changed are found at the latest [s]."""
 
 
 class LeadChanges:
@@ -27,10 +29,11 @@ class LeadChanges:
         when it comes near is answered as a fault is."""
 
     def strike(self, t_s: float, kind: str) -> None:
-        """Take a fault at a time [s]; each kind is answered by changes of its own."""
+        """Start anew after a fault at a time [s]; each kind is answered by changes of its own."""
         if t_s != self._fault_s:
             self._fault_s, self._kinds = t_s, set()
         self._kinds.add(kind)
+        self._changes.clear()
 
     def take(self, event: RoleChanged, *, informed: bool) -> None:
         """Take a change of role; informed: whether it counts, as news reaches the agent."""
@@ -47,8 +50,13 @@ class LeadChanges:
         """Take the start of an agent's new process, which leads nothing."""
         self._leading.discard(agent)
 
-    def restart(self) -> None:
-        """Start anew after a fault."""
+    def restart(self, time_s: float) -> None:
+        """Start anew without an event, as agents came into reach, or went out of it.
+
+        Soon after a fault that is its effect, which is looked for once a second.
+        """
+        if time_s - self._fault_s > EFFECT_S:
+            self._kinds.clear()
         self._changes.clear()
 
     def take_excess(self) -> int:
