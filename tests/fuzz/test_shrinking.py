@@ -70,6 +70,17 @@ def test_shrinking_that_goes_on_counts_a_time_limit_as_it_was_drawn(tmp_path: Pa
     assert left["event"], "a smaller scenario counted in which the team still moves"
 
 
+def test_what_cannot_be_replayed_stays_as_it_was_drawn_and_its_page_says_so(
+    tmp_path: Path,
+) -> None:
+    row = {"seed": 1, "how": "random", "violated": ["I3"], "reason": "", "duration_s": 5.0}
+    begin(tmp_path, SMALL, row, flights.Flown("it", {"I3": -1.0}, "", ""))
+    assert "not made smaller" not in (tmp_path / "finding.md").read_text()
+    shrink(tmp_path, flights.Hangar(RestingWithEvents(), StopRequest()), lambda _: None)
+    assert "not made smaller" in (tmp_path / "finding.md").read_text()
+    assert (tmp_path / "scenario.toml").read_text() == SMALL
+
+
 @pytest.mark.parametrize(
     ("tables", "seconds"),
     [

@@ -76,6 +76,7 @@ def page(finding: Row) -> str:
         f"First tick of trouble: {_seconds(finding['trouble_s'])}.",
         f"Last event before it: {_event_text(finding['last_event'])}.",
         *_rest(finding),
+        *_as_drawn(finding),
         "",
         *_curves(finding.get("margins") or {}),
         *_events(finding.get("events") or []),
@@ -95,6 +96,13 @@ def _rest(finding: Row) -> list[str]:
     if since_s is None or end_s - since_s < SEEN_AT_REST_S:
         return []
     return [f"All vehicles stand still from {since_s:g} s on."]
+
+
+def _as_drawn(finding: Row) -> list[str]:
+    """Return that a finding is as large as it was drawn, where shrinking could not begin."""
+    if not finding["shrunk"] or finding["shrink_flights"]:
+        return []
+    return ["It was not made smaller: flown again, it does not show, or not each time."]
 
 
 def _size_row(name: str, size: Mapping[str, Any]) -> str:
