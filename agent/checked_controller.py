@@ -49,20 +49,12 @@ from agent.messages import (
     Vector,
 )
 from agent.parameters import made
+from agent.sound_intent import MAX_INDEX, claims_soundly, is_sound, moves_soundly
 from netem.compiled import UnloadableError
 from netem.wire.channels import CHANNELS
 
-MAX_INDEX: Final = 2**15
-"""Queues and ranks are below it, and at least -1, as on the wire."""
-_AXES: Final = 3
 _TILTS: Final = 2  # pitch and roll
-_FLOATS: Final = (float,) * 13
-"""Types of an intent's numbers: three vectors, two tilt angles, yaw and force."""
-_FLOATS_WITH_TARGET: Final = (float,) * 16
 _EMPTY: Final = ()
-SMALL = min(MAX_SPEED_MPS, MAX_ANGLE_RAD)
-"""Numbers whose absolute values add up to no more than this are within every bound."""
-
 MESSAGE_FIELDS: Final = 2
 MAX_DATAGRAMS: Final = 8
 """Most datagrams that a controller sends in one tick."""
@@ -167,6 +159,8 @@ def plain(intent: Intent, trusts_words: bool = False) -> Intent:
     trusts_words: whether the controller is one of this project's, whose words need no check.
     Raises TypeError if it is not an Intent, ValueError for numbers outside a command's bounds.
     """
+    if is_sound(intent, trusts_words):
+        return intent
     if type(intent) is not Intent:
         intent = _exact(intent)
     if intent.signals is not NO_SIGNALS or intent.messages is not _EMPTY:
@@ -177,9 +171,9 @@ def plain(intent: Intent, trusts_words: bool = False) -> Intent:
         intent = replace(intent, blocked=_places(intent.blocked))
     if intent.words is not NO_WORDS and not (trusts_words and type(intent.words) is Words):
         intent = replace(intent, words=_words(intent.words))
-    if not _claims_soundly(intent):
+    if not claims_soundly(intent):
         intent = _with_sound_claims(intent)
-    return intent if _moves_soundly(intent) else _converted(intent)
+    return intent if moves_soundly(intent) else _converted(intent)
 
 
 def _exact(given: object) -> Intent:
@@ -187,45 +181,6 @@ def _exact(given: object) -> Intent:
     if not isinstance(given, Intent):
         raise TypeError(f"decide returned {type(given).__name__}, not an Intent")
     return Intent(*[getattr(given, name) for name in Intent.__struct_fields__])
-
-
-def _moves_soundly(intent: Intent) -> bool:
-    """Return whether an intent's numbers are plain floats, finite and small; most always are.
-
-    Their types come first: abs() of a number of another class is what that class says.
-    """
-    wanted, velocity, heading_for = intent.wanted, intent.velocity, intent.heading_for
-    tilt, target = intent.tilt, intent.target
-    if not (
-        type(wanted) is type(velocity) is type(heading_for) is tuple
-        and type(tilt) is tuple
-        and (target is None or type(target) is tuple)
-        and len(wanted) == len(velocity) == len(heading_for) == _AXES
-    ):
-        return False
-    numbers: tuple[float, ...]
-    if target is None:
-        numbers = (*wanted, *velocity, *heading_for, *tilt, intent.yaw, intent.force)
-    else:
-        numbers = (*target, *wanted, *velocity, *heading_for, *tilt, intent.yaw, intent.force)
-    if tuple(map(type, numbers)) != (_FLOATS if target is None else _FLOATS_WITH_TARGET):
-        return False
-    # One sum shows that all are finite and small.
-    return sum(map(abs, numbers)) <= SMALL and intent.force >= 0.0
-
-
-def _claims_soundly(intent: Intent) -> bool:
-    """Return whether an intent's claim is of the right types and bounds."""
-    cost_m, place = intent.cost_m, intent.place
-    if not (type(cost_m) is float and 0.0 <= cost_m < inf and type(intent.vertex) is bool):
-        return False
-    if place is None:
-        return True
-    if type(place) is not Place:
-        return False
-    queue, rank = place
-    ints = type(queue) is int and type(rank) is int
-    return ints and -1 <= queue < MAX_INDEX and -1 <= rank < MAX_INDEX
 
 
 def _with_sound_claims(intent: Intent) -> Intent:
