@@ -1,10 +1,7 @@
-"""Encoding and decoding of messages, with every check that needs no state.
-
-Decoding is a pure function of the bytes, so a process that feeds several agents may memoise it.
-"""
+"""Encoding and decoding of messages, with every check that needs no state."""
 
 from collections.abc import Callable
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, final
 from zlib import crc32
 
 import msgpack
@@ -36,18 +33,21 @@ MAX_OBSERVATION_B: Final = 65536
 """Sensed vehicles, scans, and with them a mission: its formation and its frame's path."""
 
 _T = TypeVar("_T", bound=msgspec.Struct)
-_encode = msgspec.msgpack.Encoder().encode
+_encode: Final = msgspec.msgpack.Encoder().encode
+_GOSSIP: Final = Gossip
+_SUMMARY: Final = Summary
 
 
 def encode(message: msgspec.Struct) -> bytes:
     """Encode any message as msgpack; a summary that says nothing of lines, without that field."""
     data = _encode(message)
     # isinstance() is slow for structures of msgspec; neither of these has subclasses.
+    kind = type(message)
     summary: Summary | None = None
-    if type(message) is Gossip:
-        summary = message.summary
-    elif type(message) is Summary:
-        summary = message
+    if kind is _GOSSIP:
+        summary = message.summary  # type: ignore[attr-defined]
+    elif kind is _SUMMARY:
+        summary = message  # type: ignore[assignment]
     if summary is not None and summary.lines is None:
         return _without_last_field(data, len(_encode(summary)))
     return data
@@ -112,11 +112,11 @@ def decode_formation(data: bytes) -> FormationSpec:
     return decode(data, FormationSpec, MAX_PIECES * PIECE_B, max_text=MAX_EXPRESSION_LENGTH)
 
 
-_beacon = msgspec.msgpack.Decoder(Beacon).decode
-_gossip = msgspec.msgpack.Decoder(Gossip).decode
-_datagram = msgspec.msgpack.Decoder(Datagram).decode
-_observation = msgspec.msgpack.Decoder(Observation).decode
-_command = msgspec.msgpack.Decoder(Command).decode
+_beacon: Final = msgspec.msgpack.Decoder(Beacon).decode
+_gossip: Final = msgspec.msgpack.Decoder(Gossip).decode
+_datagram: Final = msgspec.msgpack.Decoder(Datagram).decode
+_observation: Final = msgspec.msgpack.Decoder(Observation).decode
+_command: Final = msgspec.msgpack.Decoder(Command).decode
 
 
 def decode_beacon(payload: bytes) -> Beacon:
@@ -152,6 +152,48 @@ def decode_observation(data: bytes) -> Observation:
 def decode_command(data: bytes) -> Command:
     """Decode an agent's message to the world, or raise :class:`RejectedError`."""
     return _typed(data, _command, MAX_COMMAND_B)
+
+
+@final
+class Decoders:
+    """Decodes radio payloads, each once for all agents that a process feeds.
+
+    kept: at least the newest so many payloads of a channel are known with what they hold; decoding
+    is a pure function of the bytes.
+    """
+
+    def __init__(self, kept: int = 0) -> None:
+        self._most = kept
+        self._beacons: dict[bytes, HeardBeacon] = {}
+        self._gossip: dict[bytes, Gossip] = {}
+
+    def beacon(self, payload: bytes) -> HeardBeacon:
+        """Decode a payload of the local channel, or raise :class:`RejectedError`."""
+        if not self._most:
+            return hear_beacon(payload)
+        found = self._beacons.get(payload)
+        if found is None:
+            found = hear_beacon(payload)
+            self._make_room(self._beacons)
+            self._beacons[payload] = found
+        return found
+
+    def gossip(self, payload: bytes) -> Gossip:
+        """Decode a payload of the multihop channel, or raise :class:`RejectedError`."""
+        if not self._most:
+            return decode_gossip(payload)
+        found = self._gossip.get(payload)
+        if found is None:
+            found = decode_gossip(payload)
+            self._make_room(self._gossip)
+            self._gossip[payload] = found
+        return found
+
+    def _make_room(self, known: dict[bytes, Any]) -> None:
+        """Forget the older half of what is known where that is twice as much as is kept."""
+        if len(known) >= 2 * self._most:
+            for payload in list(known)[: self._most]:
+                del known[payload]
 
 
 def _typed(data: bytes, decode_typed: Callable[[bytes], _T], max_bytes: int) -> _T:

@@ -6,14 +6,13 @@ kept with a time counts no longer, its controller included. Its mission stays.
 """
 
 from collections import Counter
-from collections.abc import Callable
 from math import dist, hypot, inf
-from typing import Final, NamedTuple, assert_never, final
+from typing import Final, assert_never, final
 
 import msgspec
 
 from agent.checked_controller import CheckedController
-from agent.codec import decode_gossip, hear_beacon, holds_datagram
+from agent.codec import Decoders, holds_datagram
 from agent.comms.broadcast import Broadcast, OwnState
 from agent.comms.datagrams import Datagrams
 from agent.comms.gossip import RecordTable
@@ -49,7 +48,6 @@ from agent.messages import (
     NO_MISSION,
     ZERO,
     Command,
-    Gossip,
     Mission,
     Observation,
     Place,
@@ -90,23 +88,17 @@ class Outbox:
         self.frames = frames
 
 
-class Decoders(NamedTuple):
-    """Decoders of radio payloads; a process that feeds many agents may pass memoising ones."""
-
-    beacon: Callable[[bytes], HeardBeacon] = hear_beacon
-    gossip: Callable[[bytes], Gossip] = decode_gossip
-
-
 class Agent:
     """One agent of the team. Raises ControllerError if its controller cannot be loaded.
 
-    decide: how its controller is asked; None: directly.
+    decoders: shared by the agents that a process feeds. decide: how its controller is asked; None:
+    directly.
     """
 
     def __init__(
         self,
         setup: AgentSetup,
-        decoders: Decoders = Decoders(),  # noqa: B008
+        decoders: Decoders | None = None,
         decide: Decide | None = None,
     ) -> None:
         tick_s = 1.0 / setup.tick_hz
@@ -115,7 +107,7 @@ class Agent:
         self.rejected: Counter[str] = Counter()
         self._setup, self._decide_with = setup, decide
         self._incarnation = setup.incarnation
-        self._hear_beacon, self._decode_gossip = decoders.beacon, decoders.gossip
+        self._decoders = decoders if decoders is not None else Decoders()
         self._slack_s = 2.0 * tick_s
         self._implausible2 = (IMPLAUSIBLE_SPEEDS * setup.fleet_max_speed_mps) ** 2
         self._command_slots = setup.command_ticks * setup.slots_per_tick
@@ -277,7 +269,7 @@ class Agent:
             self.rejected[error.cause] += 1
 
     def _receive_beacon(self, source: int, payload: bytes, now_s: float) -> None:
-        beacon = self._hear_beacon(payload)
+        beacon = self._decoders.beacon(payload)
         if beacon.id != source:
             raise RejectedError("spoofed", f"a beacon of agent {source} with the id {beacon.id}")
         u, v, w = beacon.velocity
@@ -291,7 +283,7 @@ class Agent:
             self._missions.receive_frame(beacon)
 
     def _receive_gossip(self, source: int, payload: bytes, now_s: float) -> None:
-        gossip = self._decode_gossip(payload)
+        gossip = self._decoders.gossip(payload)
         if gossip.id != source:
             raise RejectedError("spoofed", f"gossip of agent {source} with the id {gossip.id}")
         if gossip.stamp_s > now_s + self._slack_s:

@@ -9,13 +9,12 @@ they go through the codec too, as between processes, and must come out equal.
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from time import perf_counter, process_time
 from typing import Final, Protocol, TypeVar, assert_never
 
-from agent.codec import decode_command, decode_gossip, decode_observation, encode, hear_beacon
+from agent.codec import Decoders, decode_command, decode_observation, encode
 from agent.config import AgentSetup
-from agent.core import Agent, Decoders
+from agent.core import Agent
 from agent.late_frames import LateFrames
 from agent.messages import Observation
 from netem.compiled import tell_if_unfit
@@ -113,11 +112,9 @@ class VirtualFleet:
         """What in the scenario ends the run before its time; None: nothing so far."""
         self._watch = watch
         self._slot = 0
-        kept = HEARD_AGAIN * scenario.rows
-        decoders = Decoders(lru_cache(kept)(hear_beacon), lru_cache(kept)(decode_gossip))
         self._scenario = scenario
         self._medium = Medium(scenario.medium_setup())
-        self._decoders = decoders
+        self._decoders = Decoders(HEARD_AGAIN * scenario.rows)
         self._late: dict[int, LateFrames] = {}
         self._agents = {agent: self._new_agent(agent, 0) for agent in range(scenario.fleet.agents)}
         self._inboxes = [deque[tuple[Frame, ...]](maxlen=BATCH_RING) for _ in range(scenario.rows)]
@@ -205,9 +202,10 @@ class VirtualFleet:
         inbox = self._inboxes[agent]
         if self._tap is not None and self._tap.agent == agent:
             self._tap.step([frame for batch in inbox for frame in batch], observation)
+        heard_s = observation.time_s
         while inbox:
             for frame in inbox.popleft():
-                core.receive(frame.source, frame.channel, frame.payload, observation.time_s)
+                core.receive(frame.source, frame.channel, frame.payload, heard_s)
         if self._watch is not None:
             self._watch.enter(agent, open_slot.slot)
         outbox = core.step(observation)
