@@ -1,11 +1,14 @@
 """A beacon as its receivers use it: plain numbers, found once for all who hear the same beacon.
 
-Structures of msgspec are slow to read, and each receiver reads a beacon many times.
+Structures of msgspec are slow to read, and each receiver reads a beacon many times. Here each is
+taken apart once, into its fields in their order.
 """
 
 from functools import lru_cache
 from math import inf
-from typing import Final, final
+from typing import Any, Final, final
+
+from msgspec.structs import astuple
 
 from agent.messages import (
     NO_MISSION,
@@ -66,10 +69,11 @@ class HeardBranch:
     """See :class:`~agent.messages.Branch`."""
 
     def __init__(self, branch: Branch) -> None:
-        self.root: RootKey = branch.root
-        self.version: int = branch.version
-        self.tier: int = branch.tier
-        self.parent: int = branch.parent
+        root, version, tier, parent = branch
+        self.root: RootKey = root
+        self.version: int = version
+        self.tier: int = tier
+        self.parent: int = parent
 
 
 @final
@@ -77,16 +81,18 @@ class HeardStanding:
     """See :class:`~agent.messages.Standing`."""
 
     def __init__(self, standing: Standing) -> None:
+        fields: tuple[Any, ...] = astuple(standing)
+        branches, leads, queue, heard, pushes, proposal, reservation, code = fields
         self.branches: list[HeardBranch | None] = [
-            HeardBranch(each) if each is not None else None for each in standing.branches
+            HeardBranch(each) if each is not None else None for each in branches
         ]
-        self.leads: int = standing.leads
-        self.queue: int = standing.queue
-        self.heard: int = standing.heard
-        self.pushes: bool = standing.pushes
-        self.proposal: Swap | None = standing.proposal
-        self.reservation: Swap | None = standing.reservation
-        self.code: int = standing.code
+        self.leads: int = leads
+        self.queue: int = queue
+        self.heard: int = heard
+        self.pushes: bool = pushes
+        self.proposal: Swap | None = proposal
+        self.reservation: Swap | None = reservation
+        self.code: int = code
 
 
 @final
@@ -94,24 +100,27 @@ class HeardBeacon:
     """See :class:`~agent.messages.Beacon`; nobody changes it."""
 
     def __init__(self, beacon: Beacon) -> None:
-        self.id: int = beacon.id
-        self.version = Version(beacon.stamp_s, beacon.incarnation, beacon.sequence)
-        self.stamp_s: float = beacon.stamp_s
-        self.position: Vector = beacon.position
-        self.velocity: Vector = beacon.velocity
-        self.target: Vector = beacon.target
-        self.queue: int = beacon.queue
-        self.rank: int = beacon.rank
-        self.cost_mm: int = beacon.cost_mm
-        self.speed_cap: float = beacon.speed_cap
-        self._echoed = [agent for agent, _ in beacon.echoes]
-        self._sequences = [sequence for _, sequence in beacon.echoes]
-        self.mission: int = beacon.mission
-        self.frame_key: int = beacon.frame_key
-        self.frame: Pose = beacon.frame
-        self.drift: Drift | None = beacon.drift
-        self.blocked: tuple[tuple[int, int], ...] = beacon.blocked
-        standing = beacon.standing
+        fields: tuple[Any, ...] = astuple(beacon)
+        own_id, incarnation, sequence, stamp_s, position, velocity, target = fields[:7]
+        queue, rank, cost_mm, speed_cap, echoes, mission, frame_key = fields[7:14]
+        frame, drift, blocked, standing = fields[14:]
+        self.id: int = own_id
+        self.version = Version(stamp_s, incarnation, sequence)
+        self.stamp_s: float = stamp_s
+        self.position: Vector = position
+        self.velocity: Vector = velocity
+        self.target: Vector = target
+        self.queue: int = queue
+        self.rank: int = rank
+        self.cost_mm: int = cost_mm
+        self.speed_cap: float = speed_cap
+        self._echoed: list[int] = [agent for agent, _ in echoes]
+        self._sequences: list[int] = [number for _, number in echoes]
+        self.mission: int = mission
+        self.frame_key: int = frame_key
+        self.frame: Pose = frame
+        self.drift: Drift | None = drift
+        self.blocked: tuple[tuple[int, int], ...] = blocked
         self.standing = HeardStanding(standing) if standing is not None else None
         claims = self.queue >= 0 and self.rank >= 0 and self.mission != NO_MISSION
         self.place = _place(self.queue, self.rank) if claims else None

@@ -43,15 +43,17 @@ class RecordTable:
         self._ids = ids
         self._newest: dict[int, HeardBeacon | Record] = {}
         self._last: dict[int, Version] = {}
+        """The last one adopted of each subject whose newest statement is no beacon."""
         self._lag_s: dict[int, float] = {}
         period_s = 1.0 / multihop_hz if multihop_hz > 0.0 else 0.0
         self._relayed_silence_s = max(LEAST_RELAYED_SILENCE_S, RELAYED_SILENCE_ROUNDS * period_s)
 
     def adopt_beacon(self, beacon: HeardBeacon) -> None:
         """Take a neighbour's beacon as the newest record of that neighbour."""
-        subject, version = beacon.id, beacon.version
-        if self._may_know(subject) and version.supersedes(self._last.get(subject, NEVER_HEARD)):
-            self._last[subject] = version
+        subject, known = beacon.id, self._newest.get(beacon.id)
+        if known is None and not self._may_know(subject):
+            return
+        if beacon.version.supersedes(self._last_of(subject, known)):
             self._newest[subject] = beacon
 
     def adopt(self, gossip: Gossip, now_s: float, slack_s: float) -> None:
@@ -65,7 +67,7 @@ class RecordTable:
         for record in gossip.records:
             subject = record.id
             version = Version(record.stamp_s, record.incarnation, record.version)
-            if not version.supersedes(self._last.get(subject, NEVER_HEARD)):
+            if not version.supersedes(self._last_of(subject, self._newest.get(subject))):
                 continue
             if self._may_know(subject) and earliest_s <= record.stamp_s <= latest_s:
                 self._last[subject] = version
@@ -99,6 +101,7 @@ class RecordTable:
         departed = []
         for subject in gone:
             last = self._newest.pop(subject)
+            self._last[subject] = self._last_of(subject, last)
             departed.append(DepartedMember(position=last.position, stamp_s=last.stamp_s))
             self._lag_s.pop(subject, None)
         return departed
@@ -159,6 +162,12 @@ class RecordTable:
         if own is None:
             return iter(())
         return _chunks([own, *(_record_of(self._newest[each]) for each in sorted(self._newest))])
+
+    def _last_of(self, subject: int, newest: HeardBeacon | Record | None) -> Version:
+        """Return the last version adopted of a subject. newest: its newest statement, if known."""
+        if isinstance(newest, HeardBeacon):
+            return newest.version
+        return self._last.get(subject, NEVER_HEARD)
 
     def _may_know(self, subject: int) -> bool:
         """Whether a subject is known, or another agent of the run for which there is room."""
