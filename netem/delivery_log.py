@@ -31,8 +31,8 @@ class Digest:
     def __init__(self) -> None:
         self._hash = sha256()
 
-    def update(self, pages: Iterable[bytes | bytearray]) -> None:
-        """Add the pages of a slot, in order of the receivers' ids."""
+    def update(self, pages: Iterable[bytes]) -> None:
+        """Add the pages of a slot, or their entries, in order of the receivers' ids."""
         self._hash.update(b"".join(pages))
 
     @property
@@ -42,21 +42,24 @@ class Digest:
 
 
 class DeliveryLog:
-    """The pages of the present slot, row i = receiver i; the medium appends entries to them."""
+    """The pages of the present slot, row i = receiver i.
+
+    A page is a list to which the medium appends: entries, or pieces of them.
+    """
 
     def __init__(self, agents: int) -> None:
-        self.pages = [bytearray() for _ in range(agents)]
+        self.pages: list[list[bytes]] = [[] for _ in range(agents)]
         self._digest = Digest()
 
     def digest(self) -> bytes:
         """End a slot: return the digest of all slots so far."""
-        self._digest.update(self.pages)
+        self._digest.update([entry for page in self.pages for entry in page])
         self._clear()
         return self._digest.value
 
     def take_pages(self) -> Mapping[int, bytes]:
         """End a slot of a shard: return its pages by receiver, without the empty ones."""
-        taken = {receiver: bytes(page) for receiver, page in enumerate(self.pages) if page}
+        taken = {receiver: b"".join(page) for receiver, page in enumerate(self.pages) if page}
         self._clear()
         return taken
 

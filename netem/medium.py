@@ -10,8 +10,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from hashlib import sha256
 from math import inf
-from operator import itemgetter
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 
@@ -35,10 +34,10 @@ from netem.wire.frame import (
     Transmission,
 )
 
-DELIVERED = Cause.DELIVERED
-_FRAME = itemgetter(-1)
+DELIVERED: Final = int(Cause.DELIVERED)
+DROPPED_RANGE: Final = int(Cause.DROPPED_RANGE)
 FATES = tuple(cause.name.lower() for cause in Cause)
-SURELY_FIT = (MAX_BATCH_B - BATCH_HEAD_B) // (FRAME_HEAD_B + MAX_PAYLOAD_B)
+SURELY_FIT: Final = (MAX_BATCH_B - BATCH_HEAD_B) // (FRAME_HEAD_B + MAX_PAYLOAD_B)
 """This many frames fit one batch, whatever their payloads."""
 FIRST_FORGED = 2**52
 """From here on saboteurs' frames are counted: agents' own keep numbers and fates."""
@@ -189,13 +188,12 @@ class Medium:
             count = bisect_right(queue, (now_s, inf))
         if count > SURELY_FIT:
             count = _count_fitting(queue[:count])
-        taken = queue[:count]
-        del queue[:count]
+        taken, self._queues[receiver] = queue[:count], queue[count:]
         if due_s is not None:
             due_s.extend([entry[0] for entry in taken])
         self.in_flight -= count
-        self._fates[Cause.DELIVERED] += count
-        return tuple(map(_FRAME, taken))
+        self._fates[DELIVERED] += count
+        return tuple([entry[-1] for entry in taken])
 
     def discard(self, receiver: int) -> None:
         """Drop the frames in flight to a receiver that has disappeared, or to all at a kill."""
@@ -262,7 +260,7 @@ class Medium:
                 return
             sending = Sending(sending.frame, sending.key, sending.sent_s, waited_s)
         near = self._range_index.in_range(source, models.reach_m(channel, source))
-        self._fates[Cause.DROPPED_RANGE] += self._others[source] - len(near)
+        self._fates[DROPPED_RANGE] += self._others[source] - len(near)
         common = models.common(channel, source)
         if common is None or not common.plain or self._conditions.obstructed:
             self._decide_each(sending, near)
@@ -293,9 +291,8 @@ class Medium:
         if waited_s is None:
             self._fates[Cause.DROPPED_QUEUE] += self._others[source]
             if source in self._own:
-                self._delivery_log.pages[source] += HEAD(*sending.key) + FATE(
-                    0, LOST_TO_QUEUE.cause, 0.0, -1.0
-                )
+                verdict = FATE(0, LOST_TO_QUEUE.cause, 0.0, -1.0)
+                self._delivery_log.pages[source].append(HEAD(*sending.key) + verdict)
         return waited_s
 
     def _deliver_all(self, sending: Sending, near: InRange, delay_s: float) -> None:
@@ -307,7 +304,7 @@ class Medium:
         queues, pages = self._queues, self._delivery_log.pages
         for receiver, _ in near:
             queues[receiver].append(entry)
-            pages[receiver] += log_entry
+            pages[receiver].append(log_entry)
         self.in_flight += len(near)
 
     def _decide_plain(self, sending: Sending, near: InRange, link: LinkModel) -> None:
@@ -320,7 +317,9 @@ class Medium:
         verdicts = self._links.plain(link, sending, near)
         for k, (receiver, _) in enumerate(near):
             fate = verdicts[k]
-            pages[receiver] += head + FATE(0, fate.cause, fate.delay_s, fate.flipped_at)
+            page = pages[receiver]
+            page.append(head)
+            page.append(FATE(0, fate.cause, fate.delay_s, fate.flipped_at))
             if fate.cause:
                 fates[fate.cause] += 1
             else:
@@ -360,7 +359,8 @@ class Medium:
     ) -> None:
         """Log and count a verdict; put a delivered frame into its receiver's queue."""
         delay_s, turned = fate.delay_s, fate.flipped_at
-        self._delivery_log.pages[receiver] += head + FATE(copy, fate.cause, delay_s, turned)
+        verdict = FATE(copy, fate.cause, delay_s, turned)
+        self._delivery_log.pages[receiver].append(head + verdict)
         if fate.cause:
             self._fates[fate.cause] += 1
             return
