@@ -14,19 +14,16 @@ from __future__ import annotations
 
 import sys
 from array import array
-from collections import Counter
-from collections.abc import Container
+from collections.abc import Sequence
 from math import inf
 from typing import Final, NamedTuple
 
 from agent.messages import MAX_LABELS_B, MAX_TEAM, Summary
-from agent.structure.label_code import FIRST_VERTEX, queue_of_code
+from agent.structure.label_code import CODES, FIRST_VERTEX, queue_of_code
 from agent.structure.label_news import OWN, LabelNews
 
 QUANTUM_S: Final = 0.25
 """Resolution of a label's time [s]."""
-CODES: Final = 256
-"""Number of codes: see :mod:`agent.structure.label_code`."""
 UNKNOWN = 0xFFFF
 """The label on the radio of a member of which nothing is known."""
 MAX_QUANTA: Final = 254
@@ -45,6 +42,8 @@ MAX_LABELLED = 2**14
 """Ids from here on are not counted."""
 LABEL_S = QUANTUM_S / CODES
 """Time of one step of a label [s]."""
+KNOWN: Final = (False, *[True] * (CODES - 1))
+"""All codes but that of a member of which nothing is known."""
 ASK_S, FORGOTTEN_S = 0.5, 10.0
 """A member whose label is late is asked for every ASK_S, until FORGOTTEN_S later."""
 SHARED_LABELS = MAX_LABELS_B // 2
@@ -200,28 +199,28 @@ class Census:
 
     def population(self, now_s: float, lost_s: float, queues: int, vertices: int) -> Population:
         """Return who is there now. lost_s: T_lost of a neighbour, and time for an answer [s]."""
-        codes = Counter([code for code, _ in self.present(now_s, lost_s)])
         members, holders = [0] * queues, [0] * vertices
-        for code, number in codes.items():
+        present = self.present(now_s, lost_s)
+        for code, _ in present:
             if (queue := queue_of_code(code, queues)) >= 0:
-                members[queue] += number
+                members[queue] += 1
             elif FIRST_VERTEX <= code < FIRST_VERTEX + vertices:
-                holders[code - FIRST_VERTEX] += number
-        return Population(codes.total(), tuple(members), tuple(holders), self._changed_s)
+                holders[code - FIRST_VERTEX] += 1
+        return Population(len(present), tuple(members), tuple(holders), self._changed_s)
 
     def present(
-        self, now_s: float, lost_s: float, codes: Container[int] = range(1, CODES)
+        self, now_s: float, lost_s: float, among: Sequence[bool] = KNOWN
     ) -> list[tuple[int, int]]:
         """Return each member that is there, by code and id.
 
-        lost_s: as for the population [s]; codes: only of members with one of these.
+        lost_s: as for the population [s]; among: for each code, whether its members count.
         """
         oldest_s = now_s - lost_s - QUANTUM_S
-        labels, lag_s = self._labels, self._lag_s
+        labels, lag_s, counts = self._labels, self._lag_s, list(among)
         return [
             (code, member)
             for member, code in enumerate(self._codes)
-            if code in codes and labels[member] * LABEL_S >= oldest_s - LAGS * lag_s[member]
+            if counts[code] and labels[member] * LABEL_S >= oldest_s - LAGS * lag_s[member]
         ]
 
     def wire(self, now_s: float, most: int = SHARED_LABELS) -> tuple[int, bytes]:

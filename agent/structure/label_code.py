@@ -12,6 +12,8 @@ from typing import Final
 from agent.messages import Vector
 from agent.structure.queue_map import QueueMap
 
+CODES: Final = 256
+"""Number of codes; 0 is of a member of which nothing is known."""
 UNPLACED: Final = 1
 """Code of a member without a queue."""
 FIRST_QUEUE, FIRST_VERTEX = 2, 128
@@ -44,9 +46,9 @@ def of_vertex(vertex: int) -> int:
 
 
 @lru_cache(maxsize=256)
-def codes_of(queue: int, queues: int) -> frozenset[int]:
-    """Return all codes of a queue in a formation of so many queues."""
-    return frozenset(range(FIRST_QUEUE + queue, FIRST_VERTEX, queues))
+def codes_of(queue: int, queues: int) -> tuple[bool, ...]:
+    """Return for each code whether it is of a queue in a formation of so many queues."""
+    return tuple([queue_of_code(code, queues) == queue for code in range(CODES)])
 
 
 def queue_of_code(code: int, queues: int) -> int:

@@ -112,8 +112,7 @@ class Swaps:
         """
         now_s, timing = view.now_s, view.timing
         waits = now_s < claim.no_swap_before_s or now_s - claim.since_s <= timing.hold_s
-        leaving = claim.queue in view.transfers
-        if waits or leaving or view.is_under_way or claim.swapping or claim.pushes(now_s):
+        if waits or view.is_under_way or claim.swapping or claim.pushes(now_s):
             return
         mine = view.point(claim.queue, claim.number)
         best: tuple[float, Heard] | None = None
@@ -123,7 +122,7 @@ class Swaps:
             gain = _gain(view, mine, other)
             if gain > GAIN_M2 and (best is None or gain > best[0]):
                 best = gain, other
-        if best is not None and best[1].place is not None:
+        if best is not None and best[1].place is not None and claim.queue not in view.transfers:
             own = view.map.place(claim.queue, claim.number)
             claim.proposal = Swap(best[1].id, own, best[1].place)
             claim.proposed_s = now_s

@@ -140,24 +140,37 @@ class Tree:
             return
         link = _OwnLink(here, velocity, reach_m, self.parent, KEPT * parent_s)
         heard_of = {each.heard.id: each.heard for each in followers}
-        best: tuple[_Order, int] | None = None
+        best: _Order | None = None
+        tier = -1
         for each in followers:
             current = each.heard.id == self.parent
             if (
                 0 <= each.tier < MAX_TIER
                 and (current or each.heard.age_s < parent_s)
                 and each.parent != own_id
-                and (best is None or _least_tier(each) <= best[0][0])
+                and (best is None or _least_tier(each) <= best[0])
                 and each.root == root
             ):
-                found = link.order(each, heard_of.get(each.parent)), each.tier
-                best = found if best is None else min(best, found)
-        self.parent = best[0][3] if best is not None else -1
-        self.tier = best[1] + 1 if best is not None else -1
+                found = link.order(each, heard_of.get(each.parent))
+                if best is None or _precedes(found, best):
+                    best, tier = found, each.tier + 1
+        self.parent = best[3] if best is not None else -1
+        self.tier = tier
 
 
 _Order = tuple[int, bool, float, int]
 """Of two agents the one with the lesser order is the better parent."""
+
+
+def _precedes(one: _Order, other: _Order) -> bool:
+    """Whether an order is less than another one; compiled code compares tuples far more slowly."""
+    if one[0] != other[0]:
+        return one[0] < other[0]
+    if one[1] != other[1]:
+        return other[1]
+    if one[2] != other[2]:
+        return one[2] < other[2]
+    return one[3] < other[3]
 
 
 @final

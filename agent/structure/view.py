@@ -50,6 +50,7 @@ class View:
         self._highest: list[int] | None = None
         self._latest: LeaderSummary | None = None
         self._knows_latest = False
+        self._total = -1
         self._shares: tuple[int, ...] | None = None
         self._vacant: list[int] | None = None
         self._wanted: tuple[int, ...] | None = None
@@ -108,8 +109,10 @@ class View:
     @property
     def total(self) -> int:
         """Members of the team; without a leader's steady count those expected, 0 for none."""
-        latest = self.latest
-        return latest.total if latest is not None else self.expected
+        if self._total < 0:
+            latest = self.latest
+            self._total = latest.total if latest is not None else self.expected
+        return self._total
 
     @property
     def shares(self) -> tuple[int, ...]:
