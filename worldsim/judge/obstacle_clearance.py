@@ -78,6 +78,10 @@ class ObstacleClearance:
         distance = self._obstacles.swept(start, self._last[1])
         self.least_m = _lesser(self.least_m, distance)
         near = distance < self.bound_m - ROUNDING_M
+        if not near.any():
+            self.answerable_m = _lesser(self.answerable_m, distance)
+            self._lasting.clear()
+            return np.min(distance, axis=1), False
         excused = self._excused(before, tick, near)
         answerable = np.where(excused, np.nan, distance)
         self.answerable_m = _lesser(self.answerable_m, answerable)
@@ -92,8 +96,6 @@ class ObstacleClearance:
     def _excused(self, before: Tick, tick: Tick, near: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return which pairs (N, M) are too near without fault of the vehicle's controller."""
         excused = np.zeros(near.shape, dtype=np.bool_)
-        if not near.any():
-            return excused
         for pair in self._lasting:
             excused[pair] = True
         from_m, to_m = (self._obstacles.centres(each.time_s) for each in (before, tick))

@@ -5,7 +5,7 @@ Every shape is convex and keeps its heading, so the distance along a straight li
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import atan2, copysign, cos, dist, hypot, inf, isnan, nan, radians, sin, sqrt
+from math import atan2, copysign, cos, dist, hypot, inf, nan, radians, sin, sqrt
 from typing import Final, Literal, NamedTuple, assert_never, final
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from agent.messages import Vector
 from worldsim.scenario.obstacle_tables import Box, Cylinder, Movable, Obstacle, Sphere, Wall
-from worldsim.truth.vehicle import Floats
+from worldsim.truth.vehicle import Floats, array_of
 
 BISECTIONS: Final = 48
 """Halvings of a line of some centimetres; the result is finer than a float can tell."""
@@ -207,13 +207,15 @@ class Obstacles:
         for row in relative.tolist():
             for column, (x, y, z) in enumerate(row):
                 distance, (a, b, c) = NOWHERE
-                if not isnan(x):
+                if x <= inf:  # not NaN; math.isnan takes long
                     distance, (a, b, c) = self._solids[column].surface_from(x, y, z)
                 distances.append(distance)
-                outward += (a, b, c)
+                outward.append(a)
+                outward.append(b)
+                outward.append(c)
         shape = relative.shape
         return SurfaceDistances(
-            np.array(distances).reshape(shape[:2]), np.array(outward).reshape(shape)
+            array_of(distances).reshape(shape[:2]), array_of(outward).reshape(shape)
         )
 
     def swept(self, start: Relative, end: Relative) -> Floats:

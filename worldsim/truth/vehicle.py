@@ -1,8 +1,9 @@
 """Vehicles: every row is one vehicle, in the world frame, in SI units."""
 
-from array import array
 from collections.abc import Sequence
 from math import cos, inf, isnan, nan, sin, sqrt, tau
+from struct import Struct as Layout
+from struct import pack
 from typing import Final, NamedTuple, assert_never, final
 
 import numpy as np
@@ -55,8 +56,9 @@ class Vehicles:
         """Pitch and roll [rad]."""
         self._max_tilt: list[float] = np.radians([each.max_tilt_deg for each in limits]).tolist()
         self._tilts = any(self._max_tilt)
-        self._level = array("d", [0.0, 0.0] * len(self.yaws)).tobytes()
-        """All tilts where no vehicle can tilt."""
+        self._level = bytes(16 * len(self.yaws))
+        """All tilts where no vehicle can tilt, as doubles."""
+        self._pack_row = Layout(f"{(6 if self._tilts else 4) * len(self.yaws)}d").pack
         self._max_accel = [_max_accel_mps2(each) for each in limits]
         self._forward = [_flies_forward(each) for each in limits]
         self._max_speed = [each.max_speed_mps for each in limits]
@@ -91,10 +93,10 @@ class Vehicles:
         """Return all positions, then all yaws, then all tilts, as doubles."""
         row = _flat(self.positions) + self.yaws
         if not self._tilts:
-            return array("d", row).tobytes() + self._level
+            return self._pack_row(*row) + self._level
         for pitch, roll in self.tilts:
             row += (pitch, roll)
-        return array("d", row).tobytes()
+        return self._pack_row(*row)
 
     def place(self, row: int, position: Vector, yaw: float) -> None:
         """Put a vehicle into the world [m; world frame, rad], at rest and level."""
@@ -169,8 +171,12 @@ class Vehicles:
 
 
 def _array(rows: list[Vector]) -> Floats:
-    """Return vectors as an array; numpy reads one flat row far faster than many."""
-    return np.frombuffer(array("d", _flat(rows))).reshape(-1, 3)
+    return array_of(_flat(rows)).reshape(-1, 3)
+
+
+def array_of(numbers: list[float]) -> Floats:
+    """Return numbers as an array that nobody may change; numpy itself is slow to read a list."""
+    return np.frombuffer(pack(f"{len(numbers)}d", *numbers))
 
 
 def _flat(rows: list[Vector]) -> list[float]:

@@ -179,16 +179,13 @@ class World:
         A command is discarded when it is older than a tick, not newer than the agent's last, or
         ahead of the slot: a process that was paused answers old observations when it goes on.
         """
-        last = self.latest[agent]
-        stale = not self.slot - self.clock.slots_per_tick <= command.slot <= self.slot
-        repeated = last is not None and (
-            (command.incarnation, command.slot) <= (last.incarnation, last.slot)
-        )
-        if stale or repeated:
+        slot = command.slot
+        stale = not self.slot - self.clock.slots_per_tick <= slot <= self.slot
+        if stale or not self._is_newer(agent, command):
             self.discarded += 1
             return False
         self.latest[agent] = command
-        expires = min(command.expires_slot, command.slot + self._max_validity)
+        expires = min(command.expires_slot, slot + self._max_validity)
         self._expires[agent] = expires
         self._first_expires = min(self._first_expires, expires)
         velocity, self._yaw[agent], self._tilt[agent] = command.velocity, command.yaw, command.tilt
@@ -197,6 +194,14 @@ class World:
             self._yaw[agent] = self.pose_errors.yaw_back(agent, command.yaw)
         self._velocity[agent] = self.vehicles.within_limits(agent, velocity)
         return True
+
+    def _is_newer(self, agent: int, command: Command) -> bool:
+        """Return whether a command is newer than the last accepted one of its agent."""
+        last = self.latest[agent]
+        if last is None:
+            return True
+        incarnation, before = command.incarnation, last.incarnation
+        return incarnation > before or (incarnation == before and command.slot > last.slot)
 
     def advance(self) -> None:
         """Fly through the present slot; a vehicle whose command has expired stops and hovers."""
