@@ -5,8 +5,9 @@ queues share belongs to each of them.
 """
 
 from collections.abc import Sequence
+from typing import final
 
-from agent.messages import Telemetry
+from agent.messages import NO_MISSION, Telemetry
 from worldsim.judge.phase import Phase
 
 NO_QUEUES: frozenset[tuple[int, int]] = frozenset()
@@ -17,33 +18,58 @@ class QueueNeighbours:
 
     def __init__(self, rows: int, phases: Sequence[Phase]) -> None:
         self._phases = phases
-        self._claims: list[tuple[int, int, int] | None] = [None] * rows
-        """Mission, queue and rank."""
+        self._places: list[tuple[int, int] | None] = [None] * rows
+        """Queue and rank, as claimed in ``_missions``."""
+        self._missions = [NO_MISSION] * rows
         self._queues = [NO_QUEUES] * rows
         """Each queue with the key of the mission that it belongs to."""
+        self._changes = 0
+        """How often any agent has claimed another place."""
+        self._counted: list[_Counted | None] = [None] * rows
 
     def count(self, agent: int, telemetry: Telemetry) -> int | None:
         """Take an agent's telemetry; return how many of those that it hears are of its queues.
 
         None while it claims no place. Agents that fly another mission are not of its queues.
         """
-        place = telemetry.place
-        claim = (telemetry.mission, *place) if place is not None else None
-        if claim != self._claims[agent]:
-            self._claims[agent], self._queues[agent] = claim, self._queues_of(claim)
-        if claim is None:
+        place, mission = telemetry.place, telemetry.mission
+        if place != self._places[agent] or mission != self._missions[agent]:
+            self._places[agent], self._missions[agent] = place, mission
+            self._queues[agent] = self._queues_of(place, mission)
+            self._changes += 1
+        if place is None:
             return None
-        own, queues = self._queues[agent], self._queues
-        parent, needed = telemetry.parent, 0
-        for other in telemetry.heard:
+        parent, heard, counted = telemetry.parent, telemetry.heard, self._counted[agent]
+        if counted is None or not counted.holds(self._changes, parent, heard):
+            counted = _Counted(self._changes, parent, heard, self._needed(agent, parent, heard))
+            self._counted[agent] = counted
+        return counted.needed
+
+    def _needed(self, agent: int, parent: int, heard: tuple[int, ...]) -> int:
+        own, queues, needed = self._queues[agent], self._queues, 0
+        for other in heard:
             if other < len(queues) and (other == parent or not own.isdisjoint(queues[other])):
                 needed += 1
         return needed
 
-    def _queues_of(self, claim: tuple[int, int, int] | None) -> frozenset[tuple[int, int]]:
-        if claim is None:
+    def _queues_of(self, place: tuple[int, int] | None, mission: int) -> frozenset[tuple[int, int]]:
+        if place is None:
             return NO_QUEUES
-        mission, *place = claim
         flown = [phase.formation for phase in self._phases if phase.mission <= mission]
         queues = flown[-1].queues_of((place[0], place[1]))
         return frozenset((mission, queue) for queue in queues)
+
+
+@final
+class _Counted:
+    """What an agent was counted to need, and what that follows from."""
+
+    def __init__(self, changes: int, parent: int, heard: tuple[int, ...], needed: int) -> None:
+        self._changes = changes
+        self._parent = parent
+        self._heard = heard
+        self.needed = needed
+
+    def holds(self, changes: int, parent: int, heard: tuple[int, ...]) -> bool:
+        """Whether the count follows from these too."""
+        return self._changes == changes and self._parent == parent and self._heard == heard

@@ -1,7 +1,7 @@
 """The newest telemetry of each agent, and the tick that truth and telemetry make together."""
 
-from array import array
 from math import atan2, degrees, hypot, nan, pi
+from struct import pack
 from typing import Final, TypeVar, final
 
 import numpy as np
@@ -147,7 +147,7 @@ def _attitude(world: World) -> NDArray[np.float32]:
     for agent, yaw in enumerate(world.vehicles.yaws):
         pitch, roll = tilts[agent]
         rows += (yaw, pitch, roll)
-    return np.frombuffer(array("f", rows), dtype=np.float32).reshape(-1, 3)
+    return np.frombuffer(pack(f"{len(rows)}f", *rows), dtype=np.float32).reshape(-1, 3)
 
 
 def _links(rows: list[Telemetry]) -> NDArray[np.int32]:
@@ -170,4 +170,7 @@ def _turn_deg(wanted: Vector, heading: float) -> float:
     if hypot(wanted[0], wanted[1]) <= MOVING_MPS:
         return nan
     turn = atan2(wanted[1], wanted[0]) - heading
-    return degrees(turn - 2.0 * pi * round(turn / (2.0 * pi)))
+    turns = turn / (2.0 * pi)
+    if not -0.5 <= turns <= 0.5:  # seldom, and round() takes long
+        turn -= 2.0 * pi * round(turns)
+    return degrees(turn)
