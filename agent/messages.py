@@ -18,7 +18,10 @@ AllocationKind = Literal["structure", "assignment"]
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 
-MAX_M, MAX_SPEED_MPS, MAX_ANGLE_RAD, MAX_FORCE = 1e6, 100.0, 100.0, 1e9
+MAX_M: Final = 1e6
+MAX_SPEED_MPS: Final = 100.0
+MAX_ANGLE_RAD: Final = 100.0
+MAX_FORCE: Final = 1e9
 FRAME_M: Final = 930e3
 """The frame's origin lies within this distance of the world's, along each axis [m]."""
 REACH_M: Final = 50e3
@@ -29,10 +32,10 @@ room up to MAX_M for targets ahead of a vehicle."""
 LEAST_SPEED_MPS: Final = 1e-3
 MAX_COMMAND_MPS: Final = 174.0
 """The longest velocity whose components are within MAX_SPEED_MPS [m/s]."""
-MAX_COST_MM = 2**31 - 1
+MAX_COST_MM: Final = 2**31 - 1
 MAX_HEARD: Final = 256
 """Most neighbours in one telemetry, and most vehicles in one observation."""
-AGENT_IDS = 2**16
+AGENT_IDS: Final = 2**16
 """Number of agent ids: 0 to AGENT_IDS - 1."""
 
 MAX_TEAM: Final = 1024
@@ -75,7 +78,10 @@ Places = Annotated[tuple[tuple[Index, Index], ...], Meta(max_length=MAX_PLACES)]
 
 Role = Literal["member", "sub-vertex", "vertex", "distress"]
 ROLES: tuple[Role, ...] = ("member", "sub-vertex", "vertex", "distress")
-MEMBER, SUB_VERTEX, VERTEX, DISTRESS = range(len(ROLES))
+MEMBER: Final = 0
+SUB_VERTEX: Final = 1
+VERTEX: Final = 2
+DISTRESS: Final = 3
 """Roles of an agent in its queue. A sub-vertex is a member that another agent follows."""
 
 CAUSES = (
@@ -277,7 +283,7 @@ class RootKey(NamedTuple):
     id: AgentId
 
 
-class Branch(NamedTuple):
+class Branch(Message, frozen=True):
     """An agent's position in the tree of one vertex (E15)."""
 
     root: RootKey

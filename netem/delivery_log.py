@@ -8,15 +8,16 @@ receiver is out of reach has no entry: that follows from the positions.
 from collections.abc import Iterable, Mapping
 from hashlib import sha256
 from struct import Struct as Layout
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-HEAD = Layout("<4q").pack
+HEAD: Final = Layout("<4q").pack
 """Packs a frame's key: source, incarnation, channel, count."""
-FATE = Layout("<BBdd").pack
+FATE: Final = Layout("<BBdd").pack
 """Packs a verdict: copy (1 for a duplicate, else 0), cause, delay [s], place of the flipped bit."""
-WHOLE = Layout("<4qBBdd").pack
+WHOLE: Final = Layout("<4qBBdd").pack
 """Packs both: HEAD and FATE."""
 ENTRY = np.dtype(
     [(name, "<i8") for name in ("source", "incarnation", "channel", "count")]

@@ -19,11 +19,11 @@ from netem.faults import Position
 
 KEPT_FROM: Final = 40
 """Number of receivers from which those near a sender are kept."""
-ARRAYS_FROM = 400 if is_preferred() else 40
+ARRAYS_FROM: Final = 400 if is_preferred() else 40
 """Number of receivers from which arrays are faster than a loop, compiled or not."""
 MARGIN_M: Final = 0.5
 """Receivers so far beyond the reach are kept among those that are near [m]."""
-MOST_MOVED_M = 0.499 * MARGIN_M
+MOST_MOVED_M: Final = 0.499 * MARGIN_M
 """Less than half of the margin by more than any rounding [m]."""
 InRange = list[tuple[int, float]]
 """Receivers and their distances [m], by receiver id."""
@@ -96,7 +96,8 @@ class RangeIndex:
         """Begin ``_near`` anew if any receiver has moved too far."""
         self._near_holds = True
         for receiver in self._receivers:
-            here, before = self.positions[receiver], self._before[receiver]
+            here = self.positions[receiver]
+            before = self._before[receiver]
             if here is not None and (before is None or not _is_within(here, before, MOST_MOVED_M)):
                 self._before = self.positions
                 if len(self._receivers) >= ARRAYS_FROM:

@@ -27,7 +27,7 @@ D hops at that loss, is twice the measured age at which a subject's records arri
 LAG_SMOOTHING: Final = 0.25
 LEAST_RELAYED_SILENCE_S: Final = 2.5
 NONE_LOST: Mapping[int, float] = MappingProxyType({})
-MAX_FRAME_B = MAX_PAYLOAD_B - CHECKSUM_B
+MAX_FRAME_B: Final = MAX_PAYLOAD_B - CHECKSUM_B
 FRAME_HEAD_B: Final = 18
 """Longest encoding of a Gossip without records [B]."""
 

@@ -34,9 +34,9 @@ RECENT_S: Final = 10.0
 """How long the last report or sight of a vehicle tells what a vehicle sensed near by may be."""
 MAX_REMEMBERED: Final = 64
 """Most vehicles remembered out of the sensor's range; those seen last are kept."""
-SURE_RANGE_M = PROXIMITY_RANGE_M - SAME_VEHICLE_M
+SURE_RANGE_M: Final = PROXIMITY_RANGE_M - SAME_VEHICLE_M
 """A vehicle nearer than this would be sensed if it were still there."""
-UNMOVED_RANGE_M = PROXIMITY_RANGE_M - 0.05
+UNMOVED_RANGE_M: Final = PROXIMITY_RANGE_M - 0.05
 """A vehicle last sensed nearer than this would be sensed if it had not moved since."""
 REMEMBERED_S: Final = 60.0
 """How long a vehicle that nobody would sense is remembered at first."""

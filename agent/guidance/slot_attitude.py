@@ -19,7 +19,7 @@ AT_SLOT_M: Final = 0.05
 """Within this distance of its slot an agent takes up the queue's orientation."""
 FORWARD_AT_SLOT_M: Final = 0.02
 """The same for a vehicle that flies only where it points: it must turn to come nearer."""
-CREEP_MPS = 0.99 * DEAD_BAND_MPS
+CREEP_MPS: Final = 0.99 * DEAD_BAND_MPS
 """Horizontal speed at which a vehicle flies in any direction without turning first (E10)."""
 MOST_CORRECTION_MPS: Final = 0.1
 """Up to this speed a wanted motion corrects a position; beyond it, it gives way."""
@@ -40,7 +40,7 @@ class SlotAttitude:
         self.at_rest = at_rest
 
 
-AWAY = SlotAttitude()
+AWAY: Final = SlotAttitude()
 """Of an agent that is not near its slot: every angle is free."""
 
 

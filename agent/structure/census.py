@@ -12,19 +12,19 @@ radio it takes two bytes: the greatest label of the time at which it is sent, le
 
 from __future__ import annotations
 
-import sys
-from array import array
 from collections.abc import Sequence
 from math import inf
+from struct import pack, unpack_from
 from typing import Final, NamedTuple
 
 from agent.messages import MAX_LABELS_B, MAX_TEAM, Summary
 from agent.structure.label_code import CODES, FIRST_VERTEX, queue_of_code
 from agent.structure.label_news import OWN, LabelNews
+from agent.structure.summary_frame import LABEL_B
 
 QUANTUM_S: Final = 0.25
 """Resolution of a label's time [s]."""
-UNKNOWN = 0xFFFF
+UNKNOWN: Final = 0xFFFF
 """The label on the radio of a member of which nothing is known."""
 MAX_QUANTA: Final = 254
 WORTH_QUANTA: Final = 2
@@ -36,17 +36,18 @@ keeps it for a round or two. Over a clean radio it is up to twice as much; but w
 lost is not known yet, and where they are, a team that asks too late counts itself wrongly."""
 LAGS: Final = 2.0
 """A label is late after so many of its usual lags, and T_lost."""
-MAX_LAG_S = MAX_QUANTA * QUANTUM_S / LAGS
+MAX_LAG_S: Final = MAX_QUANTA * QUANTUM_S / LAGS
 """Greatest lag that is noted [s]: no label is sent that is older than LAGS times as much."""
-MAX_LABELLED = 2**14
+MAX_LABELLED: Final = 2**14
 """Ids from here on are not counted."""
-LABEL_S = QUANTUM_S / CODES
+LABEL_S: Final = QUANTUM_S / CODES
 """Time of one step of a label [s]."""
 KNOWN: Final = (False, *[True] * (CODES - 1))
 """All codes but that of a member of which nothing is known."""
-ASK_S, FORGOTTEN_S = 0.5, 10.0
+ASK_S: Final = 0.5
+FORGOTTEN_S: Final = 10.0
 """A member whose label is late is asked for every ASK_S, until FORGOTTEN_S later."""
-SHARED_LABELS = MAX_LABELS_B // 2
+SHARED_LABELS: Final = MAX_LABELS_B // LABEL_B
 NEWS: Final = 48
 """Most news in one frame."""
 
@@ -165,11 +166,11 @@ class Census:
                 self._news.add(member)
 
     def _merge_run(self, first: int, labels: bytes, greatest: int, now_s: float) -> None:
-        wire = _unpacked(labels)
-        end = min(first + len(wire), self._ids)
+        sent = _unpacked(labels)
+        end = min(first + len(sent), self._ids)
         self._make_room(end)
         limit = greatest - WORTH_QUANTA * CODES
-        known, sent = self._labels[first:end], wire.tolist()
+        known = self._labels[first:end]
         later = [k for k, label in enumerate(known) if label + sent[k] < limit]
         for k in later:
             if sent[k] != UNKNOWN:
@@ -262,14 +263,9 @@ def _on_the_radio(labels: list[int], now_s: float) -> list[int]:
 
 
 def _packed(labels: list[int]) -> bytes:
-    found = array("H", labels)
-    if sys.byteorder == "big":
-        found.byteswap()
-    return found.tobytes()
+    return pack(f"<{len(labels)}H", *labels)
 
 
-def _unpacked(labels: bytes) -> array[int]:
-    found = array("H", labels[: len(labels) // 2 * 2])
-    if sys.byteorder == "big":
-        found.byteswap()
-    return found
+def _unpacked(labels: bytes) -> list[int]:
+    number = len(labels) // LABEL_B
+    return list(unpack_from(f"<{number}H", labels))

@@ -5,10 +5,10 @@ from collections.abc import Iterable
 from typing import Final
 
 BINS: Final = 16
-EDGES_M = tuple(0.75 * 1.31**k for k in range(BINS - 1))
+EDGES_M: Final = tuple(0.75 * 1.31**k for k in range(BINS - 1))
 """Upper edge of each bin but the last [m]."""
-EMPTY = bytes(BINS)
-OF_ONE = tuple(bytes([k == filled for k in range(BINS)]) for filled in range(BINS))
+EMPTY: Final = bytes(BINS)
+OF_ONE: Final = tuple(bytes([k == filled for k in range(BINS)]) for filled in range(BINS))
 """The histogram of one member in each bin."""
 
 

@@ -16,7 +16,8 @@ CODES: Final = 256
 """Number of codes; 0 is of a member of which nothing is known."""
 UNPLACED: Final = 1
 """Code of a member without a queue."""
-FIRST_QUEUE, FIRST_VERTEX = 2, 128
+FIRST_QUEUE: Final = 2
+FIRST_VERTEX: Final = 128
 """Codes from the first one on are of queues, from the second one on of vertices."""
 BEFORE, BEYOND, MARGIN = 0.3, 1.5, 2.0
 """The stretches begin so many lengths of an even queue before its home, and end so many behind it,

@@ -15,13 +15,14 @@ from agent.messages import MAX_CANDIDATES, MAX_VERTICES, Subtree, TreeReport
 
 SUMMARY_HEAD_B: Final = 22
 """Longest encoding of a Summary without reports, news and labels [B]."""
-ROOM_B = MAX_FRAME_B - FRAME_HEAD_B - SUMMARY_HEAD_B
+ROOM_B: Final = MAX_FRAME_B - FRAME_HEAD_B - SUMMARY_HEAD_B
 """Room for these in one frame [B]."""
-MOST_REPORTS_B = 2 * ROOM_B // 3
+MOST_REPORTS_B: Final = 2 * ROOM_B // 3
 """Reports leave the rest to news and labels, if there are any [B]."""
-LARGEST_REPORT_B = ROOM_B - 160
+LARGEST_REPORT_B: Final = ROOM_B - 160
 """A longer report is sent in two parts: what comes down, and what goes up [B]."""
-NEWS_B, LABEL_B = 7, 2
+NEWS_B: Final = 7
+LABEL_B: Final = 2
 """Longest encoding of one piece of news, and of one label [B]."""
 _Part = tuple[int, bool]
 """A vertex, and whether the part only goes up."""

@@ -19,7 +19,7 @@ FIRST_WITHIN_M: Final = 2.0
 """Within this distance, a vehicle of a large fleet is searched for its nearest first [m]."""
 LAST_WITHIN_M: Final = 4.0 * FLIGHT_M
 """No two vehicles are so far apart [m]."""
-FATES = ("delivered", "dropped_", "in_flight")
+FATES: Final = ("delivered", "dropped_", "in_flight")
 """Prefixes of the counters that together hold every addressed packet."""
 
 

@@ -21,7 +21,7 @@ from worldsim.judge.expected_places import ExpectedPlaces
 from worldsim.judge.tick import Tick, same_claims
 from worldsim.scenario.tables import CONVERGED_M, CONVERGED_S
 
-NO_CLAIM = (-1, -1)
+NO_CLAIM: Final = (-1, -1)
 TIME_SLACK_S: Final = 1e-9
 
 SlotsByRow = dict[int, Slot]

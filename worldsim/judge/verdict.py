@@ -5,7 +5,7 @@ of a recording, it reaches the same verdict.
 """
 
 from math import inf, isnan
-from typing import NamedTuple, assert_never, final
+from typing import Final, NamedTuple, assert_never, final
 
 import numpy as np
 
@@ -66,7 +66,7 @@ from worldsim.scenario.tables import Scenario
 from worldsim.scenario.target_frame import path_of
 from worldsim.truth.vehicle import Floats
 
-TURN_LIMIT_SLACK_DEG = 1e-6
+TURN_LIMIT_SLACK_DEG: Final = 1e-6
 
 
 @final
