@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from agent.checked_controller import CheckedController, plain
+from agent.checked_controller import CheckedController
 from agent.comms.mission import Missions
 from agent.config import AgentSetup
 from agent.controller import (
@@ -27,6 +27,7 @@ from agent.controller_log import Logging
 from agent.guidance.flocking import Flocking
 from agent.guidance.q_structure import QStructure
 from agent.messages import Branch, Message, Place, RootKey, Standing
+from agent.plain_intent import plain
 from netem.compiled import UnloadableError
 from worldsim.scenario.file import load as load_scenario
 

@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from agent.checked_controller import MAX_DATAGRAMS, plain
 from agent.codec import add_checksum, decode_beacon, decode_command, encode, holds_datagram
 from agent.config import AgentSetup, Control, Vehicle
 from agent.controller import ControllerError, FaultyControllerError, Intent, Outgoing, Senses
 from agent.controller_log import LINES_PER_S, Logging, LogLimiter
 from agent.core import Agent
 from agent.messages import MAX_DATAGRAM_B, MAX_LOG_LINES, MAX_SIGNALS, Datagram, Place
+from agent.plain_intent import MAX_DATAGRAMS, plain
 from agent.services import SERVICES, Services, ServicesError, services_of
 from netem.wire.channels import LOCAL, MULTIHOP
 from tests.agent.comms.builders import beacon
