@@ -69,7 +69,8 @@ class HeardBranch:
     """See :class:`~agent.messages.Branch`."""
 
     def __init__(self, branch: Branch) -> None:
-        root, version, tier, parent = branch
+        fields: tuple[Any, ...] = astuple(branch)
+        root, version, tier, parent = fields
         self.root: RootKey = root
         self.version: int = version
         self.tier: int = tier

@@ -5,7 +5,7 @@ Every shape is convex and keeps its heading, so the distance along a straight li
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import atan2, copysign, cos, dist, hypot, inf, nan, radians, sin, sqrt
+from math import atan2, copysign, cos, dist, hypot, inf, isnan, nan, radians, sin, sqrt
 from typing import Final, Literal, NamedTuple, assert_never, final
 
 import numpy as np
@@ -204,10 +204,11 @@ class Obstacles:
         """
         distances: list[float] = []
         outward: list[float] = []
-        for row in relative.tolist():
+        rows: list[list[list[float]]] = relative.tolist()
+        for row in rows:
             for column, (x, y, z) in enumerate(row):
                 distance, (a, b, c) = NOWHERE
-                if x <= inf:  # not NaN; math.isnan takes long
+                if not isnan(x):
                     distance, (a, b, c) = self._solids[column].surface_from(x, y, z)
                 distances.append(distance)
                 outward.append(a)

@@ -1,6 +1,6 @@
 """The proximity sensor: relative positions of near vehicles and of near obstacles' surfaces."""
 
-from typing import final
+from typing import Final, final
 
 import numpy as np
 
@@ -24,7 +24,7 @@ class ProximityReading:
         self.obstacles = obstacles
 
 
-NO_READING = ProximityReading(())
+NO_READING: Final = ProximityReading(())
 
 
 class ProximitySensor:

@@ -54,6 +54,8 @@ class Vehicles:
         """[rad; world frame]"""
         self.tilts: list[Tilt] = [LEVEL for _ in limits]
         """Pitch and roll [rad]."""
+        self._absent = sum([isnan(x) for x, _, _ in self.positions])
+        """How many vehicles are not in the world."""
         self._max_tilt: list[float] = np.radians([each.max_tilt_deg for each in limits]).tolist()
         self._tilts = any(self._max_tilt)
         self._level = bytes(16 * len(self.yaws))
@@ -61,6 +63,8 @@ class Vehicles:
         self._pack_row = Layout(f"{(6 if self._tilts else 4) * len(self.yaws)}d").pack
         self._max_accel = [_max_accel_mps2(each) for each in limits]
         self._forward = [_flies_forward(each) for each in limits]
+        self._obeys_at_once = not any(self._forward) and min(self._max_accel, default=inf) == inf
+        """Whether every vehicle flies whatever velocity it is commanded."""
         self._max_speed = [each.max_speed_mps for each in limits]
         self._max_climb = [each.max_climb_mps for each in limits]
         rates_dps = [each.max_yaw_rate_dps for each in limits]
@@ -68,6 +72,12 @@ class Vehicles:
 
     def __len__(self) -> int:
         return len(self.yaws)
+
+    def present(self) -> tuple[Vector | None, ...]:
+        """Return the positions [m; world frame], None for a vehicle that is not in the world."""
+        if self._absent == 0:
+            return tuple(self.positions)
+        return tuple([None if isnan(each[0]) else each for each in self.positions])
 
     @property
     def position(self) -> Floats:
@@ -100,6 +110,7 @@ class Vehicles:
 
     def place(self, row: int, position: Vector, yaw: float) -> None:
         """Put a vehicle into the world [m; world frame, rad], at rest and level."""
+        self._absent += isnan(position[0]) - isnan(self.positions[row][0])
         self.positions[row], self.yaws[row] = position, yaw
         self.velocities[row], self.tilts[row] = ZERO, LEVEL
 
@@ -114,16 +125,14 @@ class Vehicles:
 
         The velocities must be within the vehicles' limits of speed and climb.
         """
+        if self._obeys_at_once:
+            self.velocities = velocity.copy()
         for row, (x, y, z) in enumerate(self.positions):
-            flown = velocity[row]
-            if self._forward[row]:
-                flown = self._along_heading(row, flown)
-            if self._max_accel[row] < inf:
-                flown = self._accelerated(row, flown, dt)
-            self.velocities[row] = flown
+            if not self._obeys_at_once:
+                self.velocities[row] = self._flown(row, velocity[row], dt)
             if isnan(x):
                 continue
-            u, v, w = flown
+            u, v, w = self.velocities[row]
             self.positions[row] = (
                 _within(x + u * dt, FLIGHT_M),
                 _within(y + v * dt, FLIGHT_M),
@@ -143,6 +152,14 @@ class Vehicles:
             return velocity
         scale = min(1.0, max_speed / sqrt(square), max_climb / max(abs(z), 1e-12))
         return x * scale, y * scale, z * scale
+
+    def _flown(self, row: int, velocity: Vector, dt: float) -> Vector:
+        """Return the velocity [m/s] flown for ``dt`` [s] where another one is commanded."""
+        if self._forward[row]:
+            velocity = self._along_heading(row, velocity)
+        if self._max_accel[row] < inf:
+            velocity = self._accelerated(row, velocity, dt)
+        return velocity
 
     def _along_heading(self, row: int, velocity: Vector) -> Vector:
         """Return the part of a velocity [m/s] that a vehicle flies which only moves forward."""

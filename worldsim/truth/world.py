@@ -5,7 +5,6 @@ A pure state machine over slots. ``slot`` counts them; ``time_s`` is slot / slot
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isnan
 
 from msgspec.structs import replace
 
@@ -104,7 +103,7 @@ class World:
         """Return true positions, row i = agent i [m; world frame], None where there is none."""
         found = self._positions
         if found is None:
-            found = tuple([None if isnan(each[0]) else each for each in self.vehicles.positions])
+            found = self.vehicles.present()
             self._positions = found
         return found
 
@@ -218,9 +217,11 @@ class World:
         self._yaw[agent] = self.vehicles.yaws[agent]
 
     def _hover_expired(self) -> None:
+        first = self._expires[0]
         for agent, expires in enumerate(self._expires):
+            first = min(first, expires)
             if expires <= self.slot:
                 self._velocity[agent] = ZERO
                 self._yaw[agent] = self.vehicles.yaws[agent]
                 self._tilt[agent] = self.vehicles.tilts[agent]
-        self._first_expires = min(self._expires)
+        self._first_expires = first
