@@ -217,6 +217,9 @@ class Links:
     def __init__(self, seed: bytes) -> None:
         self._seed = seed
         self._states: dict[tuple[int, int, int], LinkState] = {}
+        self._law: PlainLaw | None = None
+        """Of the frame decided last."""
+        self._law_of: LinkModel | None = None
 
     def redraw(self, seed: bytes) -> None:
         """Draw every later frame's numbers from another seed (32 bytes); states stay."""
@@ -224,7 +227,7 @@ class Links:
 
     def plain(self, link: LinkModel, sending: Sending, in_range: InRange) -> list[Verdict]:
         """Decide a frame for all receivers in range, whose links are alike and plain; in order."""
-        law = PlainLaw(link)
+        law = self._law_for(link)
         if not link.draws:
             return [
                 _delayed(law.verdict(distance_m, None), sending.waited_s)
@@ -232,15 +235,23 @@ class Links:
             ]
         verdicts: list[Verdict] = []
         group_draw, group = b"", -1
-        last_of = {receiver // GROUP_SIZE: receiver for receiver, _ in in_range}
-        for receiver, distance_m in in_range:
+        for k, (receiver, distance_m) in enumerate(in_range):
             if receiver // GROUP_SIZE != group:
                 group = receiver // GROUP_SIZE
-                group_draw = draw_group(self._seed, sending.frame, group, last_of[group])
+                last = _last_of_group(in_range, k)
+                group_draw = draw_group(self._seed, sending.frame, group, last)
             draws = plain_draws(group_draw, receiver)
             verdicts.append(law.verdict(distance_m, draws))
         waited_s = sending.waited_s
         return [_delayed(verdict, waited_s) for verdict in verdicts] if waited_s else verdicts
+
+    def _law_for(self, link: LinkModel) -> PlainLaw:
+        """Return the law of a plain link: mostly that of the last frame."""
+        law = self._law
+        if law is None or link is not self._law_of:
+            law = PlainLaw(link)
+            self._law, self._law_of = law, link
+        return law
 
     def full(
         self, link: LinkModel, sending: Sending, receiver: int, distance_m: float
@@ -257,6 +268,18 @@ class Links:
             copy = full_verdict(link, distance_m, draws, state)
             verdicts.append(_queued(link, state, sending, copy))
         return verdicts
+
+
+def _last_of_group(in_range: InRange, begin: int) -> int:
+    """Return the last receiver that draws with the one at an index."""
+    last, _ = in_range[begin]
+    group = last // GROUP_SIZE
+    for k in range(begin + 1, len(in_range)):
+        receiver, _ = in_range[k]
+        if receiver // GROUP_SIZE != group:
+            break
+        last = receiver
+    return last
 
 
 def _queued(link: LinkModel, state: LinkState, sending: Sending, verdict: Verdict) -> Verdict:

@@ -19,7 +19,7 @@ from netem.delivery_log import FATE, HEAD, WHOLE, DeliveryLog
 from netem.faults import FaultOrder, Outage, Position, Sabotage
 from netem.link import LOST_TO_PARTITION, LOST_TO_QUEUE, Cause, Links, Sending, Verdict
 from netem.link_model import LinkModel
-from netem.messages import NEW_RUN, MediumCounters, MediumSetup
+from netem.messages import NEW_RUN, MediumCounters, MediumSetup, packet_counters
 from netem.range_index import InRange, RangeIndex
 from netem.rate_queue import RateQueue
 from netem.saboteur import Saboteur
@@ -224,7 +224,14 @@ class Medium:
 
     def packets(self) -> dict[str, int]:
         """Return the packet counters under their keys of summary.json."""
-        return self._counters(0).packets()
+        return packet_counters(
+            self.sent,
+            self.addressed,
+            dict(zip(FATES, self._fates, strict=True)),
+            duplicated=self.duplicated,
+            corrupted=self.corrupted,
+            in_flight=self.in_flight,
+        )
 
     def counters(self, slot: int) -> MediumCounters:
         """Return the counters before a slot. Ends the slot in the delivery log, as digest does."""
@@ -317,11 +324,12 @@ class Medium:
         verdicts = self._links.plain(link, sending, near)
         for k, (receiver, _) in enumerate(near):
             fate = verdicts[k]
+            cause: int = fate.cause
             page = pages[receiver]
             page.append(head)
-            page.append(FATE(0, fate.cause, fate.delay_s, fate.flipped_at))
-            if fate.cause:
-                fates[fate.cause] += 1
+            page.append(FATE(0, cause, fate.delay_s, fate.flipped_at))
+            if cause:
+                fates[cause] += 1
             else:
                 due_s = sent_s + fate.delay_s
                 queues[receiver].append((due_s, source, incarnation, channel, count, 0, frame))

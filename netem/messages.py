@@ -38,6 +38,26 @@ class FaultOrders(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     orders: tuple[FaultOrder, ...]
 
 
+def packet_counters(
+    sent: int,
+    addressed: int,
+    fates: dict[str, int],
+    *,
+    duplicated: int,
+    corrupted: int,
+    in_flight: int,
+) -> dict[str, int]:
+    """Return packet counters under their keys of summary.json; see :class:`MediumCounters`."""
+    return {
+        "sent": sent,
+        "addressed": addressed,
+        **fates,
+        "duplicated": duplicated,
+        "corrupted": corrupted,
+        "in_flight": in_flight,
+    }
+
+
 class MediumCounters(
     msgspec.Struct, frozen=True, kw_only=True, array_like=True, gc=False, forbid_unknown_fields=True
 ):
@@ -75,14 +95,14 @@ class MediumCounters(
 
     def packets(self) -> dict[str, int]:
         """Return the packet counters under their keys of summary.json."""
-        return {
-            "sent": self.sent,
-            "addressed": self.addressed,
-            **self.fates,
-            "duplicated": self.duplicated,
-            "corrupted": self.corrupted,
-            "in_flight": self.in_flight,
-        }
+        return packet_counters(
+            self.sent,
+            self.addressed,
+            self.fates,
+            duplicated=self.duplicated,
+            corrupted=self.corrupted,
+            in_flight=self.in_flight,
+        )
 
     def after_kill(self) -> "MediumCounters":
         """Return the counters once the medium's process was killed: its frames are lost."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from agent.messages import NO_MISSION, Telemetry, Vector
 from worldsim.judge.tick import NO_SIGNALS, HierarchyRows, Packets, Tick
+from worldsim.truth.vehicle import array_of
 from worldsim.truth.world import World
 
 _Row = TypeVar("_Row")
@@ -41,6 +42,7 @@ class _Claims:
     def __init__(self, newest: list[Telemetry], running: NDArray[np.bool_]) -> None:
         self.alive = running.copy()
         self.up: list[bool] = running.tolist()
+        self._all_up = False not in self.up
         rows = self.among(newest, NO_TELEMETRY)
         self.place = np.array([row.place or NO_PLACE for row in rows], dtype=np.int16)
         self.mission = np.array([row.mission for row in rows], dtype=np.int64)
@@ -49,6 +51,8 @@ class _Claims:
 
     def among(self, rows: list[_Row], none: _Row) -> list[_Row]:
         """Return the rows of the agents that are running, and ``none`` for the others."""
+        if self._all_up:
+            return rows
         return [row if runs else none for row, runs in zip(rows, self.up, strict=True)]
 
 
@@ -103,7 +107,7 @@ class FleetTelemetry:
             target=reasons[:, :3],
             place=claims.place,
             force=reasons[:, 3],
-            turn_deg=np.array(claims.among(self._turn_deg, nan), dtype=np.float64),
+            turn_deg=array_of(claims.among(self._turn_deg, nan)),
             alive=claims.alive,
             mission=claims.mission,
             links=_links(rows) if recorded else NO_LINKS,
@@ -146,7 +150,9 @@ def _attitude(world: World) -> NDArray[np.float32]:
     rows: list[float] = []
     for agent, yaw in enumerate(world.vehicles.yaws):
         pitch, roll = tilts[agent]
-        rows += (yaw, pitch, roll)
+        rows.append(yaw)
+        rows.append(pitch)
+        rows.append(roll)
     return np.frombuffer(pack(f"{len(rows)}f", *rows), dtype=np.float32).reshape(-1, 3)
 
 

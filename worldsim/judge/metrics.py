@@ -9,7 +9,7 @@ from agent.messages import FLIGHT_M, Vector
 from netem.range_index import RangeIndex
 from worldsim.judge.tick import Packets
 from worldsim.truth.obstacles import Obstacles
-from worldsim.truth.vehicle import Floats
+from worldsim.truth.vehicle import Floats, array_of
 
 MIN_SQUARE_M2: Final = 1e-300
 """The divisor used for the square of a path without length [m^2]."""
@@ -52,7 +52,7 @@ class Separation:
         if searched < len(after) ** 2:
             for row in everyone:
                 self._search_farther(sweep, row)
-        return np.array([sqrt(square) if square < inf else nan for square in sweep.square])
+        return array_of([sqrt(square) if square < inf else nan for square in sweep.square])
 
     def _search_farther(self, sweep: "_Sweep", row: int) -> None:
         """Search a vehicle's nearest in wider and wider circles, as far as it takes."""

@@ -64,7 +64,7 @@ from worldsim.judge.sub_formations import SubFormations
 from worldsim.judge.tick import Packets, Tick
 from worldsim.scenario.tables import Scenario
 from worldsim.scenario.target_frame import path_of
-from worldsim.truth.vehicle import Floats
+from worldsim.truth.vehicle import Floats, array_of
 
 TURN_LIMIT_SLACK_DEG: Final = 1e-6
 
@@ -250,7 +250,7 @@ class Judge:
         team = [row for row, runs in enumerate(tick.alive.tolist()) if runs]
         error = phase.slot_error(tick, self._hovering.places_left_out(tick, phase, team))
         in_place = phase.see(tick.time_s, [error[row] for row in team])
-        slot_error = np.array(error)
+        slot_error = array_of(error)
         if self._attitudes is not None:
             self._attitudes.see(tick, phase, slot_error)
         self.sub_formations[-1].see(tick)
