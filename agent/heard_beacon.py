@@ -103,7 +103,7 @@ class HeardBeacon:
     def __init__(self, beacon: Beacon) -> None:
         fields: tuple[Any, ...] = astuple(beacon)
         own_id, incarnation, sequence, stamp_s, position, velocity, target = fields[:7]
-        queue, rank, cost_mm, speed_cap, echoes, mission, frame_key = fields[7:14]
+        queue, rank, cost_mm, speed_cap, given, mission, frame_key = fields[7:14]
         frame, drift, blocked, standing = fields[14:]
         self.id: int = own_id
         self.version = Version(stamp_s, incarnation, sequence)
@@ -115,8 +115,9 @@ class HeardBeacon:
         self.rank: int = rank
         self.cost_mm: int = cost_mm
         self.speed_cap: float = speed_cap
-        self._echoed: list[int] = [agent for agent, _ in echoes]
-        self._sequences: list[int] = [number for _, number in echoes]
+        echoes: tuple[tuple[int, int], ...] = given  # compiled code takes apart what it knows
+        self._echoed = [agent for agent, _ in echoes]
+        self._sequences = [number for _, number in echoes]
         self.mission: int = mission
         self.frame_key: int = frame_key
         self.frame: Pose = frame

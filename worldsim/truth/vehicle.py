@@ -1,6 +1,7 @@
 """Vehicles: every row is one vehicle, in the world frame, in SI units."""
 
 from collections.abc import Sequence
+from itertools import chain
 from math import cos, inf, isnan, nan, sin, sqrt, tau
 from struct import Struct as Layout
 from struct import pack
@@ -197,12 +198,7 @@ def array_of(numbers: list[float]) -> Floats:
 
 
 def _flat(rows: list[Vector]) -> list[float]:
-    flat: list[float] = []
-    for x, y, z in rows:
-        flat.append(x)
-        flat.append(y)
-        flat.append(z)
-    return flat
+    return list(chain.from_iterable(rows))
 
 
 def _within(value: float, most: float) -> float:
