@@ -62,7 +62,8 @@ def claims_soundly(given: Any) -> bool:
         return True
     if type(place) is not Place:
         return False
-    queue, rank = place
+    numbers: tuple[Any, ...] = place
+    queue, rank = numbers
     ints = type(queue) is int and type(rank) is int
     return ints and -1 <= queue < MAX_INDEX and -1 <= rank < MAX_INDEX
 
