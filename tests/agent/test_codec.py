@@ -13,6 +13,7 @@ from agent.codec import (
     CHECKSUM_B,
     MAX_COMMAND_B,
     MAX_OBSERVATION_B,
+    Decoders,
     add_checksum,
     decode_beacon,
     decode_command,
@@ -462,6 +463,19 @@ def test_a_flipped_bit_is_detected_anywhere(decode_radio):
         with pytest.raises(RejectedError) as caught:
             decode_radio(bytes(turned))
         assert caught.value.cause == "corrupt"
+
+
+def test_decoders_know_the_newest_payloads_and_forget_the_oldest():
+    stamped = [msgspec.structs.replace(GOOD[Gossip], stamp_s=float(k)) for k in range(10)]
+    payloads = [add_checksum(encode(each)) for each in stamped]
+    decoders = Decoders(kept=2)
+    found = [decoders.gossip(each) for each in payloads]
+    assert found == stamped
+    assert decoders.gossip(payloads[-1]) is found[-1]
+    assert decoders.gossip(payloads[-2]) is found[-2]
+    assert decoders.gossip(payloads[0]) is not found[0]
+    keeping_none = Decoders()
+    assert keeping_none.gossip(payloads[0]) is not keeping_none.gossip(payloads[0])
 
 
 @given(st.binary(max_size=10))
