@@ -100,7 +100,7 @@ def _rest(finding: Row) -> list[str]:
 
 def _as_drawn(finding: Row) -> list[str]:
     """Return that a finding is as large as it was drawn, where shrinking could not begin."""
-    if not finding["shrunk"] or finding["shrink_flights"]:
+    if not finding.get("shrunk") or finding["shrink_flights"]:
         return []
     return ["It was not made smaller: flown again, it does not show, or not each time."]
 

@@ -17,7 +17,7 @@ from agent.comms.unidentified_vehicles import SAME_VEHICLE_M, UNIDENTIFIED_AFTER
 from agent.controller import Flown
 from agent.messages import Place, Vector
 from agent.places.place_points import PlacePoints
-from agent.qstructure.formation import NO_PLACES
+from agent.qstructure.formation import NO_PLACES, Layout
 from worldsim.judge.phase import Phase
 from worldsim.judge.tick import Tick
 from worldsim.scenario.tables import CONVERGED_M
@@ -59,6 +59,10 @@ class HoveringVehicles:
         square = moved * moved
         hover: NDArray[np.bool_] = square[:, 0] + square[:, 1] + square[:, 2] < SAME_VEHICLE_M**2
         return hover
+
+    def layout(self, tick: Tick, phase: Phase, team: list[int]) -> Layout:
+        """Return how a team (rows) fills the phase's formation around hovering vehicles."""
+        return phase.formation.layout(len(team), self.occupied_places(tick, phase, team))
 
     def occupied_places(
         self, tick: Tick, phase: Phase, team: list[int], seen: NDArray[np.bool_] | None = None
