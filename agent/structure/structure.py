@@ -239,9 +239,11 @@ class Structure:
         elif claim.number < 1:
             if not self._direct.is_near:
                 self._numbers.take_first(view, claim)
-        elif self._swaps.proceed(view, claim) or self._numbers.keep_up(view, claim):
-            pass
-        elif not self._direct.is_near:  # else partners that decide directly would not answer
+        elif (
+            not self._swaps.proceed(view, claim)
+            and not self._numbers.keep_up(view, claim)
+            and not self._direct.is_near  # else partners that decide directly would not answer
+        ):
             self._swaps.propose(view, claim)
 
     @property
