@@ -197,7 +197,7 @@ class DirectRule:
 
     def _assigned(self, view: View, claim: Claim, members: int) -> Place | None:
         """Return the own place among all members; None where there are too few of them."""
-        layout = view.map.formation.layout(members, view.blocked)
+        layout = view.map.formation.layout(members, view.blocked | _left_vertices(view, claim))
         led = _led(view, claim)
         places = [place for place in layout.places if place not in led]
         team = self._team(view, claim, frozenset(layout.places))
@@ -233,6 +233,18 @@ def _led(view: View, claim: Claim) -> set[Place]:
     """Return the vertices that have a leader, whether it stands there or not."""
     vertices = {h.standing.leads for h in view.heard if h.standing is not None} | {claim.vertex}
     return {view.map.vertex_places[v] for v in vertices if 0 <= v < view.map.vertices}
+
+
+def _left_vertices(view: View, claim: Claim) -> frozenset[Place]:
+    """Return the vertices whose leaders stand in their queues (E18).
+
+    A leader returns to a vertex that is free again only once it is sure of that. Until it says so,
+    its number is its own.
+    """
+    left = [h.standing.leads for h in view.heard if h.standing and view.number_of(h) > 0]
+    if claim.number > 0:
+        left.append(claim.vertex)
+    return frozenset([view.map.vertex_places[v] for v in left if 0 <= v < view.map.vertices])
 
 
 def _stands_in(view: View, vertex: int, available: frozenset[Place]) -> bool:

@@ -172,7 +172,19 @@ def test_a_leader_whose_vertex_is_taken_shares_the_queues_with_the_others():
     assert {TWO.place(c.queue, c.number) for c in claims.values()} == layout
 
 
-def choice(own, at, claims):
+def test_a_leader_keeps_its_number_until_it_returns_to_a_vertex_that_is_free_again():
+    """It looks for a while whether the vertex is free; until then the others keep off."""
+    at = {1: (-1.0, -1.0, 0.0), 2: (-1.0, -1.1, 0.0), 3: (-1.2, 1.2, 0.0)}
+    claims = {k: Claim(-9.0) for k in at}
+    claims[1].lead(0, 0.0, -9.0)
+    for k, queue in ((1, 1), (2, 1), (3, 0)):
+        claims[k].take(queue, 1, 0.0, -9.0)
+    chosen = [choice(own, at, claims, blocked=()) for own in (2, 3)]
+    assert (1, 1) not in chosen
+    assert len({*chosen}) == len(chosen)
+
+
+def choice(own, at, claims, blocked=(APEX,)):
     """Return the queue and number that an agent of TWO chooses while nobody else moves."""
     around = [
         heard(k, at[k], TWO.place(c.queue, c.number), heard=3, leads=c.vertex, queue=c.queue)
@@ -181,7 +193,7 @@ def choice(own, at, claims):
     ]
     mine, rule, told_all = copy(claims[own]), DirectRule(own, 0.0), [leader_summary(total=3)]
     for tick in range(12):
-        seen = view(TWO, TICK_S * tick, around, at=at[own], summaries=told_all, blocked=[APEX])
+        seen = view(TWO, TICK_S * tick, around, at=at[own], summaries=told_all, blocked=blocked)
         rule.update(seen, mine)
         if rule.applies:
             rule.choose(seen, mine)
