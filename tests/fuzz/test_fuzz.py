@@ -24,6 +24,7 @@ from worldsim.fuzz.fuzz import Search, fuzz
 from worldsim.fuzz.pages import curve
 from worldsim.fuzz.probe import Rest
 from worldsim.results.exit_status import BAD_INPUT, FAIL, INCONCLUSIVE, PASS
+from worldsim.results.provenance import provenance
 from worldsim.results.run_folder import RunDirectoryError
 from worldsim.search.drafts import cautions, loaded
 from worldsim.search.trials import Terms
@@ -133,6 +134,26 @@ def test_a_search_goes_on_elsewhere_where_its_cluster_went_away(
     assert "the scheduler is gone" in told
     assert fuzz(search(LocalSite(1, tmp_path / "two"))) == PASS
     assert sorted(SearchFolder(tmp_path / "it").rows()) == [1, 2, 3]
+
+
+def test_a_search_that_another_version_began_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its margins would mislead the guide, and its rows would stand for this version."""
+
+    def opened(search: Search) -> int:
+        with SearchFolder(search.folder).opened(search.described):
+            return PASS
+
+    monkeypatch.setattr("worldsim.fuzz.fuzz.fuzz", opened)
+    again = ["fuzz", "--random", "--out", str(tmp_path / "it")]
+    assert [command(again), command(again)] == [PASS, PASS]
+    now = {**provenance(), "commit": "0" * 40}
+    monkeypatch.setattr("worldsim.results.provenance.provenance", lambda: now)
+    assert command(again) == BAD_INPUT
+    told = capsys.readouterr().err
+    assert "holds another search: the commit of qswarm is" in told
+    assert "choose another --out" in told
 
 
 def test_the_folder_of_another_search_is_refused(

@@ -145,10 +145,25 @@ def _terms(
         "base": base,
         "base's digest": base and sha256(dump(varied).encode()).hexdigest()[:12],
         "safety only": safety_only,
+        **_code(varied),
     }
     tables = None if base is None else msgspec.to_builtins(varied)
     allowed = frozenset() if base is None else cautions(varied)
     return Terms(controller, tables, allowed, safety_only), described
+
+
+def _code(varied: "Scenario") -> dict[str, Any]:
+    """Return what search.json says of the code: margins of another version are no guide."""
+    from worldsim.results.controller_code import code_sha256, user_controllers
+    from worldsim.results.provenance import provenance
+
+    known, own = provenance(), user_controllers([varied])
+    return {
+        "the controller's code": [code_sha256(each.name, each.command)[:12] for each in own],
+        "the version of qswarm": known["version"],
+        "the commit of qswarm": known["commit"],
+        "the version of Python": known["python"],
+    }
 
 
 def _base(controller: str | None, base: str | None, settings: list[str] | None) -> "Scenario":
