@@ -2,6 +2,9 @@
 
 A truncated recording (its process was killed) is read up to the last tick of which every row is
 there.
+
+Rerun's bindings are all that reading needs. To import the whole of rerun takes half a second more,
+in each process that reads, and in each command that may begin one.
 """
 
 import json
@@ -16,9 +19,8 @@ from warnings import catch_warnings, simplefilter
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
-from pyarrow.lib import FixedSizeListArray
-from rerun.chunk import Chunk, RrdReader
-from rerun.error_utils import RerunWarning
+from pyarrow.lib import FixedSizeListArray, bool_
+from rerun_bindings import ChunkInternal, RrdReaderInternal
 
 from worldsim.judge.run_events import RunEvent, event_of
 from worldsim.judge.tick import Packets, Tick
@@ -113,7 +115,7 @@ def read_run(path: Path) -> Readback:
 class _RecordedColumns:
     """The columns of a recording, by entity and component."""
 
-    def __init__(self, chunks: Iterable[Chunk]) -> None:
+    def __init__(self, chunks: Iterable[ChunkInternal]) -> None:
         self._columns: dict[tuple[str, str], Column] = {}
         self.events: list[RunEvent] = []
         self.scenario_text: str | None = None
@@ -135,7 +137,7 @@ class _RecordedColumns:
         found = {layout.signal_name(entity): each for (entity, _), each in self._columns.items()}
         return {name: column for name, column in found.items() if name is not None}
 
-    def _read(self, chunk: Chunk) -> None:
+    def _read(self, chunk: ChunkInternal) -> None:
         batch = chunk.to_record_batch()
         if chunk.entity_path == layout.SCENARIO:
             self.scenario_text = batch.column("TextDocument:text")[0].as_py()[0]
@@ -157,27 +159,41 @@ class _RecordedColumns:
             if component in COMPONENTS:
                 column = self._columns.setdefault((entity, component), {})
                 rows = batch.column(component)
-                # A row that is null keeps the one before.
-                there = rows.is_valid().to_pylist()
+                # A row that is null keeps the one before. (Array.is_valid() imports much more.)
+                there = [each.is_valid for each in rows] if rows.null_count else [True] * len(rows)
                 told = zip(ticks, _flat_rows(rows), there, strict=True)
                 column.update({tick: row for tick, row, valid in told if valid})
 
 
 def _flat_rows(lists: Any) -> list[NDArray[Any]]:
     """Return a column of lists of numbers, or of vectors, as one flat array for each row."""
-    offsets, values, width = lists.offsets.to_numpy(), lists.values, 1
+    offsets, values, width = lists.offsets.to_pylist(), lists.values, 1
     if isinstance(values, FixedSizeListArray):
         values, width = values.values, values.type.list_size
-    flat = values.to_numpy(zero_copy_only=False)
-    return [flat[start * width : end * width] for start, end in pairwise(offsets.tolist())]
+    flat = _numbers(values)
+    return [flat[start * width : end * width] for start, end in pairwise(offsets)]
 
 
-def _chunks(path: Path) -> list[Chunk]:
+def _numbers(values: Any) -> NDArray[Any]:
+    """Return numbers as an array.
+
+    What pyarrow has for it imports pandas, wherever that is installed: a third of a second.
+    """
+    if values.null_count:
+        return values.to_numpy(zero_copy_only=False)  # type: ignore[no-any-return]
+    if values.type == bool_():
+        packed = np.frombuffer(values.buffers()[1] or b"", dtype=np.uint8)
+        bits = np.unpackbits(packed, count=values.offset + len(values), bitorder="little")
+        return bits[values.offset :].astype(np.bool_)
+    return np.from_dlpack(values)
+
+
+def _chunks(path: Path) -> list[ChunkInternal]:
     try:
         with readable(path) as file, catch_warnings():
             # Rerun warns of an old format where a truncated file has no footer.
-            simplefilter("ignore", RerunWarning)
-            return list(RrdReader(file).stream())
+            simplefilter("ignore")
+            return list(RrdReaderInternal(str(file)).stream())
     except (RuntimeError, ValueError, OSError) as error:
         # Rerun names the file that it read, which may be a copy.
         why = RERUN_NAMES.sub("", str(error), count=1)

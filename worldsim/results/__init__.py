@@ -9,7 +9,7 @@ __all__ = ["Run", "open"]
 
 
 def __getattr__(name: str) -> Any:
-    """Return ``open`` or ``Run``, which take half a second to import: they read with rerun."""
+    """Return ``open`` or ``Run``, which are quickest not imported: they read recordings."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from worldsim.results import run  # noqa: PLC0415 - few that import this package read runs
