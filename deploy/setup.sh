@@ -29,13 +29,16 @@ stamped() {
 }
 
 install_into_venv() {
-    local what=$root
+    local what=$root bytecode=--no-compile
+    # Python writes the bytecode of a module when it is first imported, and of all that is installed
+    # little ever is. Only where it may not write any does pip, which takes half of the set-up.
+    [ -z "${PYTHONDONTWRITEBYTECODE-}" ] || bytecode=--compile
     [ "$1" = run ] || what="${root}[$1]"
     say "setting up $venv for '$1', once (200 MB or so are downloaded) ..."
     make_venv
     touch "$venv/unfinished"
     rm -f "$venv"/set-up-*
-    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check \
+    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check "$bytecode" \
         --constraint "$root/constraints.txt" --editable "$what" \
         || fail "set-up failed, see above; the next start repeats it"
     printf '%s\n' "$2" >"$venv/set-up-$1"
