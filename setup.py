@@ -32,9 +32,17 @@ from setuptools.command.build_py import build_py
 ROOT = Path(__file__).resolve().parent
 sys.path.insert(0, str(ROOT))  # absent in an isolated build
 
-from netem.compiled import FOLDER, IN_WHEEL, MANIFEST, digest_of  # noqa: E402
+from netem.compiled import (  # noqa: E402
+    FOLDER,
+    IN_WHEEL,
+    MANIFEST,
+    UnfitError,
+    digest_of,
+    fitting,
+)
 from worldsim.results.provenance import RECORDED, commit_of  # noqa: E402
 
+PACKAGES = ("netem", "agent", "worldsim")
 WANTED = environ.get("QSWARM_COMPILED", "0")
 """Whether a wheel is to be compiled: no ("0" or ""), or yes."""
 
@@ -127,8 +135,13 @@ class Compile(Command):
 def _compile(folder: Path) -> None:
     """Compile the hot modules into a folder; the manifest comes last.
 
-    What was compiled there before stays away if this ends early.
+    What was compiled there before stays away if this ends early. A wheel takes what is compiled in
+    this checkout, if the same compilers made it of the same files.
     """
+    inputs = _digest_of_inputs()
+    if folder != FOLDER and _inputs_of(FOLDER) == inputs:
+        shutil.copytree(FOLDER, folder)
+        return
     try:
         mypycify = import_module("mypyc.build").mypycify  # nothing else needs it
     except ImportError as error:
@@ -156,18 +169,50 @@ def _compile(folder: Path) -> None:
     built.run()
     files = {each.name: str(Path(built.get_ext_filename(each.name))) for each in extensions}
     manifest = {"abi": get_config_var("SOABI"), "sources": before, "extensions": files}
+    manifest["inputs"] = inputs
     (folder / MANIFEST).write_text(json.dumps(manifest, indent=1) + "\n", "utf-8")
 
 
 def _folder_of_objects() -> Path:
     """Return the folder of objects that these compilers made in this way; remove all others."""
-    mypy = import_module("mypy.version").__version__
-    made_by = [get_config_var("SOABI"), mypy, environ.get("CC"), environ.get("CFLAGS")]
-    kind = sha256(repr(made_by).encode() + Path(__file__).read_bytes()).hexdigest()[:16]
+    kind = sha256(_compilers()).hexdigest()[:16]
     objects = ROOT / "build" / "objects"
     for other in {*objects.glob("*")} - {objects / kind}:
         shutil.rmtree(other)
     return objects / kind
+
+
+def _compilers() -> bytes:
+    """Return what says which compilers are used, and how."""
+    mypy = import_module("mypy.version").__version__
+    made_by = [get_config_var("SOABI"), mypy, environ.get("CC"), environ.get("CFLAGS")]
+    return repr(made_by).encode() + Path(__file__).read_bytes()
+
+
+def _digest_of_inputs() -> str | None:
+    """Return the digest of all that compiled modules depend on, None without the compilers.
+
+    The types in modules that are not compiled are a part of it.
+    """
+    try:
+        digest = sha256(_compilers())
+    except ImportError:
+        return None
+    code = (file for name in PACKAGES for file in (ROOT / name).rglob("*.py"))
+    for file in sorted([*code, ROOT / "pyproject.toml"]):
+        content = file.read_bytes()
+        digest.update(f"{file.relative_to(ROOT)} {len(content)} ".encode() + content)
+    return digest.hexdigest()
+
+
+def _inputs_of(folder: Path) -> str:
+    """Return the digest of what the modules in a folder were compiled of, "" where none are."""
+    try:
+        fitting(ROOT, folder)
+        found = json.loads((folder / MANIFEST).read_text("utf-8"))["inputs"]
+    except (OSError, UnfitError, KeyError):
+        return ""
+    return str(found)
 
 
 def _hot_modules() -> list[str]:
