@@ -143,12 +143,12 @@ def test_what_controllers_print_is_bounded(
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_run_whose_controller_ignores_signals_ends(number: signal.Signals) -> None:
     arguments = flown("IgnoresSignals", "--no-recording", "--duration", "1000")
-    started = Started([*QSWARM, *arguments], Path("output"), Path.cwd())
     events = Path("out/events.jsonl")
-    eventually(events.exists, 20.0)
-    started.wait_for_output("deaf")
-    started.process.send_signal(number)
-    assert started.status(within_s=20.0) == 130
+    with Started([*QSWARM, *arguments], Path("output"), Path.cwd()) as started:
+        eventually(events.exists, 20.0)
+        started.wait_for_output("deaf")
+        started.process.send_signal(number)
+        assert started.status(within_s=20.0) == 130
     assert json.loads(Path("out/summary.json").read_text())["outcome"] == "inconclusive"
 
 

@@ -1,6 +1,7 @@
 """A small scenario that runs in a moment, and the command line with what it printed."""
 
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +21,8 @@ class Printed(NamedTuple):
 
 
 Command = Callable[..., Printed]
+PROGRESS = re.compile(r"\d+ of \d+ runs done, .*\n|[0-9.]+ of [0-9.]+ s.*\n")
+"""What a slow host prints besides."""
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.commands.conftest import Command
+from tests.commands.conftest import PROGRESS, Command
 from tests.processes.harness import QSWARM, Started, eventually
 from worldsim.scenario.file import load
 
@@ -144,7 +144,7 @@ def test_a_failing_controller_fails_its_own_seed_alone(
         "sim", small, "--no-recording", "--seeds", "0:3", "--jobs", jobs, "--out", "many",
         "--set", "control.controller=fragile:Fragile", "--set", "expect.converge=false",
     )  # fmt: skip
-    assert (printed.status, printed.err) == (1, "")
+    assert (printed.status, PROGRESS.sub("", printed.err)) == (1, "")
     rows = summary("many")["rows"]
     outcomes = {row["seed"]: row["outcome"] for row in rows}
     assert sorted(outcomes) == [0, 1, 2]
@@ -170,10 +170,10 @@ def long_sim(jobs: str, *more: str) -> Started:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_ends_a_run_with_its_summary(small: Path, number: signal.Signals) -> None:
-    started = long_sim("1")
-    eventually(lambda: has_events("cut"), 20.0)
-    started.process.send_signal(number)
-    assert started.status(within_s=20.0) == 130, small
+    with long_sim("1") as started:
+        eventually(lambda: has_events("cut"), 20.0)
+        started.process.send_signal(number)
+        assert started.status(within_s=20.0) == 130, small
     printed = summary("cut")
     assert printed["outcome"] == "inconclusive"
     assert printed["reason"] == f"interrupted after {printed['duration_s']:.1f} s"
@@ -184,12 +184,12 @@ def test_ctrl_c_ends_a_run_with_its_summary(small: Path, number: signal.Signals)
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_ends_a_sweep_with_its_workers_and_summaries(small: Path, jobs: str) -> None:
-    started = long_sim(jobs, "--no-recording", "--seeds", "0:4")
-    pid, started_runs = started.process.pid, int(jobs)
-    eventually(lambda: sum(map(has_events, Path("cut").glob("*"))) >= started_runs, 20.0)
-    workers = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    started.process.send_signal(signal.SIGINT)
-    assert started.status(within_s=20.0) == 130, small
+    with long_sim(jobs, "--no-recording", "--seeds", "0:4") as started:
+        pid, started_runs = started.process.pid, int(jobs)
+        eventually(lambda: sum(map(has_events, Path("cut").glob("*"))) >= started_runs, 20.0)
+        workers = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        started.process.send_signal(signal.SIGINT)
+        assert started.status(within_s=20.0) == 130, small
     overall = summary("cut")
     reason = f"interrupted: 0 of 4 runs done, {overall['runs']} cut off"
     assert (overall["outcome"], overall["reason"]) == ("inconclusive", reason)

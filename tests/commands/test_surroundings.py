@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -11,12 +10,11 @@ from typing import Any
 
 import pytest
 
-from tests.commands.conftest import Command
+from tests.commands.conftest import PROGRESS, Command
 from tests.small_scenario import SMALL
 from worldsim.commands.app import command
 from worldsim.results.output_streams import SafeStream, escaped
 
-PROGRESS = re.compile(r"[0-9.]+ of 0\.3 s.*\n")
 ROOT = Path(__file__).parents[2]
 PROGRAM = "from worldsim.commands.app import main; main()"
 SIM = f"'{sys.executable}' -c '{PROGRAM}' sim small.toml --out out --duration 0.3 --set expect.converge=false"  # noqa: E501

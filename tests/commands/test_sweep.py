@@ -43,12 +43,12 @@ def test_a_sweep_is_a_tidy_table_and_goes_on(small: Path, qswarm: Command) -> No
 
 def test_ctrl_c_says_how_far_a_sweep_is_and_it_goes_on(small: Path, qswarm: Command) -> None:
     options = ("sweep", str(small), "--vary", "duration_s=4,4000", "--seeds", "0:1", "--out", "s")
-    started = Started([*QSWARM, *options, "--jobs", "1"], Path("output"), Path.cwd())
     flights = Path("s/flights.jsonl")
-    eventually(lambda: flights.exists() and flights.read_text().count("\n") == 1, 20.0)
-    eventually(lambda: any(Path("s/.flights").glob("*/events.jsonl")), 20.0)
-    started.process.send_signal(signal.SIGINT)
-    assert started.status(within_s=20.0) == 130, small
+    with Started([*QSWARM, *options, "--jobs", "1"], Path("output"), Path.cwd()) as started:
+        eventually(lambda: flights.exists() and flights.read_text().count("\n") == 1, 20.0)
+        eventually(lambda: any(Path("s/.flights").glob("*/events.jsonl")), 20.0)
+        started.process.send_signal(signal.SIGINT)
+        assert started.status(within_s=20.0) == 130, small
     how_far = "interrupted: 1 of 2 flights done"
     told = f"{how_far}, 1 pass, 0 fail; the same command with --out s goes on  s/summary.json"
     assert told in started.text.splitlines()

@@ -62,16 +62,15 @@ def test_a_browser_is_served_on_loopback_until_it_is_ended(
 ) -> None:
     configuration = recorded.parent / "configuration"
     monkeypatch.setenv("XDG_CONFIG_HOME", str(configuration))
-    started = Started(
-        [*QSWARM, "view", "two", "--web"], recorded.parent / "output", recorded.parent
-    )
-    started.wait_for_output("Ctrl-C ends it")
-    address = re.search(r"http://127\.0\.0\.1:\d+/", started.text)
-    assert address is not None
-    eventually(lambda: answers(address[0]), 20.0, lambda: started.text)
-    started.process.send_signal(number)
-    assert started.status(within_s=10.0) == 0
-    eventually(lambda: not answers(address[0]), 10.0)
+    arguments = [*QSWARM, "view", "two", "--web"]
+    with Started(arguments, recorded.parent / "output", recorded.parent) as started:
+        started.wait_for_output("Ctrl-C ends it")
+        address = re.search(r"http://127\.0\.0\.1:\d+/", started.text)
+        assert address is not None
+        eventually(lambda: answers(address[0]), 20.0, lambda: started.text)
+        started.process.send_signal(number)
+        assert started.status(within_s=10.0) == 0
+        eventually(lambda: not answers(address[0]), 10.0)
     assert not configuration.exists()
 
 

@@ -1,8 +1,9 @@
 """Fleets of real processes, killed at the end of each test."""
 
-import signal
 import socket
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -12,18 +13,14 @@ from tests.processes.harness import SCENARIO, Started
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Callable[..., Started]]:
-    started: list[Started] = []
+    with ExitStack() as stack:
+        outputs = count()
 
-    def begin(*arguments: str) -> Started:
-        output = tmp_path / f"output-{len(started)}.txt"
-        started.append(Started(list(arguments), output, tmp_path))
-        return started[-1]
+        def begin(*arguments: str) -> Started:
+            output = tmp_path / f"output-{next(outputs)}.txt"
+            return stack.enter_context(Started(list(arguments), output, tmp_path))
 
-    yield begin
-    for each in started:
-        if each.process.poll() is None:
-            each.kill_group(signal.SIGKILL)
-            each.process.wait(5.0)
+        yield begin
 
 
 @pytest.fixture

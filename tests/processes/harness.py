@@ -42,7 +42,7 @@ QSWARM = [sys.executable, "-c", "from worldsim.commands.app import main; main()"
 
 
 class Started:
-    """A process whose output goes to a file."""
+    """A process whose output goes to a file; as a context, it ends with all that it started."""
 
     def __init__(self, arguments: list[str], output: Path, folder: Path) -> None:
         self._output = output
@@ -57,6 +57,14 @@ class Started:
                 cwd=folder,
                 env={**os.environ, "PYTHONPATH": path, "PYTHONUNBUFFERED": "1"},
             )
+
+    def __enter__(self) -> "Started":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.process.poll() is None:
+            self.kill_group(signal.SIGKILL)
+            self.process.wait(5.0)
 
     @property
     def text(self) -> str:
