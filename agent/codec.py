@@ -29,6 +29,8 @@ MAX_COMMAND_B: Final = 8192
 """A command, with the telemetry of an agent that has much to tell."""
 DATAGRAM_MARK: Final = 0x92
 """First byte of a frame that holds a datagram: msgpack's mark of an array of two fields."""
+CHECKED_EVERY: Final = 61
+"""A prime, so that the turn of each agent and of each kind of message comes."""
 MAX_OBSERVATION_B: Final = 65536
 """Sensed vehicles, scans, and with them a mission: its formation and its frame's path."""
 
@@ -155,17 +157,39 @@ def decode_command(data: bytes) -> Command:
 
 
 @final
-class Decoders:
-    """Decodes radio payloads, each once for all agents that a process feeds.
+class RadioCodec:
+    """Encodes and decodes radio payloads, each once for all agents that a process feeds.
 
     kept: at least the newest so many payloads of a channel are known with what they hold; decoding
-    is a pure function of the bytes.
+    is a pure function of the bytes. What was encoded here is known, too: it is handed over. One
+    message in ``CHECKED_EVERY`` is decoded nevertheless, and must come out equal.
     """
 
     def __init__(self, kept: int = 0) -> None:
         self._most = kept
+        self._encoded = 0
         self._beacons: dict[bytes, HeardBeacon] = {}
         self._gossip: dict[bytes, Gossip] = {}
+
+    def encode_beacon(self, beacon: Beacon) -> bytes:
+        """Return a beacon's payload."""
+        payload = add_checksum(encode(beacon))
+        if self._most:
+            if self._is_checked():
+                check_equal(beacon, decode_beacon(payload))
+            self._make_room(self._beacons)
+            self._beacons[payload] = HeardBeacon(beacon)
+        return payload
+
+    def encode_gossip(self, gossip: Gossip) -> bytes:
+        """Return the payload of a frame of the multihop channel."""
+        payload = add_checksum(encode(gossip))
+        if self._most:
+            if self._is_checked():
+                check_equal(gossip, decode_gossip(payload))
+            self._make_room(self._gossip)
+            self._gossip[payload] = gossip
+        return payload
 
     def beacon(self, payload: bytes) -> HeardBeacon:
         """Decode a payload of the local channel, or raise :class:`RejectedError`."""
@@ -189,11 +213,22 @@ class Decoders:
             self._gossip[payload] = found
         return found
 
+    def _is_checked(self) -> bool:
+        """Whether the next message that is encoded is decoded, too."""
+        self._encoded += 1
+        return self._encoded % CHECKED_EVERY == 0
+
     def _make_room(self, known: dict[bytes, Any]) -> None:
         """Forget the older half of what is known where that is twice as much as is kept."""
         if len(known) >= 2 * self._most:
             for payload in list(known)[: self._most]:
                 del known[payload]
+
+
+def check_equal(sent: _T, arrived: _T) -> None:
+    """Raise ValueError if a message does not come out of the codec as it went in."""
+    if arrived != sent:
+        raise ValueError(f"the codec makes {arrived!r} of {sent!r}")
 
 
 def _typed(data: bytes, decode_typed: Callable[[bytes], _T], max_bytes: int) -> _T:

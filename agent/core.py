@@ -12,7 +12,7 @@ from typing import Final, assert_never, final
 import msgspec
 
 from agent.checked_controller import CheckedController
-from agent.codec import Decoders, holds_datagram
+from agent.codec import RadioCodec, holds_datagram
 from agent.comms.broadcast import Broadcast, OwnState
 from agent.comms.datagrams import Datagrams
 from agent.comms.gossip import RecordTable
@@ -91,14 +91,14 @@ class Outbox:
 class Agent:
     """One agent of the team. Raises ControllerError if its controller cannot be loaded.
 
-    decoders: shared by the agents that a process feeds. decide: how its controller is asked; None:
+    codec: shared by the agents that a process feeds. decide: how its controller is asked; None:
     directly.
     """
 
     def __init__(
         self,
         setup: AgentSetup,
-        decoders: Decoders | None = None,
+        codec: RadioCodec | None = None,
         decide: Decide | None = None,
     ) -> None:
         tick_s = 1.0 / setup.tick_hz
@@ -107,7 +107,7 @@ class Agent:
         self.rejected: Counter[str] = Counter()
         self._setup, self._decide_with = setup, decide
         self._incarnation = setup.incarnation
-        self._decoders = decoders if decoders is not None else Decoders()
+        self._codec = codec if codec is not None else RadioCodec()
         self._slack_s = 2.0 * tick_s
         self._implausible2 = (IMPLAUSIBLE_SPEEDS * setup.fleet_max_speed_mps) ** 2
         self._command_slots = setup.command_ticks * setup.slots_per_tick
@@ -119,8 +119,8 @@ class Agent:
         self._broadcast = Broadcast(
             setup.id,
             setup.incarnation,
-            1.0 / comms.local_hz,
-            round_s,
+            comms,
+            self._codec,
             setup.relays and services.records,
         )
         self._datagrams = Datagrams(self._slack_s, round_s)
@@ -269,7 +269,7 @@ class Agent:
             self.rejected[error.cause] += 1
 
     def _receive_beacon(self, source: int, payload: bytes, now_s: float) -> None:
-        beacon = self._decoders.beacon(payload)
+        beacon = self._codec.beacon(payload)
         if beacon.id != source:
             raise RejectedError("spoofed", f"a beacon of agent {source} with the id {beacon.id}")
         u, v, w = beacon.velocity
@@ -283,7 +283,7 @@ class Agent:
             self._missions.receive_frame(beacon)
 
     def _receive_gossip(self, source: int, payload: bytes, now_s: float) -> None:
-        gossip = self._decoders.gossip(payload)
+        gossip = self._codec.gossip(payload)
         if gossip.id != source:
             raise RejectedError("spoofed", f"gossip of agent {source} with the id {gossip.id}")
         if gossip.stamp_s > now_s + self._slack_s:

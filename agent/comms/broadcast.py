@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from math import inf
 from typing import Final, final
 
-from agent.codec import add_checksum, encode
+from agent.codec import RadioCodec
 from agent.comms.gossip import RecordTable
+from agent.config import Comms
 from agent.messages import (
     HOME,
     Beacon,
@@ -78,24 +79,24 @@ class OwnState:
 class Broadcast:
     """An agent's sending side of both channels.
 
-    It numbers the beacons (``sequence``) and remembers when each was sent (``sent_s``). The periods
-    of the two channels are in [s]; infinite for a channel that is off. relays: whether it passes
-    the table of members on.
+    It numbers the beacons (``sequence``) and remembers when each was sent (``sent_s``). relays:
+    whether it passes the table of members on.
     """
 
     def __init__(
         self,
         own_id: int,
         incarnation: int,
-        beacon_period_s: float,
-        round_period_s: float,
+        comms: Comms,
+        codec: RadioCodec,
         relays: bool = True,
     ) -> None:
+        self._codec = codec
         self._relays = relays
         self._id = own_id
         self._incarnation = incarnation
-        self._beacon_period_s = beacon_period_s
-        self._round_period_s = round_period_s
+        self._beacon_period_s = 1.0 / comms.local_hz
+        self._round_period_s = 1.0 / comms.multihop_hz if comms.multihop_hz > 0.0 else inf
         self.sequence = 0
         self.forget_times()
 
@@ -123,7 +124,8 @@ class Broadcast:
         frames: list[tuple[Channel, bytes]] = []
         if now_s >= self._next_beacon_s:
             self._next_beacon_s = now_s + self._beacon_period_s - 1e-9
-            frames.append((LOCAL, add_checksum(encode(self._beacon(now_s, own, echoes)))))
+            beacon = self._beacon(now_s, own, echoes)
+            frames.append((LOCAL, self._codec.encode_beacon(beacon)))
         if now_s >= self._next_round_s:
             self._next_round_s = now_s + self._round_period_s - 1e-9
             record = self._record(now_s, own) if self._relays else None
@@ -132,7 +134,7 @@ class Broadcast:
             frames.extend((MULTIHOP, frame) for frame in table.frames(now_s, None, pieces))
         if own.summary is not None and self._round_period_s < inf:
             gossip = Gossip(self._id, now_s, records=(), piece=None, summary=own.summary)
-            frames.append((MULTIHOP, add_checksum(encode(gossip))))
+            frames.append((MULTIHOP, self._codec.encode_gossip(gossip)))
         return tuple(frames)
 
     def _pieces_due(self, now_s: float, pieces: Sequence[Piece]) -> bool:

@@ -10,10 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agent.codec import (
+    CHECKED_EVERY,
     CHECKSUM_B,
     MAX_COMMAND_B,
     MAX_OBSERVATION_B,
-    Decoders,
+    RadioCodec,
     add_checksum,
     decode_beacon,
     decode_command,
@@ -465,17 +466,36 @@ def test_a_flipped_bit_is_detected_anywhere(decode_radio):
         assert caught.value.cause == "corrupt"
 
 
-def test_decoders_know_the_newest_payloads_and_forget_the_oldest():
+def test_a_codec_knows_the_newest_payloads_and_forgets_the_oldest():
     stamped = [msgspec.structs.replace(GOOD[Gossip], stamp_s=float(k)) for k in range(10)]
     payloads = [add_checksum(encode(each)) for each in stamped]
-    decoders = Decoders(kept=2)
-    found = [decoders.gossip(each) for each in payloads]
+    codec = RadioCodec(kept=2)
+    found = [codec.gossip(each) for each in payloads]
     assert found == stamped
-    assert decoders.gossip(payloads[-1]) is found[-1]
-    assert decoders.gossip(payloads[-2]) is found[-2]
-    assert decoders.gossip(payloads[0]) is not found[0]
-    keeping_none = Decoders()
+    assert codec.gossip(payloads[-1]) is found[-1]
+    assert codec.gossip(payloads[-2]) is found[-2]
+    assert codec.gossip(payloads[0]) is not found[0]
+    keeping_none = RadioCodec()
     assert keeping_none.gossip(payloads[0]) is not keeping_none.gossip(payloads[0])
+
+
+def test_a_codec_hands_over_what_it_encoded_and_checks_one_message_of_many():
+    codec, gossip, beacon = RadioCodec(kept=2), GOOD[Gossip], GOOD[Beacon]
+    payload = codec.encode_gossip(gossip)
+    assert payload == add_checksum(encode(gossip))
+    assert codec.gossip(payload) is gossip
+    heard = codec.beacon(codec.encode_beacon(beacon))
+    assert (heard.id, heard.position, heard.stamp_s) == (
+        *(beacon.id, beacon.position, beacon.stamp_s),
+    )
+    wrong = msgspec.structs.replace(gossip, id=-1)
+    with pytest.raises(RejectedError):
+        for _ in range(CHECKED_EVERY):
+            codec.encode_gossip(wrong)
+    altered = msgspec.structs.replace(gossip, records=[])  # a tuple comes out
+    with pytest.raises(ValueError, match="the codec makes"):
+        for _ in range(CHECKED_EVERY):
+            codec.encode_gossip(altered)
 
 
 @given(st.binary(max_size=10))

@@ -1,18 +1,25 @@
 """Virtual time: the whole fleet in one process, as fast as the host allows.
 
-The agents, the medium and the world are those of the processes, driven by the same slot loop. What
-an agent says by radio is encoded and decoded, a payload that several agents hear once. The other
-messages are handed over as they are, since nobody can change them; in one slot of ``CHECKED_EVERY``
-they go through the codec too, as between processes, and must come out equal.
+The agents, the medium and the world are those of the processes, driven by the same slot loop.
+Messages are handed over as they are, since nobody can change them; in one slot of ``CHECKED_EVERY``
+they go through the codec too, as between processes, and must come out equal. What an agent says by
+radio is encoded, for its bytes count: known bytes are not decoded, see ``RadioCodec``.
 """
 
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter, process_time
-from typing import Final, Protocol, TypeVar, assert_never
+from typing import Final, Protocol, assert_never
 
-from agent.codec import Decoders, decode_command, decode_observation, encode
+from agent.codec import (
+    CHECKED_EVERY,
+    RadioCodec,
+    check_equal,
+    decode_command,
+    decode_observation,
+    encode,
+)
 from agent.config import AgentSetup
 from agent.core import Agent
 from agent.late_frames import LateFrames
@@ -51,11 +58,8 @@ from worldsim.engine.trace import TraceLog
 from worldsim.scenario.tables import Scenario
 
 WORLD_KILLED: Final = "the world was killed"
-CHECKED_EVERY: Final = 61
-"""A prime, so that each agent's turn comes: agents step in every fourth slot."""
 HEARD_AGAIN: Final = 16
-"""So many payloads are kept decoded for each agent: those of about a second."""
-_Message = TypeVar("_Message")
+"""So many payloads are kept with what they hold for each agent: those of about a second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +118,7 @@ class VirtualFleet:
         self._slot = 0
         self._scenario = scenario
         self._medium = Medium(scenario.medium_setup())
-        self._decoders = Decoders(HEARD_AGAIN * scenario.rows)
+        self._codec = RadioCodec(HEARD_AGAIN * scenario.rows)
         self._late: dict[int, LateFrames] = {}
         self._agents = {agent: self._new_agent(agent, 0) for agent in range(scenario.fleet.agents)}
         self._inboxes = [deque[tuple[Frame, ...]](maxlen=BATCH_RING) for _ in range(scenario.rows)]
@@ -188,9 +192,9 @@ class VirtualFleet:
         if self._tap is not None and self._tap.agent == agent:
             self._tap.begin(setup)
         if self._watch is None:
-            return Agent(setup, self._decoders)
+            return Agent(setup, self._codec)
         self._watch.enter(agent, self._slot)
-        core = Agent(setup, self._decoders)
+        core = Agent(setup, self._codec)
         self._watch.leave()
         return core
 
@@ -198,7 +202,7 @@ class VirtualFleet:
         core, now_s = self._agents[agent], open_slot.time_s
         checks = open_slot.slot % CHECKED_EVERY == 0
         if checks:
-            _check_codec(observation, decode_observation(encode(observation)))
+            check_equal(observation, decode_observation(encode(observation)))
         inbox = self._inboxes[agent]
         if self._tap is not None and self._tap.agent == agent:
             self._tap.step([frame for batch in inbox for frame in batch], observation)
@@ -215,11 +219,11 @@ class VirtualFleet:
         outgoing = tuple([Outgoing(channel, payload) for channel, payload in said])
         transmission = Transmission(open_slot.slot, outbox.command.incarnation, outgoing)
         if checks:
-            _check_codec(transmission, unpack_transmission(pack(transmission)))
+            check_equal(transmission, unpack_transmission(pack(transmission)))
         self._medium.transmit(agent, now_s, transmission)
         command = encode(outbox.command)
         if checks:
-            _check_codec(outbox.command, decode_command(command))
+            check_equal(outbox.command, decode_command(command))
         self.loop.apply_command(agent, outbox.command, command)
 
     def _deliver(self, slot: int) -> None:
@@ -233,7 +237,7 @@ class VirtualFleet:
                 frames = self._medium.collect(agent, time_s)
                 if slot % CHECKED_EVERY == 0:
                     batch = Batch(slot, frames)
-                    _check_codec(batch, unpack_batch(pack(batch)))
+                    check_equal(batch, unpack_batch(pack(batch)))
                 self._inboxes[agent].append(frames)
 
 
@@ -242,12 +246,6 @@ class Probe(Protocol):
 
     def before_slot(self, fleet: VirtualFleet) -> None:
         """See the fleet before its next slot."""
-
-
-def _check_codec(sent: _Message, arrived: _Message) -> None:
-    """Raise ValueError if a message does not come out of the codec as it went in."""
-    if arrived != sent:
-        raise ValueError(f"the codec makes {arrived!r} of {sent!r}")
 
 
 def fly(

@@ -5,9 +5,10 @@ from math import inf
 
 import pytest
 
-from agent.codec import decode_beacon, decode_gossip
+from agent.codec import RadioCodec, decode_beacon, decode_gossip
 from agent.comms.broadcast import MAX_ECHOES, Broadcast, OwnState
 from agent.comms.gossip import RecordTable
+from agent.config import Comms
 from agent.messages import (
     FRAME_M,
     MAX_PLACES,
@@ -83,7 +84,8 @@ EXTREME = OwnState(
 
 
 def broadcast(beacon_s=0.05, round_s=0.5, incarnation=0, relays=True, own_id=3):
-    return Broadcast(own_id, incarnation, beacon_s, round_s, relays)
+    comms = Comms(local_hz=1.0 / beacon_s, multihop_hz=1.0 / round_s)
+    return Broadcast(own_id, incarnation, comms, RadioCodec(), relays)
 
 
 def table_with(own_id, records):
