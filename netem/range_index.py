@@ -21,7 +21,7 @@ KEPT_FROM: Final = 40
 """Number of receivers from which those near a sender are kept."""
 ARRAYS_FROM: Final = 400 if is_preferred() else 40
 """Number of receivers from which arrays are faster than a loop, compiled or not."""
-MARGIN_M: Final = 0.5
+MARGIN_M: Final = 1.0
 """Receivers so far beyond the reach are kept among those that are near [m]."""
 MOST_MOVED_M: Final = 0.499 * MARGIN_M
 """Less than half of the margin by more than any rounding [m]."""
