@@ -13,6 +13,7 @@ radio it takes two bytes: the greatest label of the time at which it is sent, le
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from math import inf
 from struct import pack, unpack_from
 from typing import Final, NamedTuple
@@ -166,7 +167,7 @@ class Census:
                 self._news.add(member)
 
     def _merge_run(self, first: int, labels: bytes, greatest: int, now_s: float) -> None:
-        sent = _unpacked(labels)
+        sent: list[int] = _unpacked(labels)
         end = min(first + len(sent), self._ids)
         self._make_room(end)
         limit = greatest - WORTH_QUANTA * CODES
@@ -266,6 +267,8 @@ def _packed(labels: list[int]) -> bytes:
     return pack(f"<{len(labels)}H", *labels)
 
 
+@lru_cache(maxsize=64)
 def _unpacked(labels: bytes) -> list[int]:
+    """Return labels as they were sent; several agents hear the same, and none changes the list."""
     number = len(labels) // LABEL_B
     return list(unpack_from(f"<{number}H", labels))
