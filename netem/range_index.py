@@ -4,7 +4,8 @@ Few receivers are searched in a loop over plain floats, many as arrays. Both do 
 (differences, a written-out sum of three squares, a square root) and so find equal numbers.
 
 Of a large fleet only those near the sender are searched, as in a Verlet list: they were within the
-reach and a margin when it was made, and it holds until some radio has moved half of the margin.
+reach and a margin at one time, the same for all senders, and the lists hold until some radio has
+moved half of the margin since then.
 """
 
 from collections.abc import Sequence
@@ -44,8 +45,8 @@ class RangeIndex:
         self._array_before: Floats = np.full((3, len(receivers)), nan)
         self._near_holds = False
         """Whether it is known that ``_near`` holds now."""
-        self._near: dict[tuple[int, float], tuple[Position, Sequence[int]]] = {}
-        """Where a sender was, and the receivers near it, by its id and reach."""
+        self._near: dict[float, list[Sequence[int] | None]] = {}
+        """By reach, the receivers that were near each radio; None where it was not asked for."""
         self._found: dict[tuple[int, float], InRange] = {}
 
     def place(self, positions: tuple[Position | None, ...]) -> None:
@@ -68,17 +69,17 @@ class RangeIndex:
         """Return receivers, all within a distance [m] of the source among them, ascending."""
         if len(self._receivers) < KEPT_FROM:
             return self._receivers
-        here = self.positions[source]
-        if here is None:
+        if self.positions[source] is None:
             return ()
         if not self._near_holds:
             self._check_near()
-        near = self._near.get((source, reach_m))
-        if near is None or not _is_within(here, near[0], MOST_MOVED_M):
-            pairs = self._in_range_before(source, here, reach_m + MARGIN_M)
-            near = here, [receiver for receiver, _ in pairs]
-            self._near[source, reach_m] = near
-        return near[1]
+        lists = self._near.get(reach_m)
+        if lists is None:
+            lists = self._near[reach_m] = [None for _ in self.positions]
+        near = lists[source]
+        if near is None:
+            near = lists[source] = self._near_before(source, reach_m + MARGIN_M)
+        return near
 
     def _among_near(self, source: int, here: Position, reach_m: float) -> InRange:
         near = self.near(source, reach_m)
@@ -86,19 +87,25 @@ class RangeIndex:
             return _by_loop(self.positions, source, here, reach_m, near)
         return self._by_array(self._placed(), source, here, reach_m)
 
-    def _in_range_before(self, source: int, here: Position, reach_m: float) -> InRange:
-        """Return the receivers that were within a distance [m] when ``_near`` was begun."""
+    def _near_before(self, source: int, within_m: float) -> Sequence[int]:
+        """Return the receivers within a distance [m] when ``_near`` was begun."""
+        here = self._before[source]
+        if here is None:
+            return ()  # not asked for: ``_near`` is begun anew with a radio that appears
         if len(self._receivers) < ARRAYS_FROM:
-            return _by_loop(self._before, source, here, reach_m, self._receivers)
-        return self._by_array(self._array_before, source, here, reach_m)
+            pairs = _by_loop(self._before, source, here, within_m, self._receivers)
+        else:
+            pairs = self._by_array(self._array_before, source, here, within_m)
+        return [receiver for receiver, _ in pairs]
 
     def _check_near(self) -> None:
-        """Begin ``_near`` anew if any receiver has moved too far."""
+        """Begin ``_near`` anew if any radio has moved too far."""
         self._near_holds = True
-        for receiver in self._receivers:
-            here = self.positions[receiver]
-            before = self._before[receiver]
-            if here is not None and (before is None or not _is_within(here, before, MOST_MOVED_M)):
+        for radio, here in enumerate(self.positions):
+            if here is None:
+                continue
+            before = self._before[radio]
+            if before is None or not _is_within(here, before, MOST_MOVED_M):
                 self._before = self.positions
                 if len(self._receivers) >= ARRAYS_FROM:
                     self._array_before = self._placed()
