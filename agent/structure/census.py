@@ -12,6 +12,7 @@ radio it takes two bytes: the greatest label of the time at which it is sent, le
 
 from __future__ import annotations
 
+from bisect import insort
 from collections.abc import Sequence
 from functools import lru_cache
 from math import inf
@@ -43,8 +44,8 @@ MAX_LABELLED: Final = 2**14
 """Ids from here on are not counted."""
 LABEL_S: Final = QUANTUM_S / CODES
 """Time of one step of a label [s]."""
-KNOWN: Final = (False, *[True] * (CODES - 1))
-"""All codes but that of a member of which nothing is known."""
+NOTHING_KNOWN: Final = 0
+"""The code of a member of which nothing is known."""
 ASK_S: Final = 0.5
 FORGOTTEN_S: Final = 10.0
 """A member whose label is late is asked for every ASK_S, until FORGOTTEN_S later."""
@@ -70,7 +71,9 @@ class Census:
         self._ids = min(ids, MAX_LABELLED)
         self._labels: list[int] = []
         self._codes: list[int] = []
-        """The codes of the labels; 0 of a member of which nothing is known."""
+        """The codes of the labels."""
+        self._holders: dict[int, list[int]] = {}
+        """The known members with each code, ascending."""
         self._lag_s: list[float] = []
         """How old labels are when they arrive, by member [s]."""
         self._news = LabelNews()
@@ -187,9 +190,13 @@ class Census:
         self._set(member, label, now_s)
 
     def _set(self, member: int, label: int, now_s: float, source: int = OWN) -> None:
-        code = label % CODES
-        if code != self._codes[member]:
+        code, before = label % CODES, self._codes[member]
+        if code != before:
             self._codes[member] = code
+            if before != NOTHING_KNOWN:
+                self._holders[before].remove(member)
+            if code != NOTHING_KNOWN:
+                insort(self._holders.setdefault(code, []), member)
             self._news.add_event(member, source)
             self.version += 1
             if member != self._own and now_s > self._changed_s:
@@ -201,28 +208,29 @@ class Census:
 
     def population(self, now_s: float, lost_s: float, queues: int, vertices: int) -> Population:
         """Return who is there now. lost_s: T_lost of a neighbour, and time for an answer [s]."""
-        members, holders = [0] * queues, [0] * vertices
-        present = self.present(now_s, lost_s)
-        for code, _ in present:
+        members, leaders = [0] * queues, [0] * vertices
+        total = 0
+        for code in self._holders:
+            there = len(self.present(now_s, lost_s, (code,)))
+            total += there
             if (queue := queue_of_code(code, queues)) >= 0:
-                members[queue] += 1
+                members[queue] += there
             elif FIRST_VERTEX <= code < FIRST_VERTEX + vertices:
-                holders[code - FIRST_VERTEX] += 1
-        return Population(len(present), tuple(members), tuple(holders), self._changed_s)
+                leaders[code - FIRST_VERTEX] += there
+        return Population(total, tuple(members), tuple(leaders), self._changed_s)
 
-    def present(
-        self, now_s: float, lost_s: float, among: Sequence[bool] = KNOWN
-    ) -> list[tuple[int, int]]:
-        """Return each member that is there, by code and id.
+    def present(self, now_s: float, lost_s: float, codes: Sequence[int]) -> list[int]:
+        """Return the members with some codes that are there, by code and id.
 
-        lost_s: as for the population [s]; among: for each code, whether its members count.
+        lost_s: as for the population [s].
         """
         oldest_s = now_s - lost_s - QUANTUM_S
-        labels, lag_s, counts = self._labels, self._lag_s, list(among)
+        labels, lag_s = self._labels, self._lag_s
         return [
-            (code, member)
-            for member, code in enumerate(self._codes)
-            if counts[code] and labels[member] * LABEL_S >= oldest_s - LAGS * lag_s[member]
+            member
+            for code in codes
+            for member in self._holders.get(code, ())
+            if labels[member] * LABEL_S >= oldest_s - LAGS * lag_s[member]
         ]
 
     def wire(self, now_s: float, most: int = SHARED_LABELS) -> tuple[int, bytes]:
@@ -246,7 +254,7 @@ class Census:
         missing = members - len(self._labels)
         if missing > 0:
             self._labels += [0] * missing
-            self._codes += [0] * missing
+            self._codes += [NOTHING_KNOWN] * missing
             self._lag_s += [0.0] * missing
             self._deadline_s += [inf] * missing
 

@@ -75,6 +75,5 @@ class HeadCount:
             self._ordered, self._ordered_s = wanted, view.now_s
             lost_s = view.timing.lost_s + view.timing.answer_s
             codes = codes_of(queue, self._map.queues)
-            present = sorted(self.census.present(view.now_s, lost_s, codes))
-            self._order = [member for _, member in present]
+            self._order = self.census.present(view.now_s, lost_s, codes)
         return self._order

@@ -47,9 +47,9 @@ def of_vertex(vertex: int) -> int:
 
 
 @lru_cache(maxsize=256)
-def codes_of(queue: int, queues: int) -> tuple[bool, ...]:
-    """Return for each code whether it is of a queue in a formation of so many queues."""
-    return tuple([queue_of_code(code, queues) == queue for code in range(CODES)])
+def codes_of(queue: int, queues: int) -> tuple[int, ...]:
+    """Return the codes of a queue in a formation of so many queues, ascending."""
+    return tuple([code for code in range(CODES) if queue_of_code(code, queues) == queue])
 
 
 def queue_of_code(code: int, queues: int) -> int:

@@ -101,7 +101,7 @@ def spread(agents, reach, tellings, *, loss=0.5, frames=60, seed=0):
             for sender in range(max(0, to - reach), min(agents, to + reach + 1)):
                 if sender != to and random.random() >= loss:
                     member.merge(Summary(0, 0, b"", spoken[sender], ()), 10.0, 10.0, sender)
-    return sum(bool(each.present(10.0, 1.0)) for each in members), told / agents
+    return sum(each.population(10.0, 1.0, 1, 1).total > 0 for each in members), told / agents
 
 
 def test_news_reach_the_end_of_a_line_only_if_they_are_repeated():
