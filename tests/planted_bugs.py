@@ -16,14 +16,16 @@ from typing import Any, Final
 import msgspec
 import pytest
 
+from agent.comms import whereabouts
 from agent.comms.gossip import RecordTable
+from agent.comms.whereabouts import VehicleReport
 from agent.guidance import q_structure
 from agent.guidance.cone import Cone
 from agent.guidance.movement import DEAD_BAND_MPS
 from agent.guidance.promise_filter import PromiseFilter
 from agent.guidance.safety_filter import Bound, RangingFilter
-from agent.heard_beacon import Version
-from agent.messages import Vector
+from agent.heard_beacon import HeardBeacon, Version
+from agent.messages import Record, Vector
 from agent.structure.queue_map import QueueMap
 from agent.vectors import across
 from netem import link
@@ -42,7 +44,7 @@ from worldsim.truth.world import World
 Plant = Callable[[pytest.MonkeyPatch], None]
 SHRINK_FLIGHTS = 60
 BESIDE = Path("planted.toml")
-BLIND = ("broken_promise",)
+BLIND = ("broken_promise", "stale_frame")
 """Bugs of code that keeps vehicles without a ranging sensor apart: fast ones that chase each other,
 for the shipped controller keeps farther off than its filter makes it."""
 BLIND_CHASE: dict[str, Any] = {
@@ -166,14 +168,15 @@ def broken_promise(patch: pytest.MonkeyPatch) -> None:
 
 
 def stale_frame(patch: pytest.MonkeyPatch) -> None:
-    """A stale frame: whatever comes last is the newest."""
-    right = Version.supersedes
+    """A stale frame: what a vehicle last said of itself counts as said now, however old it is."""
+    right = whereabouts._report
 
-    def supersedes(self: Any, other: Any) -> bool:
-        Difference.note(not right(self, other))
-        return True
+    def report(newest: HeardBeacon | Record, position: Vector, now_s: float) -> VehicleReport:
+        found = right(newest, position, now_s)
+        Difference.note(found.age_s > 0.0)
+        return found._replace(age_s=0.0)
 
-    patch.setattr(Version, "supersedes", supersedes)
+    patch.setattr(whereabouts, "_report", report)
 
 
 def lasting_partition(patch: pytest.MonkeyPatch) -> None:
