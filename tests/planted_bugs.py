@@ -2,7 +2,8 @@
 
 The product has no switch for any of them: they replace parts of pure Python code in this process
 (QSWARM_PURE=1), and the flights that it forks inherit them. Each notes when it first makes a
-difference: when the planted code does something else than the code that it replaces would have.
+difference: when the planted code does something else than the code that it replaces would have. A
+flight can mend a bug for a while: then it runs the code that the bug replaces.
 ``python -m tests.planted_figures`` measures what becomes of them.
 """
 
@@ -87,6 +88,37 @@ class DifferenceProbe:
         (folder / self.FILE).write_text(json.dumps(self._at_s), encoding="utf-8")
 
 
+class Window:
+    """The slots in which a flight runs the planted code; before and after it, the right one.
+
+    first, end: from the one on, up to the other, in slots; None: to the end of the flight.
+    """
+
+    open = True
+    """Whether it runs the planted code now, in this process."""
+
+    def __init__(self, first: int, end: int | None) -> None:
+        self._first, self._end = first, end
+
+    def before_slot(self, fleet: VirtualFleet) -> None:
+        """Choose the code of the next slot."""
+        slot = fleet.loop.world.slot
+        Window.open = self._first <= slot and (self._end is None or slot < self._end)
+
+    def write(self, folder: Path) -> None:
+        """Write nothing: the summary says it all."""
+
+
+def put(patch: pytest.MonkeyPatch, owner: Any, name: str, planted: Callable[..., Any]) -> None:
+    """Plant a function in place of one of a class or a module, where the window is open."""
+    right = getattr(owner, name)
+
+    def either(*given: Any) -> Any:
+        return planted(*given) if Window.open else right(*given)
+
+    patch.setattr(owner, name, either)
+
+
 def filter_sign(patch: pytest.MonkeyPatch) -> None:
     """A sign in the filter: it limits the way from a vehicle, not the way to it."""
     right = RangingFilter.bounds
@@ -97,7 +129,7 @@ def filter_sign(patch: pytest.MonkeyPatch) -> None:
         x, y, z = range(3)
         return [each._replace(away=(-each.away[x], -each.away[y], -each.away[z])) for each in found]
 
-    patch.setattr(RangingFilter, "bounds", bounds)
+    put(patch, RangingFilter, "bounds", bounds)
 
 
 def version_alone(patch: pytest.MonkeyPatch) -> None:
@@ -109,7 +141,7 @@ def version_alone(patch: pytest.MonkeyPatch) -> None:
         Difference.note(newer != right(self, other))
         return newer
 
-    patch.setattr(Version, "supersedes", supersedes)
+    put(patch, Version, "supersedes", supersedes)
 
 
 def unkeyed_draw(patch: pytest.MonkeyPatch) -> None:
@@ -124,8 +156,8 @@ def unkeyed_draw(patch: pytest.MonkeyPatch) -> None:
         Difference.note()
         return right_group(os.urandom(32), *key)
 
-    patch.setattr(link, "draw", draw)
-    patch.setattr(link, "draw_group", draw_group)
+    put(patch, link, "draw", draw)
+    put(patch, link, "draw_group", draw_group)
 
 
 def forgotten_tombstone(patch: pytest.MonkeyPatch) -> None:
@@ -139,7 +171,7 @@ def forgotten_tombstone(patch: pytest.MonkeyPatch) -> None:
         self._lag_s.update(lag_s)
         return []
 
-    patch.setattr(RecordTable, "forget_silent", forget_silent)
+    put(patch, RecordTable, "forget_silent", forget_silent)
 
 
 def held_command(patch: pytest.MonkeyPatch) -> None:
@@ -149,7 +181,7 @@ def held_command(patch: pytest.MonkeyPatch) -> None:
         held = zip(self._expires, self._velocity, strict=True)
         Difference.note(any(expires <= self.slot and any(v) for expires, v in held))
 
-    patch.setattr(World, "_hover_expired", hover_expired)
+    put(patch, World, "_hover_expired", hover_expired)
 
 
 def broken_promise(patch: pytest.MonkeyPatch) -> None:
@@ -157,6 +189,8 @@ def broken_promise(patch: pytest.MonkeyPatch) -> None:
     right: Any = PromiseFilter.speed_limit
 
     def speed_limit(self: Any) -> float:
+        if not Window.open:
+            return float(right.fget(self))
         Difference.note(right.fget(self) < self._max_speed)
         return float(self._max_speed)
 
@@ -164,7 +198,7 @@ def broken_promise(patch: pytest.MonkeyPatch) -> None:
         return float(self._braking.stopping_s(max(speed, right.fget(self))))
 
     patch.setattr(PromiseFilter, "speed_limit", property(speed_limit))
-    patch.setattr(PromiseFilter, "_needs_s", needs_s)
+    put(patch, PromiseFilter, "_needs_s", needs_s)
 
 
 def stale_frame(patch: pytest.MonkeyPatch) -> None:
@@ -176,7 +210,7 @@ def stale_frame(patch: pytest.MonkeyPatch) -> None:
         Difference.note(found.age_s > 0.0)
         return found._replace(age_s=0.0)
 
-    patch.setattr(whereabouts, "_report", report)
+    put(patch, whereabouts, "_report", report)
 
 
 def lasting_partition(patch: pytest.MonkeyPatch) -> None:
@@ -190,7 +224,7 @@ def lasting_partition(patch: pytest.MonkeyPatch) -> None:
         else:
             right(self, order)
 
-    patch.setattr(Medium, "apply", apply)
+    put(patch, Medium, "apply", apply)
 
 
 def rank_off_by_one(patch: pytest.MonkeyPatch) -> None:
@@ -201,7 +235,7 @@ def rank_off_by_one(patch: pytest.MonkeyPatch) -> None:
         Difference.note(number == 4)
         return right(self, queue, number + (number == 4), members)
 
-    patch.setattr(QueueMap, "slot", slot)
+    put(patch, QueueMap, "slot", slot)
 
 
 def turn_at_180(patch: pytest.MonkeyPatch) -> None:
@@ -217,7 +251,7 @@ def turn_at_180(patch: pytest.MonkeyPatch) -> None:
         Difference.note(flown != right(wanted, yaw, cone)[0])
         return flown, heading
 
-    patch.setattr(q_structure, "steer", steer)
+    put(patch, q_structure, "steer", steer)
 
 
 PLANTS: dict[str, Plant] = {

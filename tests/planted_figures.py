@@ -11,9 +11,10 @@ are kept in the folder: what was stopped goes on. They are to be new for each co
 import argparse
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from hashlib import sha256
+from math import ceil
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
@@ -26,6 +27,7 @@ from tests.planted_bugs import (
     PLANTS,
     SHRINK_FLIGHTS,
     DifferenceProbe,
+    Window,
     small_terms,
 )
 from worldsim.campaign.flight_site import LocalSite, Order
@@ -36,18 +38,12 @@ from worldsim.fuzz.folder import SCENARIO, Row, read_finding
 from worldsim.fuzz.fuzz import Drawn, drawn, generations, row_of, task_of
 from worldsim.fuzz.shrinking import shrink
 from worldsim.results.progress_line import ProgressLine
-from worldsim.scenario.tables import Scenario
+from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 from worldsim.search.drafts import loaded
 from worldsim.search.guide import Guide
 
-CAUSES = (
-    "version_alone",
-    "forgotten_tombstone",
-    "held_command",
-    "lasting_partition",
-    "rank_off_by_one",
-)
-"""Bugs that wait for something to happen; the others make a difference from the start."""
+NEAR_S = 1.0
+"""So near to a bug's trigger ``qswarm cause`` is to say that its failure is certain [s]."""
 
 
 @contextmanager
@@ -191,30 +187,86 @@ def difference_s(bench: Bench, folder: Path, name: str) -> float | None:
     return at_s
 
 
-def trigger_s(scenario: Scenario, difference: float | None) -> float | None:
-    """Return when the last thing happened that can have made a bug act [s; simulated time].
+class Harm(NamedTuple):
+    """When a bug did what a finding's violation needs [s; simulated time]."""
 
-    That is an event, or its end, before the first difference; the start where there is none.
+    kept_away_s: float
+    """The last tick from which on it must act; kept away for longer, it does no harm."""
+    done_s: float
+    """The first tick from which on it need not act any more; mended then, all is lost."""
+
+
+def harm_of(bench: Bench, folder: Path, name: str) -> Harm:
+    """Return when a bug did the harm in a finding's scenario, by mending it for a while."""
+    scenario = loaded((folder / SCENARIO).read_text("utf-8"), BESIDE)
+    ticks = ceil(scenario.duration_s * scenario.fleet.tick_hz)
+    wanted = read_finding(folder)["property"]
+
+    def fails(first: int, end: int | None) -> bool:
+        bench.say(f"{name}: planted in ticks {first} to {end or ticks}")
+        slots = None if end is None else end * SLOTS_PER_TICK
+        window = Window(first * SLOTS_PER_TICK, slots)
+        task = Task("harm", scenario, window, flights_for(wanted))
+        (flown,) = bench.hangar.fly([task])
+        return flown.margins.get(wanted, 1.0) < 0.0
+
+    with planted(name):
+        kept_away = last_tick(ticks, lambda tick: fails(tick, None))
+        saved = last_tick(ticks, lambda tick: not fails(0, tick))
+    hz = scenario.fleet.tick_hz
+    return Harm(kept_away / hz, (saved + 1) / hz)
+
+
+def last_tick(ticks: int, holds: Callable[[int], bool]) -> int:
+    """Return the last tick in which something holds that holds in tick 0.
+
+    It goes back from the end in eighths of the flight to one that holds, and bisects after it.
     """
-    if difference is None:
-        return None
+    low, high = 0, ticks
+    for eighth in range(7, 0, -1):
+        tick = eighth * ticks // 8
+        if holds(tick):
+            low = tick
+            break
+        high = tick
+    while high - low > 1:
+        middle = (low + high) // 2
+        if holds(middle):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def trigger_s(scenario: Scenario, needed_s: float) -> float:
+    """Return the last event, or end of one, up to when a bug must act; the start without one."""
     turns = [each.at_s for each in scenario.event]
     turns += [each.at_s + each.for_s for each in scenario.event if each.for_s]
-    return max((each for each in turns if each <= difference), default=0.0)
+    return max((each for each in turns if each <= needed_s), default=0.0)
 
 
 def causes(bench: Bench, names: list[str]) -> None:
-    """Print what made each bug act, its first difference, and what ``qswarm cause`` says."""
-    print("| bug | trigger | first difference | certain from | cause |\n|---|---|---|---|---|")
+    """Print what made each bug do harm, and what ``qswarm cause`` says."""
+    print(
+        "| bug | violated at | first difference | must act from | trigger | harm done by "
+        "| certain from | cause |\n|---|---|---|---|---|---|---|---|"
+    )
+    near = []
     for name in names:
         folder = bench.folder / "findings" / name
-        at_s = difference_s(bench, folder, name)
+        scenario = loaded((folder / SCENARIO).read_text("utf-8"), BESIDE)
+        first_s, harm = difference_s(bench, folder, name), harm_of(bench, folder, name)
         with planted(name):
             cause = find_cause(folder, bench.hangar, 20, bench.say)
-        if cause is not None:
-            scenario = loaded((folder / SCENARIO).read_text("utf-8"), BESIDE)
-            times = f"{trigger_s(scenario, at_s)} | {at_s} | {cause.certain_s}"
-            print(f"| {name} | {times} | {cause.text} |", flush=True)
+        if cause is None:
+            return
+        trigger = trigger_s(scenario, harm.kept_away_s)
+        certain_s = cause.certain_s
+        near.append(certain_s is not None and abs(certain_s - trigger) <= NEAR_S)
+        shown_s = read_finding(folder)["trouble_s"]
+        times = (shown_s, first_s, harm.kept_away_s, trigger, harm.done_s, certain_s)
+        print(f"| {name} | {' | '.join(map(str, times))} | {cause.text} |", flush=True)
+    print(f"certain within {NEAR_S:g} s of the trigger: {sum(near)} of {len(near)}")
 
 
 def main() -> int:
@@ -230,7 +282,7 @@ def main() -> int:
     given: Any = parser.parse_args()
     with stop_requests() as stop:
         bench = Bench(given.out, stop)
-        names = given.only or list(CAUSES if given.what == "cause" else PLANTS)
+        names = given.only or list(PLANTS)
         if given.what == "find":
             seeds = range(given.first[0], given.first[0] + given.most)
             return 0 if find(bench, names, seeds, given.budget) else 1
