@@ -56,7 +56,10 @@ def planted(name: str) -> Iterator[None]:
 
 
 class Bench:
-    """Flies trials with and without a bug, and remembers what they showed."""
+    """Flies trials with and without a bug, and remembers what they showed.
+
+    folder: no other process may use it meanwhile, or flights end by errors that are no findings.
+    """
 
     def __init__(self, folder: Path, stop: StopRequest) -> None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -110,7 +113,10 @@ def first_found(bench: Bench, name: str, seeds: range, guided: bool) -> First:
 
 
 def find(bench: Bench, names: list[str], seeds: range, budget: int) -> bool:
-    """Find and shrink each bug; print a row for each; return whether all were found."""
+    """Find and shrink each bug; print a row for each; return whether all were found.
+
+    A finding counts that violates the same property again, and nothing without the bug.
+    """
     print("| bug | seed | violated | runs | as drawn | shrunk | share | replays | without |")
     print("|---|---|---|---|---|---|---|---|---|")
     found = []
@@ -128,11 +134,13 @@ def find(bench: Bench, names: list[str], seeds: range, budget: int) -> bool:
             with planted(name):
                 shrink(folder, bench.hangar, bench.say, budget)
         finding = read_finding(folder)
-        found.append(finding)
         sizes = (finding["original_size"], finding["size"])
         shown = [f"{s['faults']}, {s['agents']}, {s['duration_s']:g} s" for s in sizes]
         share = f"{100.0 * sizes[1]['duration_s'] / sizes[0]['duration_s']:.0f} %"
-        verdicts = [", ".join(violated(bench, folder, each)) or "nothing" for each in (name, "")]
+        with_it, without = violated(bench, folder, name), violated(bench, folder, "")
+        if finding["property"] in with_it and not without:
+            found.append(finding)
+        verdicts = [", ".join(each) or "nothing" for each in (with_it, without)]
         print(
             f"| {name} | {finding['seed']} ({finding['how']}) | {finding['property']} "
             f"| {first.runs} | {' | '.join(shown)} | {share} | {' | '.join(verdicts)} |",

@@ -6,8 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from agent.comms.whereabouts import Whereabouts
 from netem.wire.shutdown import StopRequest
-from tests.planted_bugs import BESIDE, PLANTS, DifferenceProbe
+from tests.agent.comms.builders import ORIGIN, heard_beacon
+from tests.planted_bugs import BESIDE, PLANTS, DifferenceProbe, Window
+from tests.planted_figures import last_tick
 from tests.small_scenario import SMALL
 from worldsim.campaign.flight_site import LocalSite, Order
 from worldsim.fuzz.flights import Hangar, Task
@@ -63,3 +66,41 @@ def test_an_unkeyed_draw_shows_in_a_second_flight(
     PLANTS["unkeyed_draw"](monkeypatch)
     (other,) = Hangar(site, StopRequest()).fly([task])
     assert (kept.margins["repeat"], other.margins["repeat"]) == (1.0, -1.0)
+
+
+@pytest.mark.pure
+def test_a_mended_bug_flies_as_the_right_code(
+    site: LocalSite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario, hangar = flying("{ at_s = 2.0, kill = [1] }"), Hangar(site, StopRequest())
+
+    def trace(first: int, end: int | None) -> str | None:
+        (flown,) = hangar.fly([Task("it", scenario, Window(first, end))])
+        return flown.trace
+
+    right = trace(0, None)
+    PLANTS["held_command"](monkeypatch)
+    assert trace(0, None) != right
+    assert trace(0, 1) == right
+    assert trace(10**6, None) == right
+
+
+@pytest.mark.pure
+def test_a_stale_frame_counts_as_said_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    PLANTS["stale_frame"](monkeypatch)
+    known = Whereabouts(0, 2)
+    known.hear(heard_beacon(1, 1, 2.0))
+    (report,) = known.reports(ORIGIN, 9.0)
+    assert report.age_s == 0.0
+
+
+@pytest.mark.parametrize("last", [0, 1, 11, 12, 13, 87, 99, 100])
+def test_the_last_tick_in_which_something_holds_is_found(last: int) -> None:
+    asked: list[int] = []
+
+    def holds(tick: int) -> bool:
+        asked.append(tick)
+        return tick <= last
+
+    assert last_tick(101, holds) == last
+    assert len(asked) < 16
