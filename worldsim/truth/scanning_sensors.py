@@ -74,7 +74,8 @@ class ScanningSensor:
         c, s = np.array([[cos(a), sin(a)] for a in yaw.tolist()]).T[:, :, None]
         x, y, z = self._rays.T
         level = np.zeros(len(yaw))[:, None]
-        return np.stack((c * x - s * y, s * x + c * y, z + level), axis=2)
+        turned = np.stack((c * x - s * y, s * x + c * y, z + level))
+        return np.moveaxis(turned, 0, 2)  # each component in a row of its own, for speed
 
     def _measured(self, ranges: Floats, agent: int, slot: int) -> bytes:
         """Return ranges with noise and dropouts, as a Scan holds them."""
