@@ -11,13 +11,13 @@ are kept in the folder: what was stopped goes on. They are to be new for each co
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from hashlib import sha256
 from math import ceil
 from pathlib import Path
 from statistics import median
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import pytest
 
@@ -33,15 +33,17 @@ from tests.planted_bugs import (
 from worldsim.campaign.flight_site import LocalSite, Order
 from worldsim.fuzz.cause import find_cause
 from worldsim.fuzz.findings import begin, flights_for
-from worldsim.fuzz.flights import WORK, Hangar, Task
+from worldsim.fuzz.flights import WORK, Flown, Hangar, Task
 from worldsim.fuzz.folder import SCENARIO, Row, read_finding
 from worldsim.fuzz.fuzz import Drawn, drawn, generations, row_of, task_of
 from worldsim.fuzz.shrinking import shrink
+from worldsim.results.exit_status import FAIL, INTERRUPTED, PASS
 from worldsim.results.progress_line import ProgressLine
 from worldsim.scenario.tables import SLOTS_PER_TICK, Scenario
 from worldsim.search.drafts import loaded
 from worldsim.search.guide import Guide
 
+_Flown = TypeVar("_Flown")
 NEAR_S = 1.0
 """So near to a bug's trigger ``qswarm cause`` is to say that its failure is certain [s]."""
 
@@ -53,6 +55,18 @@ def planted(name: str) -> Iterator[None]:
         if name:
             PLANTS[name](patch)
         yield
+
+
+class StoppedError(Exception):
+    """A flight was cut off by Ctrl-C."""
+
+
+def first_of(flown: Iterable[_Flown]) -> _Flown:
+    """Return what the only flight showed. Raises StoppedError where it was cut off."""
+    found = [*flown]
+    if not found:
+        raise StoppedError
+    return found[0]
 
 
 class Bench:
@@ -70,6 +84,10 @@ class Bench:
         self._rows: dict[str, Row] = {row["key"]: row for row in map(json.loads, lines)}
         self.say = ProgressLine().update
 
+    def fly(self, task: Task) -> Flown:
+        """Return what a flight showed. Raises StoppedError where it was cut off."""
+        return first_of(self.hangar.fly([task]))
+
     def row(self, name: str, trial: Drawn) -> Row:
         """Return what a trial showed with a bug planted; without one for an empty name."""
         text = trial.trial.text.partition("\n")[2]  # without its name
@@ -78,7 +96,7 @@ class Bench:
         if key not in self._rows:
             self.say(f"{name or 'no bug'}: seed {trial.seed}; {len(self._rows)} flights")
             with planted(name):
-                (flown,) = self.hangar.fly([task_of(trial)])
+                flown = self.fly(task_of(trial))
             row = {**row_of(trial, flown), "key": key, "plant": name}
             with self._file.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")
@@ -128,7 +146,7 @@ def find(bench: Bench, names: list[str], seeds: range, budget: int) -> bool:
         folder = bench.folder / "findings" / name
         if not (folder / SCENARIO).exists():
             with planted(name):
-                (flown,) = bench.hangar.fly([task_of(first.trial)])
+                flown = bench.fly(task_of(first.trial))
             begin(folder, first.trial.trial.text, bench.row(name, first.trial), flown)
         if not read_finding(folder)["shrunk"]:
             with planted(name):
@@ -162,7 +180,7 @@ def violated(bench: Bench, folder: Path, name: str) -> list[str]:
     scenario = loaded((folder / SCENARIO).read_text("utf-8"), BESIDE)
     flights = flights_for(read_finding(folder)["property"])
     with planted(name):
-        (flown,) = bench.hangar.fly([Task("replay", scenario, flights=flights)])
+        flown = bench.fly(Task("replay", scenario, flights=flights))
     return [key for key, margin in flown.margins.items() if margin < 0.0]
 
 
@@ -190,7 +208,7 @@ def difference_s(bench: Bench, folder: Path, name: str) -> float | None:
     scenario = loaded((folder / SCENARIO).read_text("utf-8"), BESIDE)
     order = Order("difference", scenario, DifferenceProbe(), (DifferenceProbe.FILE,))
     with planted(name):
-        (shown,) = bench.hangar.site.fly([order], bench.hangar.stop)
+        shown = first_of(bench.hangar.site.fly([order], bench.hangar.stop))
     at_s: float | None = json.loads(shown.files[DifferenceProbe.FILE])
     return at_s
 
@@ -215,7 +233,7 @@ def harm_of(bench: Bench, folder: Path, name: str) -> Harm:
         slots = None if end is None else end * SLOTS_PER_TICK
         window = Window(first * SLOTS_PER_TICK, slots)
         task = Task("harm", scenario, window, flights_for(wanted))
-        (flown,) = bench.hangar.fly([task])
+        flown = bench.fly(task)
         return flown.margins.get(wanted, 1.0) < 0.0
 
     with planted(name):
@@ -289,16 +307,24 @@ def main() -> int:
     parser.add_argument("--budget", type=int, default=SHRINK_FLIGHTS, help="flights that shrink")
     given: Any = parser.parse_args()
     with stop_requests() as stop:
-        bench = Bench(given.out, stop)
-        names = given.only or list(PLANTS)
-        if given.what == "find":
-            seeds = range(given.first[0], given.first[0] + given.most)
-            return 0 if find(bench, names, seeds, given.budget) else 1
-        if given.what == "race":
-            race(bench, names, given.first, given.most)
-        else:
-            causes(bench, names)
-    return 0
+        try:
+            return measured(Bench(given.out, stop), given)
+        except StoppedError:
+            print("stopped; the same command goes on", file=sys.stderr)
+            return INTERRUPTED
+
+
+def measured(bench: Bench, given: Any) -> int:
+    """Measure what the command line asks for; return the exit status."""
+    names = given.only or list(PLANTS)
+    if given.what == "find":
+        seeds = range(given.first[0], given.first[0] + given.most)
+        return PASS if find(bench, names, seeds, given.budget) else FAIL
+    if given.what == "race":
+        race(bench, names, given.first, given.most)
+    else:
+        causes(bench, names)
+    return PASS
 
 
 if __name__ == "__main__":
